@@ -92,10 +92,10 @@ function(flappy_simulator suffix)
   target_link_libraries(flappy_model${suffix} PUBLIC flappy_io PRIVATE $<BUILD_INTERFACE:Eigen3::Eigen>)
 
   flappy_kernels(step_objects flappy_step "${suffix}" sim/step.cpp ${ARGN})
-  flappy_kernels(mean_objects flappy_mean_step "${suffix}" sim/mean_step.cpp ${ARGN})
+  flappy_kernels(beat_averaged_objects flappy_beat_averaged_step "${suffix}" sim/beat_averaged_step.cpp ${ARGN})
   flappy_kernels(jointed_objects flappy_jointed_step "${suffix}" sim/jointed_step.cpp ${ARGN})
-  flappy_room(flappy_sim${suffix} FOLDERS sim WITHOUT sim/step.cpp sim/mean_step.cpp sim/jointed_step.cpp
-    SOURCES ${step_objects} ${mean_objects} ${jointed_objects})
+  flappy_room(flappy_sim${suffix} FOLDERS sim WITHOUT sim/step.cpp sim/beat_averaged_step.cpp sim/jointed_step.cpp
+    SOURCES ${step_objects} ${beat_averaged_objects} ${jointed_objects})
   target_link_libraries(flappy_sim${suffix} PUBLIC flappy_model${suffix})
 
   flappy_kernels(loop_objects flappy_loop "${suffix}" flight/closed_loop.cpp ${ARGN})

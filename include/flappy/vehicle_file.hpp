@@ -1,4 +1,4 @@
-// Vehicle files: TOML with `schema = 1`, one number for every entry of parameters(), `[effects.<id>]` tables, points of contact as
+// Vehicle files: TOML with `schema = 1`, one number for every element of parameters(), `[effects.<id>]` tables, points of contact as
 //
 //   [contact.left_foot]
 //   on = "torso"                                             # or left.leading_edge, left.wing, right.leading_edge, right.wing
@@ -6,10 +6,9 @@
 //   stiffness_N_m = 150.0
 //   damping_s_m = 0.5
 //   friction = 0.6
-//   grasp_m_s = 0.3                                          # optional: it holds on to a pole that it meets more slowly
+//   grasp_m_s = 0.3                                          # optional: the point holds on to a pole that it meets more slowly
 //
-// and, where
-// something is known of how far these figures can be trusted,
+// and, where the uncertainty of the parameters is known,
 //
 //   [posterior]
 //   names = ["torso.mass_kg", "effects.ground_effect.gain"]
@@ -25,19 +24,21 @@
 
 namespace flappy::model {
 
-/// Reads a vehicle. `overrides`: "left.motor.resistance_ohm=14". Throws std::runtime_error, what() "file:line:column: ..."
+/// Reads a vehicle with wings and motors; refuses beat-averaged robots and articulated wings.
+/// `overrides`: "left.motor.resistance_ohm=14". Throws std::runtime_error, what() "file:line:column: ..."
 Vehicle read_vehicle(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
 
-/// As above, or one that is known by the beat (`model = "beat_averaged"` or `"predicted"`), which read_vehicle() refuses.
+/// Reads a vehicle of any kind, including beat-averaged robots (`model = "beat_averaged"` or `"predicted"`) and
+/// articulated wings (`model = "jointed"`).
 Vehicle read_any_vehicle(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
 
-/// As read_any_vehicle(), but for one whose forces are predicted for recorded flights alone: refused, for nothing flies it.
+/// As read_any_vehicle(), but refuses `model = "predicted"`: its forces exist for recorded flights only.
 Vehicle read_flyable_vehicle(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
 
-/// As read_vehicle(), for physics steps of `step_s` that have to divide the driver's hold: refused where they do not.
+/// As read_vehicle(); refuses a vehicle if `step_s` does not divide the driver's hold.
 Vehicle read_vehicle_for_steps(const std::filesystem::path& path, double step_s);
 
-/// The same vehicle as the text of a vehicle file.
+/// Text of a vehicle file that reads back as the same vehicle.
 std::string vehicle_text(const Vehicle& vehicle);
 
 }  // namespace flappy::model

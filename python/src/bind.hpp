@@ -1,4 +1,4 @@
-// What the parts of the module share: arrays that Python owns, and errors that name what they were given.
+// Shared by the parts of the module: arrays that Python owns, checks of arguments, and error messages that describe them.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -22,12 +22,12 @@ using namespace nb::literals;
 template <class T>
 using Array = nb::ndarray<nb::numpy, T, nb::c_contig, nb::device::cpu>;
 
-/// "float64 of shape (3, 4)", of whatever NumPy makes of it.
+/// Describes a value as NumPy sees it: "float64 of shape (3, 4)".
 std::string described(nb::handle value);
 std::string shape_text(std::span<const std::size_t> shape);
 
-/// Numbers of Python as an array of this shape: float32 as they are, other floats rounded. TypeError or ValueError, with both
-/// shapes in it, for others, and for what is not finite.
+/// Converts a Python array to floats of a given shape: float32 as it is, other floats rounded. Throws TypeError for other types, and
+/// ValueError, with both shapes in the message, for another shape and for numbers that are not within +-`most`.
 class Floats {
  public:
   Floats(nb::handle value, const char* name, std::initializer_list<std::size_t> shape, float most);
@@ -37,7 +37,7 @@ class Floats {
   nb::ndarray<const float, nb::c_contig, nb::device::cpu> array_;
 };
 
-/// A new array of Python, to be filled.
+/// A new array of zeros that Python owns.
 template <class T>
 Array<T> make_array(std::initializer_list<std::size_t> shape) {
   std::size_t size = 1;
@@ -47,7 +47,7 @@ Array<T> make_array(std::initializer_list<std::size_t> shape) {
                   nb::capsule(data, [](void* p) noexcept { delete[] static_cast<T*>(p); }));
 }
 
-/// One call at a time: RuntimeError where another thread is in one.
+/// Admits one call at a time: throws RuntimeError while another thread is in a call.
 class Turn {
  public:
   Turn(std::atomic_flag& busy, const char* what);
@@ -58,10 +58,10 @@ class Turn {
   std::atomic_flag& busy_;
 };
 
-/// The file that is meant: as it stands, or of the package's own configurations ("fly/hover.toml").
+/// Finds a file: `file` itself, or else a configuration of the package, such as "fly/hover.toml".
 std::filesystem::path found(const std::filesystem::path& file);
 
-/// The row of `i`, counted from the end where it is negative. IndexError.
+/// Checks an index, which counts from the end where it is negative. Throws IndexError.
 std::size_t checked_index(std::int64_t i, std::size_t count);
 
 void bind_vehicle(nb::module_& m);

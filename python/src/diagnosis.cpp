@@ -1,4 +1,4 @@
-// What measurements say of a vehicle: flappy-gap diagnose, flappy-identify forces.
+// Binds diagnosis and identification from measurements: flappy-gap diagnose, flappy-identify forces.
 #include <csignal>
 
 #include "bind.hpp"
@@ -10,7 +10,7 @@
 namespace flappy::python {
 namespace {
 
-/// Ctrl-C ends our work early meanwhile, and is Python's again after it.
+/// During its lifetime Ctrl-C stops our work early; afterwards Python handles it again.
 class Interruptible {
  public:
   Interruptible() {

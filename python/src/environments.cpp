@@ -1,4 +1,4 @@
-// Environments: arrays of a step are written where Python sees them.
+// Binds environments. A step writes directly into arrays that Python sees.
 #include "rollout/environments.hpp"
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 namespace flappy::python {
 namespace {
 
-/// All that a step writes, in one piece of memory.
+/// The memory that a step writes.
 struct Buffer {
   Buffer(std::size_t count, std::size_t observations)
       : observation(count * observations), reward(count), terminated(new bool[count]()), truncated(new bool[count]()) {}
@@ -20,13 +20,13 @@ struct Buffer {
   std::unique_ptr<bool[]> terminated, truncated;
 };
 
-/// Buffers that Python has given back, for the next steps.
+/// Buffers that Python no longer uses, for the next steps.
 struct Pool {
   std::mutex mutex;
   std::vector<std::unique_ptr<Buffer>> free;
 };
 
-/// A buffer that Python holds; it goes back to the pool with the last array that shows it.
+/// A buffer that Python uses. It returns to the pool with the last array that refers to it.
 struct Lease {
   explicit Lease(std::shared_ptr<Pool> from) : pool(std::move(from)) {}
   Lease(const Lease&) = delete;
@@ -103,7 +103,7 @@ class PyEnvironments {
     return nb::make_tuple(shown_[0], shown_[1], shown_[2], shown_[3], ended);
   }
 
-  /// What ended in the last step.
+  /// The episodes that ended in the last step.
   nb::dict ended() const {
     const rollout::Environments& e = all();
     const std::size_t n = e.count();
@@ -129,7 +129,7 @@ class PyEnvironments {
     return d;
   }
 
-  /// What an environment looks like: true pose and wings, and where it is meant to be.
+  /// The state to draw an environment: true pose and wing angles, and the target.
   nb::dict pose(std::int64_t at) const {
     const std::size_t i = checked_index(at, all().count());
     const sim::FlapperState s = all().state(i);
@@ -149,7 +149,7 @@ class PyEnvironments {
     return d;
   }
 
-  /// What stays the same while it flies, as a flight page has it.
+  /// The constant part of a drawing, as JSON in the form of a flight page: the vehicle's form and its surroundings.
   std::string scene() const {
     const rollout::FlyConfig& config = all().config();
     const sim::World& world = config.fleet.batch.world;
@@ -167,7 +167,7 @@ class PyEnvironments {
   }
 
  private:
-  /// Where the next step is written: what nobody looks at any more, or, of views, the other one of two.
+  /// The buffer for the next step: one that Python no longer uses, or, without copies, the other one of two.
   Buffer& fresh() {
     if (!copy_ && views_.size() == 2) {
       turn_ = 1 - turn_;
@@ -196,7 +196,8 @@ class PyEnvironments {
     }
     return b;
   }
-  /// Of an environment that is reset by itself, the others' rows stay.
+  /// With autoreset disabled, keeps the observations: reset_some() replaces only the rows of the environments that it
+  /// resets.
   void keep(const Buffer& buffer) {
     if (all().options().autoreset == rollout::Autoreset::disabled) last_ = buffer.observation;
   }

@@ -1,4 +1,4 @@
-// A network of any library as our C header, proven as our own are.
+// Exports a network of any library as our C header, and proves it like our own.
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -16,12 +16,12 @@
 namespace flappy::python {
 namespace {
 
-/// As flappy-export: flights whose observations are tried, and how many of them are test vectors and proofs.
+/// As in flappy-export: number of flights for observations, and numbers of vectors for tests and proofs.
 constexpr std::size_t kProofFlights = 64, kTestVectors = 24, kProofVectors = 1000;
 
 using Numbers = std::vector<double>;
 
-/// What is exported, in memory until it is proven.
+/// An export, kept in memory until it is proven.
 class PyExport {
  public:
   PyExport(const std::filesystem::path& config, const std::vector<std::string>& overrides,
@@ -39,7 +39,7 @@ class PyExport {
     actor.hidden =
         static_cast<policy::Activation>(std::ranges::find(policy::kActivationNames, hidden) - policy::kActivationNames);
     actor.weights = weights, actor.mean = mean, actor.scale = scale, actor.clip = clip;
-    // through its file, which refuses what is no actor
+    // write and read the file, because reading refuses an invalid actor
     const io::TemporaryFolder work;
     policy::write_actor(work / "actor.json", actor);
     fly.actor = std::make_shared<const policy::Actor>(policy::read_actor(work / "actor.json"));
@@ -61,7 +61,7 @@ class PyExport {
       files_["flappy_controller.h"] = deploy::controller_header(fly, info, deploy::record_controller(fly));
   }
 
-  /// Observations of flights, and what the exported network does upon them, in [-1, 1].
+  /// Observations of flights, and the exported network's actions for them, in [-1, 1].
   nb::tuple flown() const {
     const policy::PolicyVectors some = deploy::some_of(flown_, kProofVectors);
     const auto inputs = static_cast<std::size_t>(network_.inputs()),
@@ -76,7 +76,7 @@ class PyExport {
     return nb::make_tuple(observation, action);
   }
 
-  /// A row for each compiler; RuntimeError where a bit differs.
+  /// Returns a table with a row for each compiler. Throws RuntimeError where a bit differs.
   std::string prove(bool everywhere) const {
     const nb::gil_scoped_release free;
     const io::TemporaryFolder work;

@@ -1,4 +1,4 @@
-// Closed-loop fleets, and flight logs.
+// Binds closed-loop fleets, flight logs, and pages of flights.
 #include <nanobind/stl/array.h>
 
 #include <variant>
@@ -33,7 +33,7 @@ class PyFleet {
   }
   std::atomic_flag& busy() const { return busy_; }
 
-  /// An array of `width` numbers of each flapper, or of one number where it is 0.
+  /// An array with `width` numbers for each flapper, or one-dimensional with one number each where `width` is 0.
   template <class T = double>
   Array<T> rows(std::size_t width, const auto& put) const {
     const Turn turn(busy_, "the fleet");
@@ -152,7 +152,7 @@ struct NamedColumn {
   Column* column;
 };
 
-/// Calls visit(stream's name, its columns) for all that a log has.
+/// Calls visit(name of a stream, its columns) for all streams of a log.
 void streams(FlightLog& log, const auto& visit) {
   auto& c = log.command;
   std::vector<NamedColumn> command = {{"t_s", &c.t_s}};
@@ -220,7 +220,7 @@ nb::dict read_flight(const std::filesystem::path& folder) {
   return flight;
 }
 
-/// By way of texts, so that what is wrong is said as of a log that is read, in `folder`.
+/// Converts the dict of read_flight to a log. Goes through the text of the files, so that errors read as those of a log in `folder`.
 FlightLog log_of(const nb::dict& flight, const std::filesystem::path& folder) {
   flightlog::LogFiles files;
   for (const auto [key, value] : flight) {
@@ -254,7 +254,7 @@ void write_flight(const std::filesystem::path& folder, const nb::dict& flight) {
   flightlog::write_flight_log(folder, log_of(flight, folder));
 }
 
-/// The page of flights, each a folder or what read_flight returns; these are named by their place.
+/// The HTML page of flights. Each is a folder or a dict of read_flight; a dict is named by its place in the list.
 std::string flights_page(const nb::list& flights, const std::optional<std::filesystem::path>& vehicle,
                          const std::optional<std::array<double, 3>>& goal_m) {
   std::vector<view::ShownFlight> shown;
@@ -275,7 +275,7 @@ std::string flights_page(const nb::list& flights, const std::optional<std::files
   return view::page_text(section.title(), {section}, packing);
 }
 
-/// Seconds that `steps` steps of `periods` control periods take the fleet alone: what environments are measured by.
+/// Wall-clock seconds for `steps` steps of `periods` control periods of the fleet alone, the reference for the speed of environments.
 double fleet_seconds(const std::filesystem::path& config, const std::vector<std::string>& overrides, std::size_t count,
                      int periods, int steps) {
   const rollout::FlyConfig fly = rollout::read_fly_config(found(config), overrides);

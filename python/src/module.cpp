@@ -1,4 +1,4 @@
-// The module flappy._core. Its errors: io::InputError is flappy.InputError, a ValueError.
+// The module flappy._core. io::InputError becomes flappy.InputError, a ValueError.
 #include "bind.hpp"
 #include "io/config.hpp"
 #include "io/installation.hpp"
@@ -13,7 +13,6 @@ std::string shape_text(std::span<const std::size_t> shape) {
   return text + ")";
 }
 
-/// Of a str of Python.
 std::string text_of(const nb::object& str) { return nb::cast<std::string>(str); }
 
 std::string described(nb::handle value) {

@@ -1,4 +1,4 @@
-// Policies that were trained or exported, and the way of a network into C.
+// Binds policies, trained or exported.
 #include "policy/policy.hpp"
 
 #include "bind.hpp"
@@ -8,7 +8,7 @@
 namespace flappy::python {
 namespace {
 
-/// One of a run folder or of a C header.
+/// The policy of a finished run, or one of a file that policy::load_policy() reads.
 class PyPolicy {
  public:
   PyPolicy(const std::filesystem::path& path, int observations, int actions)

@@ -1,4 +1,4 @@
-// Vehicles, and many of them in open loop: flappy::sim::Batch, its arrays a row for each flapper.
+// Binds vehicles, and batches of them in open loop: flappy::sim::Batch, with a row of an array for each flapper.
 #include <algorithm>
 #include <variant>
 
@@ -23,7 +23,7 @@ model::Parameter parameter(Vehicle& v, const std::string& path) {
                           .c_str());
 }
 
-/// One of the two precisions.
+/// A batch in double or single precision.
 class PyBatch {
  public:
   PyBatch(std::size_t count, const Vehicle& vehicle, double step_s, int threads, const sim::World& world,
@@ -47,7 +47,7 @@ class PyBatch {
   mutable std::atomic_flag busy_ = ATOMIC_FLAG_INIT;
 };
 
-/// The numbers of a state, in the order of its members, and their names and widths.
+/// The members of a state: name, index of the first number, and number of numbers.
 struct Part {
   const char* name;
   std::size_t first, width;
@@ -94,7 +94,8 @@ sim::FlapperState state_of(const nb::dict& given) {
   return s;
 }
 
-/// Runs `set(i, row)` for every flapper of an array of one row for each, or of one for all.
+/// Calls `set(i, row)` for every flapper, with an array of one row for each flapper or of one row for all. Throws ValueError for other
+/// shapes and for numbers that are not finite.
 void for_rows(nb::handle given, const char* name, std::size_t count, std::size_t width, const auto& set) {
   const auto array =
       nb::cast<Doubles>(nb::module_::import_("numpy").attr("ascontiguousarray")(given, "dtype"_a = "float64"));

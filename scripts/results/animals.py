@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Animals beside what was published of them. Prints the tables of docs/animals.md.
+"""Animals beside what was published of them. Prints the tables of docs/results/animals.md.
 
     scripts/results/animals.py BIN ROOT FOLDER
 

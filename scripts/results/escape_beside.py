@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The trained escape of the bird beside the robot's: prints the trained columns of docs/animals.md.
+"""The trained escape of the bird beside the robot's: prints the trained columns of docs/results/animals.md.
 
     scripts/results/escape_beside.py BIN ROOT BIRD_RUN ROBOT_RUN OUT
 

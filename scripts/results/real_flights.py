@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Diagnoses flights that others measured: a Flapper Nimble+ and a Crazyflie 2.1, from a folder with flapper/*.csv.gz and
-nanobench/*.csv.gz. Prints the tables of docs/real.md; keeps every diagnosis in OUT.
+nanobench/*.csv.gz. Prints the tables of docs/results/real_flights.md; keeps every diagnosis in OUT.
 
     scripts/results/real_flights.py BIN PROJECT DATA OUT
 """
@@ -15,7 +15,7 @@ import subprocess
 import sys
 import time
 
-BIN, PROJECT, DATA, OUT = (pathlib.Path(a) for a in sys.argv[1:5])
+BIN, PROJECT, DATA, OUT = (pathlib.Path(a).resolve() for a in sys.argv[1:5])
 
 # What is withheld of the fitted vehicle: name, channel, entry, its parameters (all: the whole entry), entries of the same form, and what else
 # is a right answer.

@@ -14,10 +14,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Shares of the mean square of an example, as ridges to choose among.
+/// Ridges to choose from, as shares of the mean square of an example.
 constexpr double kRidges[] = {0.01, 0.03, 0.1, 0.3, 1, 3, 10};
-/// Features that hardly differ say nothing.
-constexpr double kLeastSd = 1e-6;
+/// Features with a smaller standard deviation are left out.
+constexpr double kMinSd = 1e-6;
 
 }  // namespace
 
@@ -35,11 +35,12 @@ BlackBox::BlackBox(const std::vector<Example>& examples) {
   const VectorXd mean = x.colwise().mean();
   x.rowwise() -= mean.transpose();
   VectorXd scale = (x.colwise().squaredNorm() / static_cast<double>(n)).cwiseSqrt();
-  for (double& s : scale) s = s > kLeastSd ? 1 / s : 0;
+  for (double& s : scale) s = s > kMinSd ? 1 / s : 0;
   x = x * scale.asDiagonal();
   const VectorXd offset = y.colwise().mean();
   y.rowwise() -= offset.transpose();
-  // in the space of the examples, of which there are fewer than features; an example left out is predicted off by alpha / (K + ridge)^-1_ii
+  // kernel form, for there are fewer examples than features; the prediction of a left-out example errs by alpha / (K +
+  // ridge)^-1_ii
   const MatrixXd products = x * x.transpose();
   const double size = products.trace() > 0 ? products.trace() / static_cast<double>(n) : 1;
   MatrixXd best;

@@ -1,5 +1,5 @@
-// A plain black box beside the diagnosis: ridge regression from what the residuals look like to what the robot had, learnt on scored robots of other
-// families alone. It knows no physics and no catalogue: what it never saw it cannot name.
+// A black box as a baseline of the diagnosis: ridge regression from features of the residuals to the effect of the robot, learnt only on scored
+// robots of other families. It has no physics and no catalogue, so it names only effects that its examples have.
 #pragma once
 
 #include <string>
@@ -7,18 +7,19 @@
 
 namespace flappy::benchmark {
 
-/// What residuals looked like (Prediction::features), and which single effect was at work; "" for none.
+/// Features of the residuals (Prediction::features), and the single effect that the robot had; "" for none.
 struct Example {
   std::vector<double> features;
   std::string effect;
 };
 
-/// Least squares on one column for each effect, features scaled to unit variance; its ridge is that which predicts examples left out best.
+/// Least squares on an indicator column for each effect; features are scaled to unit variance. The ridge is the one that predicts left-out examples
+/// best.
 class BlackBox {
  public:
-  /// `examples`: two at least, all with as many features.
+  /// `examples`: at least two, all with the same number of features.
   explicit BlackBox(const std::vector<Example>& examples);
-  /// Effects and "" by what is predicted of them, the largest first.
+  /// Effects and "" by their predicted indicator, the largest first.
   std::vector<std::string> ranked(const std::vector<double>& features) const;
 
  private:

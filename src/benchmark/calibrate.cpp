@@ -19,10 +19,10 @@ namespace fs = std::filesystem;
 using gap::ScoredHypothesis;
 using gap::VerdictRule;
 
-/// An answer is never taken for less probable, so that no single case decides.
+/// Least probability of a right answer in the score, so that no single case decides.
 constexpr double kMinProbability = 1e-3;
 
-/// What may be chosen: where it stands in the file, its range, and whether it is sought on a logarithmic scale.
+/// A constant to learn: its table and key in the file, its range, and whether it is searched on a logarithmic scale.
 struct Constant {
   const char *table, *key;
   std::function<double&(VerdictRule&)> of;
@@ -32,8 +32,8 @@ struct Constant {
 
 const std::array<Constant, 7>& constants() {
   static const std::array<Constant, 7> kAll = {{
-      {"doubt", "nats", [](VerdictRule& r) -> double& { return r.tempering.nats; }, 0.1, 100, true},
-      {"doubt", "freedom", [](VerdictRule& r) -> double& { return r.tempering.freedom; }, 0.3, 30, true},
+      {"tempering", "nats", [](VerdictRule& r) -> double& { return r.tempering.nats; }, 0.1, 100, true},
+      {"tempering", "freedom", [](VerdictRule& r) -> double& { return r.tempering.freedom; }, 0.3, 30, true},
       {"gain", "by_chance_nats", [](VerdictRule& r) -> double& { return r.gain.by_chance_nats; }, 0, 300, false},
       {"gain.outside", "by_chance_nats", [](VerdictRule& r) -> double& { return r.gain.outside_by_chance_nats; }, 0,
        300, false},
@@ -96,7 +96,7 @@ class Calibration {
           if (h.remainder) a.unexplained.emplace_back();
           own.hypotheses.push_back(std::move(a));
         }
-        if (own.hypotheses.empty()) continue;  // its data were at fault
+        if (own.hypotheses.empty()) continue;  // its data were faulty
         own.part = parts.try_emplace(manifest.family + " " + own.truth.part, counts.size()).first->second;
         if (own.part == counts.size()) counts.push_back(0);
         counts[own.part] += 1;
@@ -109,7 +109,7 @@ class Calibration {
   std::size_t cases() const { return cases_.size(); }
   const VerdictRule& start() const { return rule_; }
 
-  /// Mean logarithm of what the right answers get.
+  /// Weighted mean logarithm of the probability of the right answers.
   double score(const VerdictRule& rule) const {
     double sum = 0;
     for (const Case& c : cases_) {
@@ -128,7 +128,7 @@ class Calibration {
     return sum;
   }
 
-  /// Along one constant after another, by steps that shrink (Hooke, Jeeves 1961).
+  /// Maximises the score along one constant after another, with shrinking steps (Hooke, Jeeves 1961).
   VerdictRule best() const {
     VerdictRule rule = rule_;
     double value = score(rule);
@@ -149,11 +149,11 @@ class Calibration {
   }
 
  private:
-  /// What adds up to 1.
+  /// The priors that add up to 1.
   static std::array<double*, 4> shared(VerdictRule& rule) {
     return {&rule.prior.none, &rule.prior.parameters, &rule.prior.effect, &rule.prior.unknown};
   }
-  /// The others have what one of these leaves.
+  /// Scales the other priors so that all of them add up to 1 with the prior `one`.
   static void share(VerdictRule& rule, const double& one) {
     double others = 0;
     for (const double* p : shared(rule))
@@ -168,8 +168,8 @@ class Calibration {
 
 std::string rounded(double x) { return io::format("%.4g", x); }
 
-/// The file with other figures: all else stays as it is.
-void set_figure(std::string& text, const std::string& table, const std::string& key, const std::string& value) {
+/// Replaces the value of a key in the text of a TOML file; comments and layout stay.
+void set_number(std::string& text, const std::string& table, const std::string& key, const std::string& value) {
   const std::size_t from = text.find("\n[" + table + "]"), at = text.find("\n" + key + " = ", from);
   if (from == std::string::npos || at == std::string::npos) return;
   const std::size_t begin = at + key.size() + 4, end = text.find_first_of(" \n", begin);
@@ -190,12 +190,12 @@ Json calibrate(const CalibrateCommand& command) {
   Json json = {
       {"cases", calibration.cases()}, {"score_before", calibration.score(before)}, {"score", calibration.score(after)}};
   for (const Constant& c : constants()) {
-    set_figure(text, c.table, c.key, rounded(c.of(after)));
+    set_number(text, c.table, c.key, rounded(c.of(after)));
     json[std::string(c.table) + "." + c.key] = c.of(after);
     std::printf("%-12s %-24s %10.4g, was %.4g\n", c.table, c.key, c.of(after), c.of(before));
   }
   for (const auto& [key, value] : {std::pair{"none", after.prior.none}, {"effect", after.prior.effect}})
-    set_figure(text, "prior", key, io::shortest_digits(value));
+    set_number(text, "prior", key, io::shortest_digits(value));
   std::printf("mean log probability of what is right: %.3f, was %.3f, of %zu cases\n", json["score"].get<double>(),
               json["score_before"].get<double>(), calibration.cases());
   io::write_atomically(command.out, text);

@@ -1,8 +1,8 @@
-// flappy-blind calibrate: how much a nat of evidence counts, learnt from robots of which all is known.
+// flappy-blind calibrate: learns the constants of the verdict from robots whose truth is known.
 //
-// Probabilities are made of log evidences by few constants (configs/gap/verdict.toml): what a hypothesis gains by chance, what nats are
-// worth, how often a cause is unknown. They are chosen to give the right answers of scored cases the largest mean logarithm of
-// probability, a proper score (Good 1952), every part of every family counting alike.
+// A few constants turn log evidences into probabilities (configs/gap/verdict.toml): the gain by chance, the tempering of the evidence, the prior of
+// an unknown cause. They are chosen to maximise the mean logarithm of the probability of the right answers in scored cases, a proper score
+// (Good 1952), in which every part of every family has the same weight.
 #pragma once
 
 #include <filesystem>
@@ -14,12 +14,12 @@
 namespace flappy::benchmark {
 
 struct CalibrateCommand {
-  std::vector<std::filesystem::path> folders;                           ///< that were scored
-  std::filesystem::path verdict = io::config_path("gap/verdict.toml");  ///< to start from
+  std::vector<std::filesystem::path> folders;                           ///< scored benchmarks
+  std::filesystem::path verdict = io::config_path("gap/verdict.toml");  ///< constants to start from
   std::filesystem::path out;
 };
 
-/// Writes the verdict's constants and prints what they were and are. InputError where a folder was not scored.
+/// Writes the verdict file with the learnt constants to `out`, and prints them with their old values. InputError if a folder was not scored.
 nlohmann::ordered_json calibrate(const CalibrateCommand& command);
 
 }  // namespace flappy::benchmark

@@ -22,54 +22,54 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Twice the detectable size is flown, and no robot has more than four times the typical.
-constexpr double kMostDetectable = 2, kMostHover = 1000;
-/// What acts in none of these regimes alone does so in hover, too.
+/// Largest detectable magnitude: robots fly twice the detectable magnitude, and none has more than 4. Value that stands for "never" in hover.
+constexpr double kMaxDetectable = 2, kMaxHover = 1000;
+/// Regimes that only rich flight has. Effects that act in these alone need a contrast of their own in hover; others act in hover, too.
 constexpr const char* kOfFlight[] = {"height", "ceiling",      "wall",    "place",      "velocity",
                                      "rate",   "acceleration", "heading", "difference", "bias"};
 constexpr const char* kChannels[] = {"force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z"};
 constexpr const char* kOrders[] = {"mean", "first harmonic", "second harmonic"};
 
-/// Squares of a beat's coefficients of one order count as the waveform's mean square.
+/// Mean square of the waveform of one order of a beat.
 double power(const double* at, std::size_t order) {
   return order == 0 ? at[0] * at[0] : (at[2 * order - 1] * at[2 * order - 1] + at[2 * order] * at[2 * order]) / 2;
 }
 
-/// One effect of one robot: the size detectable in rich flight, and in hover.
+/// Detectable magnitude of an effect for one robot, in rich flight and in hover.
 struct Found {
   double rich = 0, hover = 0;
-  Shown where;  ///< at size 1
+  Shown where;  ///< at magnitude 1
 };
 
 std::string three_digits(double x) { return io::format("%.3g", x); }
 
-struct Size {
+struct Detectable {
   double detectable = 0, low = 0, high = 0, hover = 0;
   Shown where;
   bool undetectable = false, of_sensors = false;
 };
 
-Size size_of(const blind::FamilyEffect& effect, const std::vector<Found>& robots) {
-  std::vector<double> sizes, hovers;
-  Size s;
+Detectable detectable_of(const blind::FamilyEffect& effect, const std::vector<Found>& robots) {
+  std::vector<double> magnitudes, hovers;
+  Detectable s;
   for (const Found& f : robots) {
-    sizes.push_back(f.rich);
+    magnitudes.push_back(f.rich);
     hovers.push_back(f.hover);
     if (f.where.share > s.where.share) s.where = f.where;
   }
   s.of_sensors = s.where.share == 0 && std::ranges::none_of(effect.channels, [](const std::string& c) {
                    return c.starts_with("force") || c.starts_with("torque");
                  });
-  if (s.of_sensors) sizes = {1}, hovers = {1};
-  s.detectable = io::median(sizes);
-  s.low = *std::ranges::min_element(sizes);
-  s.high = *std::ranges::max_element(sizes);
-  s.hover = std::min(io::median(hovers), kMostHover);
-  s.undetectable = !(s.detectable <= kMostDetectable);
+  if (s.of_sensors) magnitudes = {1}, hovers = {1};
+  s.detectable = io::median(magnitudes);
+  s.low = *std::ranges::min_element(magnitudes);
+  s.high = *std::ranges::max_element(magnitudes);
+  s.hover = std::min(io::median(hovers), kMaxHover);
+  s.undetectable = !(s.detectable <= kMaxDetectable);
   return s;
 }
 
-std::string shows(const Size& s) {
+std::string shows(const Detectable& s) {
   if (s.of_sensors) return "sensors alone";
   return std::string(kChannels[s.where.channel]) + ", " + kOrders[s.where.order];
 }
@@ -81,14 +81,14 @@ Beats beats_of(const flightlog::FlightLog& log, const std::vector<double>& beat_
   const flightlog::ImuStream& imu = log.imu;
   const flightlog::Column* streams[] = {&imu.accel_x_m_s2, &imu.accel_y_m_s2, &imu.accel_z_m_s2,
                                         &imu.gyro_x_rad_s, &imu.gyro_y_rad_s, &imu.gyro_z_rad_s};
-  constexpr std::ptrdiff_t kLeastSamples = 9;
+  constexpr std::ptrdiff_t kMinSamples = 9;
   Beats beats;
   for (const double start : beat_s) {
     const double late = log.header.imu.latency_s;
     const auto first = std::ranges::lower_bound(imu.t_s, start + late),
                last = std::ranges::lower_bound(imu.t_s, start + beat + late);
     beats.emplace_back();
-    if (last - first < kLeastSamples) continue;
+    if (last - first < kMinSamples) continue;
     const auto from = first - imu.t_s.begin();
     Eigen::MatrixXd waves(last - first, 6), values(last - first, 6);
     for (Eigen::Index i = 0; i < waves.rows(); ++i) {
@@ -101,7 +101,8 @@ Beats beats_of(const flightlog::FlightLog& log, const std::vector<double>& beat_
     std::array<double, 30>& of = beats.back().emplace();
     for (std::size_t k = 0; k < 6; ++k) {
       const auto c = fit.col(static_cast<Eigen::Index>(k));
-      // the rate's slope and the derivatives of its waves are the turning acceleration's
+      // the gyro measures rates: their slope and the derivatives of their harmonics are those of the angular
+      // acceleration
       const std::array<double, 5> row =
           k < 3 ? std::array{c[0], c[1], c[2], c[3], c[4]}
                 : std::array{c[5] / beat, turn * c[2], -turn * c[1], 2 * turn * c[4], -2 * turn * c[3]};
@@ -119,12 +120,12 @@ void Changed::add(const blind::Contrast& contrast, const Beats& of) {
     }
 }
 
-Shown shown(const Changed& d, double size) {
+Shown shown(const Changed& d, double magnitude) {
   const std::size_t n = d.change.size();
   if (n == 0) return {};
   const double beats = static_cast<double>(n);
   double weight = 0;
-  std::array<double, 2> waveform{};  // mean square of an axis
+  std::array<double, 2> waveform{};  // mean square of an axis: forces, angular accelerations
   for (const auto& s : d.signal)
     for (std::size_t c = 0; c < 6; ++c)
       for (std::size_t order = 0; order < 3; ++order) {
@@ -138,7 +139,8 @@ Shown shown(const Changed& d, double size) {
     for (std::size_t order = 0; order < 3; ++order) {
       const double reference = std::sqrt(order == 0 && c < 3 ? weight : waveform[c / 3]);
       if (!(reference > 0)) continue;
-      // columns: the signal, its slope, a constant of each coefficient; by turns, each within its bound
+      // least squares with bounds, one column after another: the signal, its derivative, a constant for each
+      // coefficient
       const std::size_t from = 5 * c + (order == 0 ? 0 : 2 * order - 1), width = order == 0 ? 1 : 2;
       const double turn = 2 * std::numbers::pi * static_cast<double>(order) * d.flapping_Hz;
       const auto column = [&](std::size_t b, std::size_t k, std::size_t i) {
@@ -147,10 +149,10 @@ Shown shown(const Changed& d, double size) {
         if (k == 1) return order == 0 ? 0 : i == 0 ? turn * x[1] : -turn * x[0];
         return k - 2 == i ? 1.0 : 0.0;
       };
-      const std::array<double, 4> bound = {kFigures, kLate_s, kConstant * reference, kConstant * reference};
+      const std::array<double, 4> bound = {kParameterError, kLate_s, kConstant * reference, kConstant * reference};
       std::array<double, 4> at{};
       const auto rest = [&](std::size_t b, std::size_t i) {
-        double r = size * d.change[b][from + i];
+        double r = magnitude * d.change[b][from + i];
         for (std::size_t k = 0; k < at.size(); ++k) r -= at[k] * column(b, k, i);
         return r;
       };
@@ -179,7 +181,7 @@ Shown shown(const Changed& d, double size) {
   return most;
 }
 
-double detectable_size(const Changed& changed, double most) {
+double detectable_magnitude(const Changed& changed, double most) {
   if (!(shown(changed, most).share >= kShare)) return std::numeric_limits<double>::infinity();
   double low = 0, high = most;
   for (int i = 0; i < 24; ++i) {
@@ -202,7 +204,7 @@ Json run_detectability(const DetectabilityCommand& command) {
   for (int i = 0; i < command.vehicles; ++i) {
     blind::Assignment a;
     a.vehicle_file = command.vehicle;
-    a.own_figures = true;
+    a.own_parameters = true;
     FlownRobot flown = fly_drawn(family, a, command.seed + static_cast<std::uint64_t>(i));
     Robot r{flown.assignment, flown.assignment, {}, {}};
     for (blind::FamilyFlight& f : flown.flights) r.logs.push_back(std::move(f.log));
@@ -228,14 +230,14 @@ Json run_detectability(const DetectabilityCommand& command) {
     Changed rich, hover;
     bool acts = true;
     for (std::size_t n = 0; n < r.logs.size() && acts; ++n) acts = add(rich, r.rich, n, r.logs[n]) || n > 0;
-    f.rich = detectable_size(rich, kMostDetectable);
+    f.rich = detectable_magnitude(rich, kMaxDetectable);
     f.where = shown(rich, 1);
     f.hover = f.rich;
     if (std::ranges::all_of(effect.regimes,
                             [](const std::string& w) { return std::ranges::count(kOfFlight, w) > 0; }) &&
         acts) {
       add(hover, r.hover, 0, r.hover_log);
-      f.hover = detectable_size(hover, kMostHover);
+      f.hover = detectable_magnitude(hover, kMaxHover);
     }
     const std::scoped_lock lock(mutex);
     line.show(++done / static_cast<double>(effects.size() * robots.size()));
@@ -243,15 +245,15 @@ Json run_detectability(const DetectabilityCommand& command) {
   line.clear();
 
   std::string text = "# How large the effects of family " + command.family +
-                     " have to be (docs/blind.md), in its own unit: 1 is typical. Written by\n"
+                     " have to be (docs/reference/benchmark.md), in its own unit: 1 is typical. Written by\n"
                      "#   flappy-blind detectability --family " +
                      command.family + " --vehicle " + command.vehicle + " --vehicles " +
                      std::to_string(command.vehicles) + " --seed " + std::to_string(command.seed) + " --out " +
                      command.out + "\n# commit " + io::commit() +
                      "\n#\n"
-                     "# detectable    an effect of this size changes a channel's mean or harmonic by " +
+                     "# detectable    an effect of this magnitude changes a channel's mean or harmonic by " +
                      three_digits(100 * kShare) +
-                     " % beyond what figures and lateness take over\n"
+                     " % beyond what parameters and lateness take over\n"
                      "#               (src/benchmark/detectability.hpp); median of robots; 1 where it acts on "
                      "sensors alone\n"
                      "# undetectable  that is beyond 2\n"
@@ -260,7 +262,7 @@ Json run_detectability(const DetectabilityCommand& command) {
   std::printf("%-30s %10s %17s %8s  %s\n", "effect", "detectable", "least, most", "hover", "shows in");
   Json all = Json::object();
   for (std::size_t e = 0; e < effects.size(); ++e) {
-    const Size s = size_of(effects[e], found[e]);
+    const Detectable s = detectable_of(effects[e], found[e]);
     std::printf("%-30s %10.3g %8.3g %8.3g %8.3g  %s%s\n", effects[e].id.c_str(), s.detectable, s.low, s.high, s.hover,
                 shows(s).c_str(), s.undetectable ? "; undetectable" : "");
     text += "\n[" + effects[e].id + "]\n";

@@ -58,7 +58,7 @@ FlownRobot fly_drawn(const Family& family, blind::Assignment a, std::uint64_t se
     robot.lost.push_back("flight " + std::to_string(robot.flights.size()) + " " + robot.flights.back().how);
   }
   throw blind::NeverFlies("--seed " + std::to_string(seed) + ": " + std::to_string(blind::kTries) +
-                          " robots in a row crashed; accepted: effects of smaller size, less randomisation");
+                          " robots in a row crashed; accepted: effects of smaller magnitude, less randomisation");
 }
 
 }  // namespace flappy::benchmark

@@ -59,7 +59,8 @@ class Maker {
   fs::path label_file(const PlannedCase& p) const { return sealed_ / (number_text(p.number) + ".json"); }
   fs::path case_folder(const PlannedCase& p) const { return command_.out / "cases" / number_text(p.number); }
 
-  /// Half a benchmark goes on with the same plan only.
+  /// Stores the plan's hash, or compares it with that of an unfinished benchmark in the folder; InputError if they
+  /// differ.
   void agree_with_what_is_there() const {
     Json plan = {command_.family};
     for (const PlannedCase& p : plan_) plan.push_back(to_json(p));
@@ -73,7 +74,8 @@ class Maker {
 
   void make(const PlannedCase& p) const {
     const blind::Assignment a = assignment_of(p, command_.vehicle);
-    // what its own file says of a robot of the published randomisation stays with it
+    // the vehicle file of a robot of the published randomisation stays in the sealed folder, and is removed after its
+    // flights
     const fs::path drawn = sealed_ / ("vehicle_" + number_text(p.number));
     const auto prepare = [&](blind::Assignment& now) {
       if (!p.published) return;
@@ -90,7 +92,7 @@ class Maker {
       }
     Json json;
     try {
-      fs::remove_all(case_folder(p));  // half of it may be there
+      fs::remove_all(case_folder(p));  // an interrupted run may have left a part of it
       io::make_folder(case_folder(p));
       FlownRobot flown = fly_drawn(family_, a, p.seed, prepare);
       for (std::size_t k = 0; k < flown.flights.size(); ++k) {

@@ -18,18 +18,19 @@ struct MakeCommand {
   std::string family = "a";
   std::filesystem::path out, vehicle = io::config_path("vehicles/hummingbird_nominal.toml"),
                              randomise = io::config_path("randomisation/published.toml"),
-                             detectable;  ///< the latter: empty for the family's own
+                             detectable;  ///< `detectable`: table of detectable magnitudes; empty: that of the family
   PlanOptions plan;
   int threads = 0;  ///< 0: one for each processor
   io::Ranks* ranks = nullptr;
-  /// What of the catalogue's parameters comes nearest to the effects of a case, by "effect.parameter"; null: nothing does.
-  /// Asked of the parts whose intervals are scored; without it none is.
+  /// Parameters with which the effects of the catalogue come nearest to those of a case, by "effect.parameter"; null: none comes near. Called for
+  /// cases of part "singles", whose intervals are scored; if unset, no case has true values.
   std::function<std::map<std::string, std::optional<double>>(const blind::Assignment&,
                                                              const std::vector<blind::BlindEffect>&)>
       true_values;
 };
 
-/// Flies the cases into `out`/cases and seals what they are. Goes on where it was stopped; false where it was stopped again.
+/// Flies the cases into `out`/cases and seals their labels. Resumes an interrupted run; false if interrupted again. InputError if `out` has a
+/// benchmark with another plan.
 bool make_bench(const MakeCommand& command);
 
 }  // namespace flappy::benchmark

@@ -10,14 +10,15 @@
 namespace flappy::benchmark {
 namespace {
 
-/// Robots flown by hand and for the tables of detectable sizes have seeds below; 700001 to 799999, and of each family the 120,000 from 5,000,000,
-/// 5,500,000, 6,000,000, 6,500,000, 7,000,000, 7,500,000 and 8,000,000 on are spent.
+/// Robots that are flown by hand, and those of the tables of detectable magnitudes, have seeds below kSeedsOfAFamily. Already used are the seeds
+/// 700001 to 799999 and, counted from the first seed of each family, the 120,000 from 5,000,000, 5,500,000, 6,000,000, 6,500,000, 7,000,000,
+/// 7,500,000 and 8,000,000 on.
 constexpr std::uint64_t kSeedsOfAFamily = 10'000'000, kReported = 8'500'000, kSeedsOfAPart = 10'000;
-/// Of each part, as many effects of each kind; of those with few effects so many in all.
+/// Least number of cases of most parts; rounded up so that all effects of a part have the same number of cases.
 constexpr std::size_t kAtLeast = 100;
 constexpr double kOverDetectable = 2, kLargest = 4;
-/// Of effects outside the catalogue of which the table says nothing.
-constexpr double kOutsideSize = 2;
+/// Magnitude of effects outside the catalogue that the table does not list.
+constexpr double kOutsideMagnitude = 2;
 
 using Ids = std::vector<std::string>;
 
@@ -51,7 +52,7 @@ class Planner {
     if (detectable_.size() < 2)
       throw io::InputError(
           "--detectable: fewer than two effects are detectable; accepted: a table of flappy-blind detectability");
-    // the first cases of a part, too, are a fair draw of its effects
+    // so that the first cases of a part (PlanOptions::at_most) are a fair draw of its effects
     for (Ids* ids : {&detectable_, &typical_, &outside_, &hidden_}) shuffle(*ids);
     random_.seed(first_seed_);
   }
@@ -62,7 +63,7 @@ class Planner {
     part("singles_current", singles, [&](std::size_t k, PlannedCase& c) {
       single(k, c);
       c.power = true;
-      c.seed = seed_of("singles", k);  // the same robots
+      c.seed = seed_of("singles", k);  // the robots of part "singles"
     });
     part("redeclared", kAtLeast, [&](std::size_t k, PlannedCase& c) {
       single(k, c);
@@ -73,14 +74,14 @@ class Planner {
       const std::string& id = typical_[k % typical_.size()];
       c.effects = {{id, 1}};
     });
-    const auto harmless = [&](const char* name, bool published, bool own_figures, bool conventions) {
+    const auto harmless = [&](const char* name, bool published, bool own_parameters, bool conventions) {
       part(name, kAtLeast, [&](std::size_t, PlannedCase& c) {
-        c.published = published, c.own_figures = own_figures, c.conventions = conventions;
+        c.published = published, c.own_parameters = own_parameters, c.conventions = conventions;
       });
     };
     harmless("none", false, false, false);
     harmless("parameters", true, false, false);
-    harmless("own_figures", false, true, false);
+    harmless("own_parameters", false, true, false);
     harmless("conventions", false, false, true);
     part("withheld", rounds(detectable_, kAtLeast / 2), [&](std::size_t k, PlannedCase& c) {
       single(k, c);
@@ -98,7 +99,7 @@ class Planner {
   }
 
  private:
-  /// The same number of each, at least so many in all.
+  /// The least multiple of the number of effects that is at least `at_least`; 0 without effects.
   static std::size_t rounds(const Ids& ids, std::size_t at_least) {
     return ids.empty() ? 0 : (at_least + ids.size() - 1) / ids.size() * ids.size();
   }
@@ -117,7 +118,7 @@ class Planner {
       PlannedCase c;
       c.part = name;
       c.seed = seed_of(name, k);
-      c.own_figures = c.conventions = true;
+      c.own_parameters = c.conventions = true;
       fill(k, c);
       cases_.push_back(std::move(c));
     }
@@ -125,7 +126,7 @@ class Planner {
 
   blind::BlindEffect at_twice(const std::string& id) const {
     const auto d = of_.find(id);
-    if (d == of_.end()) return {id, kOutsideSize};
+    if (d == of_.end()) return {id, kOutsideMagnitude};
     return {id, d->second.undetectable ? 1 : kOverDetectable * d->second.detectable};
   }
 
@@ -180,7 +181,7 @@ std::map<std::string, Detectability> read_detectability(const std::filesystem::p
     d.undetectable = t.boolean_or("undetectable", false);
     if (!d.undetectable || t.has("detectable")) d.detectable = t.number("detectable", io::positive(kLargest));
     if (!d.undetectable && kOverDetectable * d.detectable > kLargest)
-      t.fail("detectable", "twice that is beyond size 4", "undetectable = true");
+      t.fail("detectable", "twice that is beyond magnitude 4", "undetectable = true");
     d.hidden = t.number("hover", io::positive(1e3)) > kOverDetectable * d.detectable && !d.undetectable;
     all[e.id] = d;
   }
@@ -191,9 +192,9 @@ std::map<std::string, Detectability> read_detectability(const std::filesystem::p
 blind::Assignment assignment_of(const PlannedCase& planned, const std::filesystem::path& vehicle) {
   blind::Assignment a;
   a.vehicle_file = vehicle;
-  for (const blind::BlindEffect& e : planned.effects) a.effects.emplace_back(e.id, e.size);
+  for (const blind::BlindEffect& e : planned.effects) a.effects.emplace_back(e.id, e.magnitude);
   a.hover = planned.hover, a.power = planned.power;
-  a.own_figures = planned.own_figures, a.conventions = planned.conventions;
+  a.own_parameters = planned.own_parameters, a.conventions = planned.conventions;
   return a;
 }
 

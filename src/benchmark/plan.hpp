@@ -1,4 +1,4 @@
-// Which cases a blind benchmark has.
+// The cases of a blind benchmark.
 #pragma once
 
 #include <cstdint>
@@ -13,38 +13,40 @@
 
 namespace flappy::benchmark {
 
-/// What flappy-blind detectability found of an effect, in its family's sizes.
+/// Detectability of an effect (benchmark/detectability.hpp).
 struct Detectability {
-  double detectable = 0;
-  bool undetectable = false;  ///< twice the size is beyond what can be
-  bool hidden = false;        ///< hover does not show twice the size
+  double detectable = 0;      ///< detectable magnitude, in units of the family
+  bool undetectable = false;  ///< twice the detectable magnitude exceeds what a robot may have
+  bool hidden = false;        ///< hover alone does not show twice the detectable magnitude
 };
 
-/// Of every effect of a family that the catalogue has, and of those outside that the table has. InputError where one is missing.
+/// Reads the table for every effect of a family that the catalogue has, and for effects outside the catalogue that the table lists. InputError if
+/// an effect of the catalogue is missing.
 std::map<std::string, Detectability> read_detectability(const std::filesystem::path& file, const blind::Family& family);
 
 /// One robot and its flights, as only the maker knows them.
 struct PlannedCase {
-  std::size_t number = 0;  ///< from 1, in an order that tells nothing
-  std::string part;        ///< of kParts
+  std::size_t number = 0;  ///< from 1, in random order
+  std::string part;        ///< one of kParts
   std::vector<blind::BlindEffect> effects;
   std::uint64_t seed = 0;
   bool hover = false, power = false;
-  bool own_figures = false, conventions = false;  ///< as in blind::Assignment
-  bool published = false;                         ///< its vehicle is drawn from the published randomisation
-  std::vector<std::string> withheld;              ///< from the catalogue
+  bool own_parameters = false, conventions = false;  ///< as in blind::Assignment
+  bool published = false;                            ///< its vehicle is drawn from the published randomisation
+  std::vector<std::string> withheld;                 ///< effects withheld from the catalogue
 };
 
-/// What its family flies, but for the seed.
+/// The assignment of a case to its family, without the seed.
 blind::Assignment assignment_of(const PlannedCase& planned, const std::filesystem::path& vehicle);
 
 struct PlanOptions {
-  bool reported = false;           ///< seeds of the reported figures; otherwise those of development
+  bool reported = false;           ///< seeds of the reported scores; false: seeds for development
   std::vector<std::string> parts;  ///< empty: all
-  std::size_t at_most = 0;         ///< cases of each part; 0: all
+  std::size_t at_most = 0;         ///< most cases of each part; 0: all
 };
 
-/// Seeds of b begin at 20,000,000 for development and at 28,000,000 for what is reported, those of a and c likewise.
+/// Seeds of family b begin at 20,000,000 for development and at 28,500,000 for reported scores; those of a and c at 10,000,000 and 30,000,000
+/// likewise.
 std::vector<PlannedCase> plan_cases(const blind::Family& family,
                                     const std::map<std::string, Detectability>& detectability,
                                     const PlanOptions& options);

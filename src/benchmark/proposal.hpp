@@ -1,4 +1,4 @@
-// The manoeuvre that a diagnosis proposes, as a laboratory flies it.
+// A manoeuvre that a diagnosis proposes, as a flight in the room of a blind robot.
 #pragma once
 
 #include "blind/family.hpp"
@@ -6,8 +6,9 @@
 
 namespace flappy::benchmark {
 
-/// From where its log begins on, in the room that `header` declares: as far from the ceiling and from the wall as in the manoeuvre's own world, where that
-/// has them, and else above the ground. It keeps a reference to `manoeuvre`.
+/// The part of the manoeuvre that is logged, moved into the room that `header` declares: the distance to the ceiling is that of the manoeuvre's own
+/// world if that has a ceiling, otherwise the height above the ground; the distance to the wall likewise if both have a wall. The result refers to
+/// `manoeuvre`.
 blind::ProposedFlight proposed_flight(const gap::Manoeuvre& manoeuvre, const flightlog::FlightHeader& header);
 
 }  // namespace flappy::benchmark

@@ -30,7 +30,7 @@ Json read_json(const std::filesystem::path& file) {
   try {
     return Json::parse(text);
   } catch (const Json::exception& e) {
-    throw io::InputError(file.string() + ": is no JSON: " + e.what() + "; accepted: what flappy-gap blind wrote");
+    throw io::InputError(file.string() + ": is no JSON: " + e.what() + "; accepted: what flappy-blind wrote");
   }
 }
 
@@ -112,14 +112,14 @@ blind::Assignment Label::robot(const std::filesystem::path& vehicle) const {
 
 Json to_json(const PlannedCase& p) {
   Json effects = Json::array();
-  for (const blind::BlindEffect& e : p.effects) effects.push_back({{"id", e.id}, {"size", e.size}});
+  for (const blind::BlindEffect& e : p.effects) effects.push_back({{"id", e.id}, {"magnitude", e.magnitude}});
   return {{"number", p.number},
           {"part", p.part},
           {"effects", effects},
           {"seed", p.seed},
           {"hover", p.hover},
           {"power", p.power},
-          {"own_figures", p.own_figures},
+          {"own_parameters", p.own_parameters},
           {"conventions", p.conventions},
           {"published", p.published},
           {"withheld", p.withheld}};
@@ -139,11 +139,11 @@ Label label_from(const Json& json) {
   PlannedCase& p = l.planned;
   p.number = json.at("number");
   p.part = json.at("part");
-  for (const Json& e : json.at("effects")) p.effects.push_back({e.at("id"), e.at("size")});
+  for (const Json& e : json.at("effects")) p.effects.push_back({e.at("id"), e.at("magnitude")});
   p.seed = json.at("seed");
   p.hover = json.at("hover");
   p.power = json.at("power");
-  p.own_figures = json.at("own_figures");
+  p.own_parameters = json.at("own_parameters");
   p.conventions = json.at("conventions");
   p.published = json.at("published");
   p.withheld = json.at("withheld").get<Names>();

@@ -1,4 +1,4 @@
-// What a blind benchmark keeps on disk: DIR/manifest.json for everybody, DIR/sealed/labels.json for after the predictions,
+// The files of a blind benchmark: DIR/manifest.json, which is public; DIR/sealed/labels.json, which is opened after all predictions are made;
 // DIR/predictions/NNNN.json.
 #pragma once
 
@@ -17,15 +17,15 @@ using Json = nlohmann::ordered_json;
 /// "0007"
 std::string number_text(std::size_t number);
 
-/// A JSON file. InputError where it cannot be read or is none.
+/// InputError if the file cannot be read or is not JSON.
 Json read_json(const std::filesystem::path& file);
 
-/// What the diagnosing side may know of a case.
+/// The public part of a case, which the diagnosis may know.
 struct PublicCase {
   std::size_t number = 0;
   std::vector<std::string> withheld;
-  std::map<std::string, std::string> files;  ///< SHA-256 by path below the benchmark's folder
-  /// Its flights, below the folder of a benchmark.
+  std::map<std::string, std::string> files;  ///< SHA-256 by path relative to the folder of the benchmark
+  /// Folders of its flights. `folder`: of the benchmark.
   std::vector<std::filesystem::path> flights(const std::filesystem::path& folder) const;
 };
 
@@ -36,20 +36,20 @@ struct Manifest {
 Json to_json(const Manifest& manifest);
 Manifest read_manifest(const std::filesystem::path& folder);
 
-/// Hashes of all predictions, as sha256sum writes and checks them: made once none is open any more.
+/// File with the hashes of all predictions, in the format of sha256sum. It seals the predictions, and is written once all of them are made.
 inline constexpr const char* kSums = "predictions.sha256";
 std::filesystem::path prediction_file(const std::filesystem::path& folder, std::size_t number);
-/// The line of a prediction.
+/// The line of a prediction in kSums.
 std::string sum_line(const std::filesystem::path& folder, std::size_t number);
-/// InputError where they are not sealed, or one has changed since.
+/// InputError if the predictions are not sealed, or if one has changed since.
 void check_predictions(const std::filesystem::path& folder, const Manifest& manifest);
-/// sealed/labels.json. InputError where it has changed.
+/// The content of sealed/labels.json. InputError if it has changed.
 Json open_labels(const std::filesystem::path& folder, const Manifest& manifest);
 
 struct Label {
   PlannedCase planned;
-  std::uint64_t draw = 0;                      ///< of the robots of its seed, the first that did not crash
-  std::vector<std::string> channels, regimes;  ///< of its effects, as blind::FamilyEffect has them
+  std::uint64_t draw = 0;                      ///< number of the first draw of its seed that did not crash
+  std::vector<std::string> channels, regimes;  ///< where its effects act (blind::FamilyEffect)
   std::map<std::string, double> true_values;   ///< by "effect.parameter"
   CaseTruth truth() const;
   /// The robot that flew.
@@ -60,7 +60,7 @@ Json to_json(const Label& label);
 Label label_from(const Json& json);
 
 Json to_json(const Prediction& prediction);
-/// InputError where the file holds none.
+/// InputError if the file is not a prediction.
 Prediction read_prediction(const std::filesystem::path& file);
 
 }  // namespace flappy::benchmark

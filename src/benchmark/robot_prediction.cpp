@@ -12,11 +12,11 @@ namespace {
 
 using Eigen::Quaterniond, Eigen::Vector3d;
 
-constexpr int kSubsteps = 10;  // of the robot, in one of the record
+constexpr int kSubsteps = 10;  // steps of the robot in a step of the record
 static_assert(kSubsteps * blind::kRobotStep_s == gap::kPredictionStep_s);
-/// Torques and forces.
+/// Number of torque and force channels.
 constexpr std::size_t kSignals = gap::kStrokeLeft;
-/// Beats at the start of the record that stand for those before it.
+/// The voltages before the record are not known; those of so many beats at its start are repeated instead.
 constexpr double kBeatsBefore = 10;
 
 blind::Torso torso_of(const gap::TorsoAt& t) {
@@ -33,24 +33,25 @@ blind::Room room_of(const sim::World& world) {
   return room;
 }
 
-/// Whether an effect has a past that a flight starts with: heat, charge, weather.
-bool remembers(const blind::Sizes& sizes) {
+/// Whether an effect has a state that depends on the time before the record: heat, charge, weather.
+bool remembers(const blind::Magnitudes& magnitudes) {
   for (const blind::Effect e : {blind::Effect::wind, blind::Effect::winding_heating, blind::Effect::battery_sag,
                                 blind::Effect::outside_vortex_shedding, blind::Effect::outside_brush_contact})
-    if (sizes.has(e)) return true;
+    if (magnitudes.has(e)) return true;
   return false;
 }
 
+/// A perturbed robot that replays a record.
 class Carrier {
  public:
   Carrier(const gap::Recording& recording, const Perturbation& perturbation, std::uint64_t flight)
       : r_(recording),
-        robot_(perturbation.vehicle, room_of(recording.world), perturbation.sizes, perturbation.seed, flight),
+        robot_(perturbation.vehicle, room_of(recording.world), perturbation.magnitudes, perturbation.seed, flight),
         imu_m_(recording.log.header.imu.position_m.data()) {
-    if (remembers(perturbation.sizes)) live_until_start();
+    if (remembers(perturbation.magnitudes)) live_until_start();
   }
 
-  /// [interval][signal]; empty where it comes apart.
+  /// [interval][signal]; empty if the simulation diverges.
   std::vector<double> fly() {
     std::vector<double> samples(r_.intervals() * kSignals, 0);
     put(torso_of(r_.torso[0]));
@@ -91,7 +92,8 @@ class Carrier {
         std::clamp<std::ptrdiff_t>(step, 0, static_cast<std::ptrdiff_t>(r_.left_V.size()) - 1));
     for (int n = 0; n < kSubsteps; ++n) robot_.step(r_.left_V[i], r_.right_V[i]);
   }
-  /// It has flown since it began to trim: its clock and weather are those of the flight, its heat and charge nearly so.
+  /// Runs the robot with a fixed torso from the start of its trimming to the start of the record, so that its clock and
+  /// weather are those of the flight, and its heat and charge nearly so.
   void live_until_start() {
     robot_.hold_torso(true);
     put(torso_of(r_.torso[0]));

@@ -1,6 +1,6 @@
-// Reset predictions by the blind robot, as gap/replay/reset_prediction.hpp makes them by the simulator: under the recorded
-// voltages, with the torso reset to the record at every interval of the IMU, while wings, currents, heat and whatever else it
-// has stay its own. Two robots that predict one record differ by nothing but what they are.
+// Reset predictions by a blind robot, like those of our simulator (gap/replay/reset_prediction.hpp): the recorded voltages drive it, and its torso
+// is reset to the record at every interval of the IMU; wings, currents, heat and all its other states evolve by its own dynamics. So the difference
+// of the predictions of two robots shows only the difference of the robots.
 #pragma once
 
 #include <vector>
@@ -13,17 +13,17 @@ namespace flappy::benchmark {
 /// A robot that differs from the one that flew.
 struct Perturbation {
   model::Vehicle vehicle;
-  blind::Sizes sizes;
+  blind::Magnitudes magnitudes;
   std::uint64_t seed = 0;
 };
 
-/// As the sensors of a perturbed robot would have shown flight `flight` of its case, noise-free, in the rows of gap/replay/reset_prediction.hpp: torques
-/// and forces, the rest 0. Empty where it comes apart.
+/// Rows (gap/replay/reset_prediction.hpp) that the sensors of a perturbed robot would have measured without noise in flight `flight` of its case:
+/// torques and forces; all other channels 0. Empty if its simulation diverges.
 gap::Rows predict_perturbed(const gap::PredictedFlight& recorded, const Perturbation& perturbation,
                             std::uint64_t flight);
 
-/// All flights under all perturbations: [perturbation][flight]; empty residuals for those that come apart. The same for any number of
-/// threads; 0: one for each processor.
+/// predict_perturbed for all flights and perturbations, [perturbation][flight]; empty for a perturbation whose simulation diverges in any flight.
+/// `threads`: 0: one for each processor; the result does not depend on it.
 std::vector<gap::Residuals> predict_perturbed_flights(const gap::Flights& flights,
                                                       const std::vector<Perturbation>& perturbations, int threads);
 

@@ -28,7 +28,7 @@ bool holds(const Names& all, const Names& some) {
   return std::ranges::all_of(some, [&](const std::string& s) { return std::ranges::count(all, s) > 0; });
 }
 
-/// Says which effects there are: these alone, or these and something more.
+/// Whether a verdict states a set of effects, alone or with a remainder.
 bool names_set(const std::string& kind) { return kind == "effect" || kind == "remainder"; }
 bool names_effects(const Answer& p) { return names_set(p.kind) || p.kind == "group"; }
 
@@ -68,7 +68,7 @@ const FittedSet* fitted(const Answer& p, const Names& effects) {
   return nullptr;
 }
 
-/// What of the true values lies within the intervals that the verdict gives, where it names the truth.
+/// Counts the true values, and those within the intervals of the diagnosis, if the verdict names the true effects or their group.
 void count_covered(const ScoredCase& c, std::size_t& covered, std::size_t& all) {
   if (!named_alone(c) && !group_holds(c)) return;
   const FittedSet* set = fitted(c.prediction, c.truth.effects);
@@ -81,7 +81,7 @@ void count_covered(const ScoredCase& c, std::size_t& covered, std::size_t& all) 
   }
 }
 
-/// What a verdict says is at work; of a group, its most probable member.
+/// Effects that a verdict names; for a group, its most probable set.
 Names at_work(const Answer& p) {
   if (names_set(p.kind)) return p.effects;
   if (p.kind != "group") return {};
@@ -89,7 +89,7 @@ Names at_work(const Answer& p) {
   return most == p.sets.end() ? Names() : most->effects;
 }
 
-/// Over the names of all cases together.
+/// F1 of the named effects, over all cases together. `which`: cases that count, a case may come several times.
 std::optional<double> f1(const std::vector<std::pair<Names, Names>>& named_and_true,
                          const std::vector<std::size_t>& which) {
   double hits = 0, sum = 0;
@@ -120,7 +120,7 @@ ScoreValue share(const Cases& cases, const Is& is) {
                     cases.size());
 }
 
-/// The same of every baseline that all of the cases have.
+/// Shares of the baselines, each over the cases that it has an answer for.
 template <class Is>
 std::map<std::string, ScoreValue> of_baselines(const Cases& cases, const Is& is) {
   std::map<std::string, ScoreValue> scores;
@@ -149,7 +149,7 @@ bool baseline_among_three(const CaseTruth& t, const Baseline& b) {
 
 enum class Bar { at_least, at_most, within };
 
-/// A line of the table; of `within`, must and aim are ranges.
+/// A row of the table. For Bar::within, `must` and `aim` are lower ends of ranges.
 ScoreLine line(std::string key, std::string what, Bar bar, double must, double aim, ScoreValue score,
                std::map<std::string, ScoreValue> baselines = {}, double must_high = 0, double aim_high = 0) {
   const auto text = [&](double b, double high) {
@@ -181,7 +181,7 @@ ScoreLine closure_line(const Cases& cases) {
   std::vector<double> values;
   for (const ScoredCase* c : cases)
     if (const auto v = closure(*c)) values.push_back(*v);
-  return line("closure_median", "how far: closure beside the truth's, median", Bar::at_least, 0.80, 0.95,
+  return line("closure_median", "how far: closure as a share of the truth's, median", Bar::at_least, 0.80, 0.95,
               resampled(values.size(), [&](const std::vector<std::size_t>& which) -> std::optional<double> {
                 std::vector<double> some;
                 for (const std::size_t i : which) some.push_back(values[i]);
@@ -192,7 +192,7 @@ ScoreLine closure_line(const Cases& cases) {
 ScoreLine coverage_line(const Cases& cases) {
   std::size_t covered = 0, all = 0;
   for (const ScoredCase* c : cases) count_covered(*c, covered, all);
-  return line("interval_coverage", "90 % intervals of size that hold the true one", Bar::within, 0.82, 0.87,
+  return line("interval_coverage", "90 % intervals of magnitude that hold the true one", Bar::within, 0.82, 0.87,
               proportion(covered, all), {}, 0.97, 0.93);
 }
 
@@ -200,7 +200,7 @@ ScoreLine first_line(const char* key, const char* what, double must, double aim,
   return line(key, what, Bar::at_least, must, aim, share(cases, named_alone), of_baselines(cases, baseline_first));
 }
 
-/// Each case with the one of `singles` whose robot it is, where both drew the same.
+/// Compares each case with the case of `singles` that has the same robot, if the same draw flew in both.
 ScoreLine redeclared_line(const Cases& cases, const Cases& singles) {
   std::map<std::pair<std::uint64_t, std::uint64_t>, const Answer*> by_robot;
   for (const ScoredCase* c : singles) by_robot[{c->truth.seed, c->truth.draw}] = &c->prediction;
@@ -238,7 +238,7 @@ ScoreLine pairs_line(const Cases& cases) {
   return line("pairs_f1", "pairs: F1 of names", Bar::at_least, 0.75, 0.92, f1_score(own), std::move(baselines));
 }
 
-/// Of the difference of two figures, from their intervals as if of different cases: too much rather than too little.
+/// Standard error of the difference of two scores, from their intervals as if they were independent; they share cases, so it is rather too large.
 double standard_error(const ScoreValue& a, const ScoreValue& b) {
   return std::hypot(a.high - a.low, b.high - b.low) / (2 * io::kNormal975);
 }
@@ -246,7 +246,7 @@ double standard_error(const ScoreValue& a, const ScoreValue& b) {
 std::map<std::string, std::vector<std::string>> unbeaten_lines(const std::vector<ScoreLine>& lines) {
   std::map<std::string, std::vector<std::string>> unbeaten;
   for (const char* name : kBaselines) {
-    std::optional<bool> alarms;  // none: nobody knows
+    std::optional<bool> alarms;  // whether there are too many false alarms; none: not known
     std::vector<std::string> keys;
     for (const ScoreLine& l : lines) {
       const auto b = l.baselines.find(name);
@@ -280,7 +280,7 @@ Answer answer_of(const Prediction& p) {
     if (h.kind == gap::HypothesisKind::unknown) a.unknown = h.probability;
     if (h.kind != gap::HypothesisKind::effect) continue;
     if (const auto same = std::ranges::find(a.sets, h.effects, &FittedSet::effects); same != a.sets.end()) {
-      same->probability += h.probability;  // with a remainder
+      same->probability += h.probability;  // hypotheses with and without a remainder count together
       continue;
     }
     FittedSet set{h.effects, h.probability, {}, h.loss, h.loss_gain_sd};
@@ -294,7 +294,7 @@ bool abstains(const Answer& a) { return a.kind == "group" || a.probability < 0.5
 
 bool right(const CaseTruth& t, const Answer& p) {
   if (t.part == "none" || t.part == "conventions") return p.kind == "none" || p.kind == "parameters";
-  if (t.part == "parameters" || t.part == "own_figures") return p.kind == "parameters";
+  if (t.part == "parameters" || t.part == "own_parameters") return p.kind == "parameters";
   if (t.part == "withheld" || t.part == "outside") return p.kind == "unknown";
   return (names_set(p.kind) && same(p.effects, t.effects)) || (p.kind == "group" && holds(p.effects, t.effects));
 }
@@ -334,10 +334,10 @@ Scores score(const std::vector<ScoredCase>& cases) {
   l.push_back(line("top3", "right effect among three", Bar::at_least, 0.95, 0.99, share(singles, among_three),
                    of_baselines(singles, baseline_among_three)));
   l.push_back(
-      first_line("top1_typical", "right effect first at typical size", 0.80, 0.93, of_parts(cases, {"typical"})));
+      first_line("top1_typical", "right effect first at typical magnitude", 0.80, 0.93, of_parts(cases, {"typical"})));
   for (const auto& [part, what] : {std::pair{"none", "false alarm: none"},
                                    {"parameters", "false alarm: parameters"},
-                                   {"own_figures", "false alarm: own figures"},
+                                   {"own_parameters", "false alarm: own parameters"},
                                    {"conventions", "false alarm: other conventions"}}) {
     const Cases harmless = of_parts(cases, {part});
     l.push_back(line(std::string("false_alarm_") + part, what, Bar::at_most, kFalseAlarms, 0.02,

@@ -1,4 +1,4 @@
-// How good the diagnoses of a blind benchmark were: what was predicted against what was so.
+// Scores of the diagnoses of a blind benchmark: predictions compared with the truth.
 #pragma once
 
 #include <cstdint>
@@ -12,59 +12,60 @@
 
 namespace flappy::benchmark {
 
-/// What was so.
+/// The truth of a case.
 struct CaseTruth {
-  std::string part;                            ///< of kParts
-  std::vector<std::string> effects;            ///< that the robot had
-  std::map<std::string, double> true_values;   ///< by "effect.parameter", where the catalogue's form has one
-  std::vector<std::string> channels, regimes;  ///< where they act, as blind::FamilyEffect has it
-  std::uint64_t seed = 0, draw = 0;            ///< of the robot
+  std::string part;                            ///< one of kParts
+  std::vector<std::string> effects;            ///< effects of the robot
+  std::map<std::string, double> true_values;   ///< by "effect.parameter", where the catalogue has an equivalent
+  std::vector<std::string> channels, regimes;  ///< where the effects act (blind::FamilyEffect)
+  std::uint64_t seed = 0, draw = 0;            ///< identify the robot
 };
-/// What their robots are:
-///   singles, singles_current  one effect at twice its detectable size; the latter with currents
-///   redeclared                the robots of singles, declared exactly
-///   typical                   one effect at size 1, of those that are detectable there
-///   none, parameters, own_figures, conventions
-///                             no effect: as the file has it; of the published randomisation; every figure apart; other declarations
-///   withheld, outside         an effect whose group the catalogue lacks; one that no catalogue has
-///   pairs                     two of different groups
-///   hover                     what hover alone does not show
-/// All with effects have figures of their own and the conventions of some laboratory.
-inline constexpr const char* kParts[] = {"singles",  "singles_current", "redeclared",  "typical",
-                                         "none",     "parameters",      "own_figures", "conventions",
-                                         "withheld", "outside",         "pairs",       "hover"};
+/// Parts of a benchmark, by their robots:
+///   singles, singles_current  one effect at twice its detectable magnitude; singles_current also logs currents
+///   redeclared                the robots of singles, with exact declarations
+///   typical                   one effect at magnitude 1, where that is detectable
+///   none, parameters, own_parameters, conventions
+///                             no effect: exactly as the vehicle file; parameters of the published randomisation; each parameter of each body
+///                             independent; declarations within the habits of laboratories
+///   withheld, outside         an effect whose group is withheld from the catalogue; an effect that the catalogue never has
+///   pairs                     two effects of different groups
+///   hover                     an effect that hover alone does not show, in hover
+/// All robots with effects have independent parameters of their own and, except those of redeclared, inexact declarations.
+inline constexpr const char* kParts[] = {"singles",  "singles_current", "redeclared",     "typical",
+                                         "none",     "parameters",      "own_parameters", "conventions",
+                                         "withheld", "outside",         "pairs",          "hover"};
 
 /// A parameter of an effect with its 90 % interval.
 struct ScoredParameter {
   double value = 0, low = 0, high = 0;
 };
 
-/// A set of effects that was weighed, with or without a remainder.
+/// A set of effects that a diagnosis weighed, with or without a remainder.
 struct FittedSet {
   std::vector<std::string> effects;
   double probability = 0;
   std::map<std::string, ScoredParameter> values;  ///< by "effect.parameter"
-  std::optional<double> left;                     ///< mean loss in flights held out
+  std::optional<double> left;                     ///< mean loss in held-out flights; none: not fitted
   double gain_sd = 0;                             ///< standard deviation of its gain over the parameters alone
 };
 
-/// Where an unknown cause acts, in the words of blind::FamilyEffect.
+/// Place of an unknown cause, in the terms of blind::FamilyEffect.
 struct Where {
   std::string channel, regime;
 };
 
-/// A prediction as it is scored.
+/// The parts of a prediction that are scored.
 struct Answer {
-  /// Of the verdict; "remainder": effects and something unknown; "crashed": there was no flight to diagnose.
+  /// Kind of the verdict; "remainder": effects and a remainder; "crashed": the robot crashed in the flight to be diagnosed.
   std::string kind = "data";
-  std::vector<std::string> effects;  ///< of a group the rivals
-  double probability = 0;            ///< of the verdict
+  std::vector<std::string> effects;  ///< effects that the verdict names; for a group, its possible effects
+  double probability = 0;            ///< probability of the verdict
   std::vector<FittedSet> sets;       ///< the most probable first
   double none = 0, parameters = 0, unknown = 0;
-  std::optional<double> nominal, refit, floor;  ///< losses
-  std::map<std::string, Baseline> baselines;    ///< by kBaselines
+  std::optional<double> nominal, refit, floor;  ///< mean losses: vehicle file, parameters fitted, noise alone
+  std::map<std::string, Baseline> baselines;    ///< by name (kBaselines)
   std::vector<double> features;
-  std::string manoeuvre;  ///< proposed by a verdict that abstains; or none
+  std::string manoeuvre;  ///< the proposed flight; empty: none
   std::optional<Where> where;
 };
 Answer answer_of(const Prediction& prediction);
@@ -73,37 +74,37 @@ bool abstains(const Answer& answer);
 struct ScoredCase {
   CaseTruth truth;
   Answer prediction;
-  /// With the true effect alone in the catalogue, where `prediction` has not fitted it.
+  /// Answer with only the true effects in the catalogue, if `prediction` did not fit them.
   std::optional<Answer> true_fit;
-  /// Of the flights, and of the one that `prediction` proposed.
+  /// Answer for the flights and the flight that `prediction` proposed.
   std::optional<Answer> after_next;
 };
 
-/// One line of the table.
+/// One row of the table of scores.
 struct ScoreLine {
   std::string key, what, must, aim;
   ScoreValue score;
   std::optional<bool> meets_must, meets_aim;
-  std::map<std::string, ScoreValue> baselines;  ///< those that can be judged by it
+  std::map<std::string, ScoreValue> baselines;  ///< baselines to which the score applies
 };
 
 struct Scores {
   std::vector<ScoreLine> lines;
-  /// Lines that a baseline within the bar of false alarms is not beaten on by more than a standard error of the difference, by its
-  /// name; none: beaten on all. Without those beyond the bar.
+  /// By baseline: keys of the rows on which the diagnosis does not beat it by more than a standard error of the difference; empty: beaten on all
+  /// rows. Only baselines whose false alarms are within the bar.
   std::map<std::string, std::vector<std::string>> unbeaten;
 };
 
 Scores score(const std::vector<ScoredCase>& cases);
 
-/// Whether the verdict is what it should be.
+/// Whether the verdict is right for a case of its part.
 bool right(const CaseTruth& truth, const Answer& prediction);
 
-/// Share of the closable gap that the verdict closes: (E_refit - E_named) / (E_refit - E_true effect refitted); 0 for a
-/// verdict without effects; nothing where the true effect's own gain is below two of its sd.
+/// Share of the closable gap that the verdict closes: (E_refit - E_named) / (E_refit - E_true effect refitted), E: mean loss. 0 for a verdict
+/// without effects; none if the gain of the true effect is less than two of its standard deviations.
 std::optional<double> closure(const ScoredCase& c);
 
-/// Whether closure is asked of a case whose true effect was not fitted.
+/// Whether the closure of a case is scored but its true effect was not fitted, so that true_fit is needed.
 bool needs_true_fit(const ScoredCase& c);
 
 }  // namespace flappy::benchmark

@@ -25,10 +25,10 @@ namespace fs = std::filesystem;
   throw io::InputError(file.string() + ": " + what + "; accepted: what was sealed");
 }
 
-/// Made when the labels are opened: no prediction is accepted any more.
+/// Folder that is made when the labels are opened; from then on, no further prediction is accepted.
 fs::path true_fits(const fs::path& folder) { return folder / "true_fits"; }
 
-// ---- phase 1: nothing below reads what is sealed
+// ---- phase 1: predictions, which read nothing that is sealed
 
 class Predictions {
  public:
@@ -51,7 +51,7 @@ class Predictions {
     }
   }
 
-  /// False where it was interrupted.
+  /// Makes and seals the missing predictions; false if interrupted.
   bool make() const {
     if (fs::exists(sums_)) {
       check_predictions(folder_, manifest_);
@@ -72,7 +72,7 @@ class Predictions {
     });
     if (!all) return false;
     if (io::writes(command_.ranks)) seal();
-    io::wait(command_.ranks);  // before anybody opens a label
+    io::wait(command_.ranks);  // all predictions are sealed before any rank opens a label
     return true;
   }
 
@@ -98,7 +98,7 @@ class Predictions {
 
 // ---- phase 2: the labels
 
-/// A folder of flappy-blind make.
+/// A benchmark that flappy-blind make has made.
 struct Bench {
   Bench(const ScoreCommand& command, const fs::path& at)
       : folder(at), manifest(read_manifest(at)), predictions(command, folder, manifest) {
@@ -124,10 +124,11 @@ struct Bench {
   Predictions predictions;
   Json truths;
   std::map<std::size_t, Label> labels;
-  std::vector<ScoredCase> cases;  ///< as in the manifest
+  std::vector<ScoredCase> cases;  ///< in the order of the manifest
 };
 
-/// With the true effects alone in the catalogue: where a diagnosis did not fit them, its closure has no measure.
+/// Diagnoses cases with only the true effects in the catalogue, if their diagnosis did not fit these: the closure is relative to their fit. False if
+/// interrupted.
 bool fit_truths(const ScoreCommand& command, Bench& bench) {
   std::vector<std::size_t> open;
   const auto file_of = [&](std::size_t i) {
@@ -139,7 +140,7 @@ bool fit_truths(const ScoreCommand& command, Bench& bench) {
       work_through("fitting true effects", open.size(), command.threads, command.ranks, [&](std::size_t k) {
         const PublicCase& c = bench.manifest.cases[open[k]];
         std::vector<std::string> others;
-        for (const model::EffectEntry& e : model::effects())
+        for (const model::CatalogueEffect& e : model::effects())
           if (std::ranges::count(bench.cases[open[k]].truth.effects, std::string(e.info.id)) == 0)
             others.emplace_back(e.info.id);
         Question q = bench.predictions.question(c, others);
@@ -153,7 +154,7 @@ bool fit_truths(const ScoreCommand& command, Bench& bench) {
   return true;
 }
 
-/// Flies what was proposed for robots of the part hover, and diagnoses all their flights.
+/// Flies the proposed flights of the robots of part "hover", and diagnoses these with the earlier flights. False if interrupted.
 bool fly_proposals(const ScoreCommand& command, Bench& bench) {
   const auto file_of = [&](std::size_t i) {
     return bench.folder / "proposed" / (number_text(bench.manifest.cases[i].number) + ".json");
@@ -197,11 +198,11 @@ bool fly_proposals(const ScoreCommand& command, Bench& bench) {
   return true;
 }
 
-/// The black box, learnt on robots of other families among those that are scored with these; none where there are too few.
+/// Adds the answers of the black box for a family, learnt on the robots of the other scored families; none if there are too few.
 void ask_black_box(const std::vector<std::unique_ptr<Bench>>& benches, const std::string& family) {
   constexpr std::size_t kFewest = 20;
   const std::set<std::string> kTeaching = {"singles",    "singles_current", "typical",    "none",
-                                           "parameters", "own_figures",     "conventions"};
+                                           "parameters", "own_parameters",  "conventions"};
   std::vector<Example> examples;
   for (const auto& b : benches)
     for (const ScoredCase& c : b->cases)
@@ -219,7 +220,7 @@ void ask_black_box(const std::vector<std::unique_ptr<Bench>>& benches, const std
     }
 }
 
-// ---- what is told
+// ---- output
 
 std::string figure(const std::optional<double>& value) {
   if (!value) return "-";
@@ -272,7 +273,7 @@ Json scores_json(const Scores& scores, std::size_t cases) {
   return json;
 }
 
-/// One line for each case, for whoever wants to know which ones went wrong.
+/// Rows of score.csv, one for each case.
 std::string case_lines(const Bench& bench) {
   std::string text;
   for (std::size_t i = 0; i < bench.cases.size(); ++i) {
@@ -281,12 +282,12 @@ std::string case_lines(const Bench& bench) {
     const Label& label = bench.labels.at(bench.manifest.cases[i].number);
     const std::size_t number = label.planned.number;
     const Json prediction = bench.predictions.read(number);
-    std::string sizes;
+    std::string magnitudes;
     for (const blind::BlindEffect& e : label.planned.effects)
-      sizes += (sizes.empty() ? "" : "+") + io::shortest_digits(e.size);
+      magnitudes += (magnitudes.empty() ? "" : "+") + io::shortest_digits(e.magnitude);
     const std::optional<double> closed = c.truth.part == "singles" ? closure(c) : std::nullopt;
-    text += std::to_string(number) + "," + c.truth.part + "," + io::joined(c.truth.effects, "+") + "," + sizes + "," +
-            p.kind + "," + io::joined(p.effects, "+") + "," + figure(p.probability) + "," +
+    text += std::to_string(number) + "," + c.truth.part + "," + io::joined(c.truth.effects, "+") + "," + magnitudes +
+            "," + p.kind + "," + io::joined(p.effects, "+") + "," + figure(p.probability) + "," +
             (right(c.truth, p) ? "1" : "0") + "," + (closed ? figure(closed) : "") + "," +
             io::shortest_digits(prediction.at("seconds").get<double>()) + "," + (p.where ? p.where->channel : "") +
             "," + (p.where ? p.where->regime : "") + "," + std::to_string(c.truth.seed) + "," +
@@ -322,7 +323,7 @@ Json score_bench(const ScoreCommand& command) {
   std::set<std::string> sets, commits, undetectable;
   std::size_t never = 0, drawn_again = 0;
   std::string lines =
-      "case,part,effects,sizes,verdict,named,probability,right,closure,seconds,channel,regime,seed,draw,"
+      "case,part,effects,magnitudes,verdict,named,probability,right,closure,seconds,channel,regime,seed,draw,"
       "family,set,commit\n";
   std::set<std::string> families;
   for (const auto& b : benches)
@@ -345,7 +346,7 @@ Json score_bench(const ScoreCommand& command) {
   json["families"] = Json::object();
   for (const auto& [family, cases] : by_family) {
     const Scores own = score(cases);
-    text += table("family " + family + ", 30 s of rich flight, twice the detectable size", own) + "\n";
+    text += table("family " + family + ", 30 s of rich flight, twice the detectable magnitude", own) + "\n";
     json["families"][family] = scores_json(own, cases.size());
   }
   if (by_family.size() > 1) text += table("all families", scores) + "\n";

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kResamples = 2000, kBins = 10;
 
-/// The same draws every time, and wherever the program runs: no distribution of the standard library is.
+/// Draws that are the same in every run and on every platform, unlike the distributions of the standard library.
 class Draws {
  public:
   double uniform() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
@@ -31,11 +31,11 @@ double folded_normal_mean(double d, double s) {
   return s * std::sqrt(2 / std::numbers::pi) * std::exp(-z * z / 2) + d * std::erf(z / std::numbers::sqrt2);
 }
 
-/// Before 0 is the least.
+/// Calibration error with its bias removed; may be negative.
 double unbiased_error(std::vector<Claim> claims) {
   std::ranges::sort(claims, {}, &Claim::probability);
   const std::size_t n = claims.size(), bins = std::min(n, kBins);
-  std::vector<double> right(n);  // share among claims of the same probability
+  std::vector<double> right(n);  // share of right claims among those of the same probability
   for (std::size_t i = 0, end = 0; i < n; i = end) {
     double sum = 0;
     for (end = i; end < n && claims[end].probability == claims[i].probability; ++end) sum += claims[end].right ? 1 : 0;

@@ -21,14 +21,14 @@ using Eigen::VectorXd;
 using gap::BasisCoefficients;
 using gap::Residuals;
 
-/// Reach of a parameter's difference to either side, in standard deviations.
+/// Half the step of a parameter's difference, in standard deviations.
 constexpr double kParameterReach = 0.5;
-/// How well a header says when a sample of the IMU was taken (gap/hypothesis.cpp), in steps of the record.
+/// Prior standard deviation of the lag of the IMU (gap/evidence/hypothesis.cpp), in steps of the record.
 constexpr int kLagSteps = 1;
-/// An entry that leaves more of an effect is nothing like it.
+/// An effect of the catalogue that leaves this share of a change or more is not alike.
 constexpr double kMaxMisfit = 0.5;
 
-/// a - b, or empty where either is.
+/// a - b; empty if either is empty.
 Residuals difference(Residuals a, const Residuals& b) {
   if (a.empty() || b.empty()) return {};
   for (std::size_t f = 0; f < a.size(); ++f)
@@ -43,32 +43,33 @@ std::vector<blind::RobotFlight> fly_all(const blind::Case& c, int threads) {
   return flights;
 }
 
-/// One robot without effects that flew, and what moves its rows.
+/// A robot that flew without effects, and changes of the rows of its flights.
 class Subject {
  public:
-  /// `flights`: of case `c`, all of them; both without effects, none crashed.
+  /// `flights`: all flights of case `c`, which has no effects; none crashed.
   Subject(blind::Case c, std::vector<blind::RobotFlight> flights, int threads);
 
-  /// What an effect adds to the rows; empty where the robot comes apart.
-  BasisCoefficients added(blind::Effect effect, double size) const;
-  /// The same of every uncertain parameter of the simulator for one standard deviation, and of the IMU's lag.
+  /// Change that an effect of the robot makes in its rows; empty if the simulation diverges.
+  BasisCoefficients added(blind::Effect effect, double magnitude) const;
+  /// Changes in the simulator's rows for one standard deviation of each uncertain parameter, and of the IMU's lag.
   std::vector<BasisCoefficients> parameters(const sim::Randomisation& uncertain) const;
-  /// The same of coordinates of an entry of the catalogue, in the simulator.
+  /// Changes that an effect of the catalogue makes in the simulator's rows, at each of `coordinates`; empty if the
+  /// simulation diverges.
   std::vector<BasisCoefficients> catalogue(const std::string& effect,
                                            const std::vector<Eigen::VectorXd>& coordinates) const;
 
-  /// d' C^-1 d of `columns`, with the parameters integrated out.
+  /// d' C^-1 d for all pairs of `columns`, with the parameters integrated out.
   MatrixXd information(const std::vector<BasisCoefficients>& parameters,
                        const std::vector<BasisCoefficients>& columns) const;
 
  private:
-  BasisCoefficients sensed(const blind::Sizes& sizes) const;
+  BasisCoefficients sensed(const blind::Magnitudes& magnitudes) const;
   model::Vehicle moved(const sim::Randomisation& uncertain, std::size_t draw, double variate) const;
 
   blind::Case case_;
   int threads_;
   gap::Flights flights_;
-  Residuals unperturbed_, left_;  ///< by the robot as it is; by the simulator, of the measurement
+  Residuals unperturbed_, left_;  ///< rows that the robot predicts without effects; residuals of the simulator
   std::unique_ptr<const gap::Evidence> evidence_;
 };
 
@@ -87,26 +88,27 @@ Subject::Subject(blind::Case c, std::vector<blind::RobotFlight> flights, int thr
   left_ = gap::residuals(flights_, {{case_.vehicle}}, threads_)[0];
 }
 
-BasisCoefficients Subject::added(blind::Effect effect, double size) const {
-  const blind::Sizes sizes({{blind::effect_names()[static_cast<std::size_t>(effect)], size}});
-  if (acts_on_sensors(effect)) return sensed(sizes);
-  const Residuals change =
-      difference(predict_perturbed_flights(flights_, {{case_.vehicle, sizes, case_.seed}}, threads_)[0], unperturbed_);
+BasisCoefficients Subject::added(blind::Effect effect, double magnitude) const {
+  const blind::Magnitudes magnitudes({{blind::effect_names()[static_cast<std::size_t>(effect)], magnitude}});
+  if (acts_on_sensors(effect)) return sensed(magnitudes);
+  const Residuals change = difference(
+      predict_perturbed_flights(flights_, {{case_.vehicle, magnitudes, case_.seed}}, threads_)[0], unperturbed_);
   return change.empty() ? BasisCoefficients() : evidence_->basis_coefficients(change);
 }
 
-/// Who flies the robot looks at no sensor of the log, so that the same seed flies the same motion with worse sensors, and draws
-/// the same noise.
-BasisCoefficients Subject::sensed(const blind::Sizes& sizes) const {
+/// Change by an effect of a sensor. The robot's controller uses no sensor of the log, so the same seed gives the same motion and the same noise with
+/// the effect.
+BasisCoefficients Subject::sensed(const blind::Magnitudes& magnitudes) const {
   blind::Case c = case_;
-  c.sizes = sizes;
+  c.magnitudes = magnitudes;
   std::vector<blind::RobotFlight> seen = fly_all(c, threads_);
   gap::Flights flights;
   for (std::size_t k = 0; k < blind::kFlights; ++k) flights.push_back(flights_[k]->with_log(std::move(seen[k].log)));
   return evidence_->basis_coefficients(difference(gap::residuals(flights, {{case_.vehicle}}, threads_)[0], left_));
 }
 
-/// By as much as any vehicle's figures are moved: a law that replaces knows nothing of this one's.
+/// The robot's vehicle, with its parameters changed by the amount that a draw changes those of the nominal vehicle: a law that replaces values
+/// ignores the vehicle's own values.
 model::Vehicle Subject::moved(const sim::Randomisation& uncertain, std::size_t draw, double variate) const {
   std::vector<double> variates(uncertain.draws(), 0);
   model::Vehicle middle = uncertain.at(variates);
@@ -166,12 +168,12 @@ MatrixXd Subject::information(const std::vector<BasisCoefficients>& parameters,
 }
 
 constexpr int kIterations = 8;
-/// Reach of differences, and the step below which there is no more to be had: of a coordinate, of which the prior has 1.645.
+/// Half the step of differences, and the step at which the search ends, in coordinates: 90 % of the prior is within 1.645.
 constexpr double kReach = 0.1, kConverged = 0.002;
-/// Where the search begins: about a typical size; shapes in the middle, or one of them near an end of what is plausible.
+/// Start of the search: a magnitude about as large as is typical; shape parameters in the middle of their prior, or one of them near an end of it.
 constexpr double kStart = 0.5, kShapeStart = 1.5;
 
-/// An entry of the catalogue against what an effect does to the rows.
+/// Fits the parameters of an effect of the catalogue to the change that an effect of the robot makes in the rows.
 class Likeness {
  public:
   Likeness(const Subject& subject, const std::vector<BasisCoefficients>& parameters, std::string entry,
@@ -182,7 +184,7 @@ class Likeness {
         unknowns_(gap::unknowns_of(entry_)),
         wanted_(std::move(wanted)) {}
 
-  /// What is found, and which share of the effect's rows it leaves.
+  /// The fitted magnitudes, and the share of the change that they leave (a ratio of rms, at most 1).
   std::pair<std::map<std::string, double>, double> find() {
     VectorXd at = start();
     double least = cost(left_at({at})[0], at);
@@ -231,7 +233,8 @@ class Likeness {
     return sum;
   }
 
-  /// The shapes for which sizes one after another are most like it; sizes of both signs begin at none.
+  /// Shape parameters for which the changes by the magnitudes, one at a time, are most alike; magnitudes that may have
+  /// both signs start at 0.
   VectorXd start() const {
     std::vector<VectorXd> shapes = {VectorXd::Zero(size())};
     for (Index i = 0; i < size(); ++i)
@@ -258,7 +261,7 @@ class Likeness {
     return bounded(at);
   }
 
-  /// Shares of a Gauss-Newton step.
+  /// Coordinates to try: shares of a Gauss-Newton step.
   std::vector<VectorXd> steps_from(const VectorXd& at) const {
     std::vector<VectorXd> places = {at};
     for (Index i = 0; i < size(); ++i)
@@ -316,10 +319,10 @@ bool acts_on_sensors(blind::Effect effect) {
 std::map<std::string, std::optional<double>> true_values(const blind::Case& c,
                                                          const std::vector<blind::BlindEffect>& effects,
                                                          const sim::Randomisation& uncertain, int threads) {
-  const blind::Sizes sizes(effects);  // refuses what there is not
+  const blind::Magnitudes magnitudes(effects);  // throws if an effect is unknown
   std::map<std::string, std::optional<double>> result;
   blind::Case plain = c;
-  plain.sizes = {};
+  plain.magnitudes = {};
   plain.power = plain.wings = false;
   plain.programme = blind::Programme::rich;
   std::vector<blind::RobotFlight> flights = fly_all(plain, threads);
@@ -331,12 +334,12 @@ std::map<std::string, std::optional<double>> true_values(const blind::Case& c,
   }
   for (std::size_t e = 0; e < blind::kBlindEffects; ++e) {
     const auto effect = static_cast<blind::Effect>(e);
-    if (!sizes.has(effect) || effect >= blind::Effect::outside_magnetic_torque) continue;
+    if (!magnitudes.has(effect) || effect >= blind::Effect::outside_magnetic_torque) continue;
     const std::string& id = blind::effect_names()[e];
     for (const gap::Unknown& u : gap::unknowns_of(id))
       if (u.magnitude) result[id + "." + u.name] = std::nullopt;
     if (!subject) continue;
-    BasisCoefficients wanted = subject->added(effect, sizes[effect]);
+    BasisCoefficients wanted = subject->added(effect, magnitudes[effect]);
     if (wanted.size() == 0) continue;
     const auto [found, misfit] = Likeness(*subject, parameters, id, std::move(wanted)).find();
     if (misfit >= kMaxMisfit) continue;

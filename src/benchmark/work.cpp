@@ -11,7 +11,7 @@ namespace flappy::benchmark {
 bool work_through(const std::string& what, std::size_t count, int threads, io::Ranks* ranks,
                   const std::function<void(std::size_t)>& job) {
   io::stop_on_interrupt();
-  io::wait(ranks);  // before any of them leaves what others would find
+  io::wait(ranks);  // no rank writes files before all ranks have seen which jobs are open
   std::vector<std::size_t> own;
   for (std::size_t i = 0; i < count; ++i)
     if (io::is_own(ranks, i)) own.push_back(i);

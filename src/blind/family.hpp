@@ -1,5 +1,5 @@
-// Families of blind robots: robots of one making each. They share this header and nothing else: no physics, no law of an effect,
-// no sensor, no convention, no controller. tests/structure checks it.
+// Families of blind robots: a family is one independent simulator and its robots. Families share this header and nothing else: no
+// physics, effect law, sensor model, convention or controller. tests/structure checks this.
 #pragma once
 
 #include <array>
@@ -13,17 +13,17 @@
 
 namespace flappy::blind {
 
-/// What may be wrong with a family's robots.
+/// An effect that robots of a family may have.
 struct FamilyEffect {
-  std::string id;       ///< that of the catalogue's entry with this cause; outside_* where it has none
-  std::string typical;  ///< what size 1 is, in words and units
-  /// What is sealed with a case: in which channels it acts (force_x .. torque_z of B, gyro, accelerometer, mocap, current), and
-  /// with what it grows ("always", or of height, ceiling, wall, place, amplitude, difference, bias, split_cycle, velocity, rate,
-  /// acceleration, time, temperature, charge, stroke, heading).
+  std::string id;       ///< id of the catalogue's effect with this cause; outside_* if the catalogue has none
+  std::string typical;  ///< the effect at magnitude 1, in words and units
+  /// Sealed with a case: the channels in which the effect acts (force_x .. torque_z in B, gyro, accelerometer, mocap,
+  /// current), and the quantities with which it grows ("always", height, ceiling, wall, place, amplitude, difference,
+  /// bias, split_cycle, velocity, rate, acceleration, time, temperature, charge, stroke, heading).
   std::vector<std::string> channels, regimes;
 };
 
-/// A flight that somebody proposes, on the clock of its log.
+/// A flight that a diagnosis proposes, on the clock of its log.
 struct ProposedFlight {
   double lasts_s = 0;
   std::function<std::array<double, 4>(double t_s)> goal;  ///< x, y, z in m and heading in rad, smooth
@@ -31,41 +31,42 @@ struct ProposedFlight {
       excitation;  ///< to be added to the pilot's inputs: V, V, V, split cycle
 };
 
-/// One robot and what is wrong with it.
+/// One robot, its effects, and what it flies.
 struct Assignment {
-  std::filesystem::path vehicle_file;                   ///< as declared; a family reads it in its own way
-  std::vector<std::pair<std::string, double>> effects;  ///< id, size: 1 is typical of a 12 g robot, at most 4
-  std::uint64_t seed = 0;             ///< draws the robot, its sensors and what effects have of their own
-  bool hover = false;                 ///< it hovers; else rich flights: places, speeds, inputs that are excited
-  bool own_figures = false;           ///< each figure of each body is drawn apart; else they are those of the file
-  bool conventions = false;           ///< declarations are drawn within what laboratories do; else they are exact
-  bool power = false, wings = false;  ///< logs of currents, of strokes
-  const ProposedFlight* proposed = nullptr;  ///< what it flies in place of hover and rich flights
+  std::filesystem::path vehicle_file;                   ///< the declared vehicle; each family has its own reader
+  std::vector<std::pair<std::string, double>> effects;  ///< id, magnitude: 1 is typical of a 12 g robot, at most 4
+  std::uint64_t seed = 0;             ///< draws the robot, its sensors, and random properties of its effects
+  bool hover = false;                 ///< hover only; else rich flights, which vary place, speed and inputs
+  bool own_parameters = false;        ///< draws each parameter of each body independently; else the file's values
+  bool conventions = false;           ///< draws declarations within the habits of laboratories; else they are exact
+  bool power = false, wings = false;  ///< whether currents and wing angles are logged
+  const ProposedFlight* proposed = nullptr;  ///< replaces hover and rich flights; null: none
 };
 
 struct FamilyFlight {
   bool crashed = false;
-  std::string how;           ///< it crashed
-  flightlog::FlightLog log;  ///< from t = 0 on
+  std::string how;           ///< how it crashed; empty if it did not
+  flightlog::FlightLog log;  ///< begins at t = 0, after the trimming
 };
 
-/// What an effect changes along a flight that was flown without it: for each wing beat of the log its start, then mean, cosine and
-/// sine of the first and of the second harmonic of specific force at the IMU (m/s^2, x, y, z of B) and of turning acceleration
-/// (rad/s^2); the torso moves as it was flown, everything else as the robot has it.
+/// Change that an effect makes along a flight that was flown without it. For each wing beat of the log: its start, then mean, cosine
+/// and sine of the first and of the second harmonic of specific force at the IMU (m/s^2; x, y, z of B) and of angular acceleration
+/// (rad/s^2; x, y, z of B). The torso is led along the flown path; all other states evolve by the robot's own dynamics.
 struct Contrast {
   std::vector<double> beat_s;
-  std::vector<std::array<double, 30>> change;  ///< [channel x 5 + coefficient]
+  std::vector<std::array<double, 30>> change;  ///< [beat][channel x 5 + coefficient]
 };
 
-/// From an observation by name, in SI units, to what is added to the controller's output: V, V, V, split cycle.
+/// Maps an observation (SI units, in the order of EscapeAssignment::observation) to inputs that are added to the controller's output:
+/// V, V, V, split cycle.
 using NamedPolicy = std::function<std::array<double, 4>(const std::vector<double>& observation)>;
 
-/// The escape as the policy was trained for it: names as in a task file, numbers as there.
+/// The escape under the conditions of the policy's training; names and values are those of the task file.
 struct EscapeAssignment {
   std::vector<std::string> observation;
   NamedPolicy policy;
   double action_period_s = 0.01;
-  std::array<double, 3> start_m{}, start_half_m{};  ///< from the goal, uniform within +-half
+  std::array<double, 3> start_m{}, start_half_m{};  ///< start less goal, uniform within +- half
   double heading_rad = 0, heading_half_rad = 0, x_low_m = -1e9, x_high_m = 1e9;
   struct Bounds {
     double distance_m, speed_m_s, body_rate_rad_s, tilt_rad, heading_rad;
@@ -75,7 +76,7 @@ struct EscapeAssignment {
 
 struct FamilyEscape {
   bool success = false, crashed = false;
-  double captured_s = 0;  ///< 0: never
+  double captured_s = 0;  ///< 0 if never
   flightlog::FlightLog log;
 };
 
@@ -86,10 +87,12 @@ class Family {
   virtual const std::vector<FamilyEffect>& effects() const = 0;
   static constexpr std::size_t kFlights = 3;
   static constexpr double kFlight_s = 10;
-  /// Flight 0, 1 or 2 of an assignment, or 3, the one that is proposed, after some seconds in which the robot finds its trim. The same bytes for the same arguments,
-  /// on any number of threads, of any processor of one kind.
+  /// Flies flight 0, 1 or 2 of an assignment, or 3, the proposed flight; the log begins after some seconds in which the
+  /// robot finds its trim. Returns the same bytes for the same arguments, with any number of threads, on all processors
+  /// of one kind.
   virtual FamilyFlight fly(const Assignment& a, std::size_t flight) const = 0;
-  virtual Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect, double size) const = 0;
+  virtual Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect,
+                            double magnitude) const = 0;
   virtual FamilyEscape escape(const Assignment& a, std::size_t number, const EscapeAssignment& rules) const = 0;
 };
 

@@ -1,4 +1,4 @@
-// C sources that this program writes or compiles, as they stand in src/deploy: put into it when it is built.
+// C sources of src/deploy that this program writes or compiles, embedded when it is built.
 #pragma once
 
 #include <map>
@@ -6,7 +6,7 @@
 
 namespace flappy::deploy {
 
-/// Text by the file's name, without folder.
+/// [file name without folder] text of the file.
 extern const std::map<std::string_view, std::string_view> kEmbedded;
 
 }  // namespace flappy::deploy

@@ -1,6 +1,6 @@
-// Adaptive robust controller (Yao and Tomizuka 1997; for this vehicle the code of Fei et al. 2019): sliding errors down to the level
-// where the wing beat acts, feedback that makes them decay, and parameters adapted within known bounds.
-// Levels, in the heading frame (f: forward, l: left), b = R z the direction of thrust, w the body rate:
+// Adaptive robust controller (Yao and Tomizuka 1997; for this vehicle the code of Fei et al. 2019). It forms sliding errors down to
+// the derivative on which the wing beat acts, lets them decay by feedback, and adapts parameters within known bounds.
+// Derivatives of position, in the heading frame (f: forward, l: left); b = R z is the direction of thrust, w the body rate:
 //   acceleration a = g b/b_z + d        jerk j = g R (w x z)       snap = g (w_y', -w_x')
 //   s = (D + lambda)^3 e = j_e + 3 lambda a_e + 3 lambda^2 v_e + lambda^3 e
 //   snap_sp = -3 lambda j_e - 3 lambda^2 a_e - lambda^3 v_e - k s
@@ -8,19 +8,20 @@
 //   d: indirect, from the error of a predicted velocity  v^' = g b/b_z + d + l (v - v^),  d' = gamma (v - v^), clamped
 // Heading: s = r_e + lambda e, torque I_z (-lambda r_e - k s) - tau_z. Height: s = v_e + lambda e, thrust
 //   T = m (g + a_ref - lambda v_e - k s)/b_z with m' = -gamma s (g + ..), clamped; V_amp = T/B_T + V_T.
-// Were d adapted from s as well, it could trade against tau and leave a position error.
+// d is not adapted from s: then an error of d could cancel one of tau and leave a position error.
 #pragma once
 
 #include "flight/pid.hpp"
 
 namespace flappy::flight {
 
-/// Decay of the sliding error and of the tracking error on it.
+/// Decay rates: k of the sliding error s, lambda of the tracking error on s = 0.
 template <class T>
 struct Sliding {
   T lambda_1_s, k_1_s;
 };
 
+/// Gain gamma and bounds of an adapted parameter.
 template <class T>
 struct Adapted {
   T gain, low, high;
@@ -32,7 +33,7 @@ struct ArcConstants : LoopConstants<T> {
   T position_error_limit_m, velocity_error_limit_m_s, yaw_error_limit_rad;
   Adapted<T> mass_kg, roll_Nm, pitch_Nm, yaw_Nm, disturbance_m_s2;
   T predictor_1_s;
-  // what the wing-beat inputs do
+  // linear map from the wing-beat inputs to thrust and torque
   T thrust_N_V, thrust_offset_V, roll_Nm_V, pitch_Nm_V, yaw_Nm_split;
   T inertia_x_kg_m2, inertia_y_kg_m2, inertia_z_kg_m2;
   T initial_mass_kg, amplitude_low_V, amplitude_high_V;
@@ -41,7 +42,7 @@ struct ArcConstants : LoopConstants<T> {
 
 inline namespace FLAPPY_ISA {
 
-/// What it has learnt, as rows.
+/// Memory of the controller, stored as rows.
 template <class T>
 struct Arc {
   T mass_kg;  // 0 before the first update
@@ -50,14 +51,15 @@ struct Arc {
   Vec3<T> velocity_m_s, body_rate_rad_s;  // low-passed
 };
 
-/// Projected adaptation; it stands still while it would push an input further past its limit.
+/// One step of projected adaptation. `blocked_towards`: sign of the direction of the parameter that would push an input
+/// further past its limit; the parameter does not move in that direction. 0: the input is not at its limit.
 template <class T, class K>
 FLAPPY_INLINE T adapted(const Adapted<K>& k, const T& value, const T& rate, const T& period, const T& blocked_towards) {
   const T moved = clamp(T(value + T(T(k.gain) * rate) * period), T(k.low), T(k.high));
   return where(rate * blocked_towards > T(0), value, moved);
 }
 
-/// Its table of functions (controllers.hpp).
+/// Table of the controller's functions (controllers.hpp).
 struct ArcController {
   static constexpr const char* kName = "arc";
   template <class T>
@@ -75,7 +77,7 @@ struct ArcController {
     m.body_rate_rad_s = x.body_rate_rad_s;
   }
 
-  /// The inputs that its adaptation has learnt.
+  /// Wing-beat inputs that balance the adapted weight and torques.
   template <class T>
   static FLAPPY_INLINE WingBeat<T> trim(const ArcConstants<Element<T>>& k, const Arc<T>& m) {
     const T weight = T(k.gravity_m_s2) * where(m.mass_kg > T(0), m.mass_kg, T(k.initial_mass_kg));
@@ -83,7 +85,7 @@ struct ArcController {
             -T(m.pitch_Nm / T(k.pitch_Nm_V)), -T(m.yaw_Nm / T(k.yaw_Nm_split))};
   }
 
-  /// Low-passes and prediction go on.
+  /// Restores the adapted parameters in the lanes `held`; low-passes and predicted velocity keep their new values.
   template <class T>
   static FLAPPY_INLINE void unlearn(auto held, const Arc<T>& before, Arc<T>& now) {
     constexpr T Arc<T>::*kLearnt[] = {
@@ -158,7 +160,7 @@ FLAPPY_INLINE WingBeat<T> ArcController::update(const ArcConstants<Element<T>>& 
   m.body_rate_rad_s = add_scaled(m.body_rate_rad_s, T(k.rate_share), x.body_rate_rad_s - m.body_rate_rad_s);
   const Vec3<T>& w = m.body_rate_rad_s;
 
-  // horizontal: acceleration by lean, and what it cannot explain
+  // horizontal: acceleration from lean, and the disturbance, estimated from what lean does not explain
   const T upright = max(R.row_z.z, T(0.5));
   const T lean_x = T(g * R.row_x.z) / upright, lean_y = T(g * R.row_y.z) / upright;
   const auto predict = [&](T& disturbance, T& predicted, const T& lean, const T& velocity) {

@@ -1,5 +1,5 @@
-// The closed loop: what a block of flappers does in one control period, stage by stage. Compiled once for each
-// instruction set (FLAPPY_ISA); the bits are the same on all of them.
+// One control period of a block of flappers, stage by stage. Compiled once for each instruction set (FLAPPY_ISA); all give the
+// same bits.
 #if !defined(__x86_64__)
 #include <chrono>
 #endif
@@ -20,7 +20,7 @@ using sim::view_rows;
 template <class T>
 using L = Lanes<T, kWidth<T>>;
 
-/// Calls `stage(first lane)` for every register of lanes in a block.
+/// Calls `stage(first lane)` for each register of lanes in a block.
 template <class T, class Stage>
 FLAPPY_INLINE void for_lanes(const Stage& stage) {
   for (int first = 0; first < kLanes<T>; first += kWidth<T>) stage(first);
@@ -36,7 +36,7 @@ FLAPPY_INLINE Setpoint<L<T>> setpoint(FlightBlock<T>& f, const FlightPlan<T>& pl
   return setpoint_at<L<T>>(plan.path, f.tick + first, f.segment + first);
 }
 
-/// The policy acts where its last action has been held for long enough.
+/// The actor acts in the lanes in which its last action has been held for action_repeat control periods.
 template <class T>
 FLAPPY_INLINE void act(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episode<L<T>>& episode, int first) {
   const FlightBlock<T>& f = s.flight;
@@ -73,7 +73,7 @@ FLAPPY_INLINE void act(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episo
   store_rows(episode, s.flight.episode, first);
 }
 
-/// What the controller has learnt to hold; nothing without one.
+/// The inputs that the controller has learnt to hold; 0 without a controller.
 template <class T>
 FLAPPY_INLINE WingBeat<L<T>> learnt_trim(const FlightBlock<T>& f, const FlightPlan<T>& plan, int first) {
   WingBeat<L<T>> trim{L<T>(0), L<T>(0), L<T>(0), L<T>(0)};
@@ -83,7 +83,7 @@ FLAPPY_INLINE WingBeat<L<T>> learnt_trim(const FlightBlock<T>& f, const FlightPl
   return trim;
 }
 
-/// The policy's voltages, within what the motors take.
+/// The policy's voltages, clipped to the motors' voltage limits.
 template <class T>
 FLAPPY_INLINE sim::Voltages<L<T>> commanded(const FlightSpace<T>& s, const Episode<L<T>>& episode, int first) {
   const auto& p = view_rows<Parameters<L<T>>>(s.body.parameters, first);
@@ -91,7 +91,7 @@ FLAPPY_INLINE sim::Voltages<L<T>> commanded(const FlightSpace<T>& s, const Episo
   return {clip(episode.adds[0], p.left.voltage_limit_V), clip(episode.adds[1], p.right.voltage_limit_V)};
 }
 
-/// Policy and controller set the inputs of the wing beat; or the policy alone sets the motors' voltages.
+/// Sets the wing-beat inputs by policy and controller, or the motor voltages by the policy alone.
 template <class T>
 FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int first) {
   FlightBlock<T>& f = s.flight;
@@ -133,7 +133,7 @@ FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   store_rows(drive, s.body.drive, first);
 }
 
-/// Where everything is at the end of a slice: what sensors see, and what is scored.
+/// Stores the true motion at the end of a slice, for sensors and reward.
 template <class T>
 FLAPPY_INLINE void look(const FlightSpace<T>& s, int first) {
   const auto truth =
@@ -141,7 +141,7 @@ FLAPPY_INLINE void look(const FlightSpace<T>& s, int first) {
   store_rows(truth, s.flight.truth, first);
 }
 
-/// Time since the start of each lane's flight, `steps` into the period.
+/// Time since the start of each lane's flight, at physics step `steps` of the control period.
 template <class T>
 FLAPPY_INLINE L<T> flight_time_s(const FlightBlock<T>& f, const FlightPlan<T>& plan, std::int64_t steps, int first) {
   T time[kWidth<T>];
@@ -158,7 +158,7 @@ FLAPPY_INLINE L<T> beat_phase(const sim::Block<T>& body, int first) {
   return L<T>::load(fraction);
 }
 
-/// What the tracker makes of the truth of its sample `index`; `seen`: 0 where it is lost.
+/// Mocap sample number `index` of a true motion, with noise and sensor effects. `seen`: 0 where the sample is lost.
 template <class T>
 FLAPPY_INLINE MocapSample<L<T>> see(const FlightSpace<T>& s, const FlightPlan<T>& plan, const Truth<L<T>>& truth,
                                     const L<T>& seen, std::uint32_t index, int first) {
@@ -171,7 +171,8 @@ FLAPPY_INLINE MocapSample<L<T>> see(const FlightSpace<T>& s, const FlightPlan<T>
   return sample;
 }
 
-/// The pose of a correction where motion capture is later than it says: of the time before, once that is known.
+/// For lanes with mocap_delay: replaces the pose of a correction by one of the true motion at sample time less delay.
+/// It runs when the pose arrives, because a negative delay needs motion after the sample time.
 template <class T>
 FLAPPY_INLINE void delay(const FlightSpace<T>& s, const FlightPlan<T>& plan, const Correction& correction, int first) {
   T* rows = s.queue + static_cast<std::ptrdiff_t>(correction.slot) * kMocapRows * kLanes<T>;
@@ -185,7 +186,7 @@ FLAPPY_INLINE void delay(const FlightSpace<T>& s, const FlightPlan<T>& plan, con
   for (int r = 0; r < kMocapRows; ++r) where(late == L<T>(0), prompt[r], from[r]).store(rows + r * kLanes<T> + first);
 }
 
-/// Sensors sample the true state at the end of a slice, `steps` into the period.
+/// Takes the samples that are due at the end of a slice, at physics step `steps` of the control period.
 template <class T>
 FLAPPY_INLINE void sense(const FlightSpace<T>& s, const FlightPlan<T>& plan, const Slice& slice, std::int64_t steps,
                          int imu_samples, int mocap_samples, int first) {
@@ -222,7 +223,7 @@ FLAPPY_INLINE void sense(const FlightSpace<T>& s, const FlightPlan<T>& plan, con
   }
 }
 
-/// The estimate at the end of the period, from all that has arrived by then.
+/// Updates the estimate to the end of the period with all samples that have arrived.
 template <class T>
 FLAPPY_INLINE void estimate(const FlightSpace<T>& s, const FlightPlan<T>& plan, int first) {
   FlightBlock<T>& f = s.flight;
@@ -262,7 +263,7 @@ FLAPPY_INLINE void estimate(const FlightSpace<T>& s, const FlightPlan<T>& plan, 
   store_rows(estimator, f.estimator, first);
 }
 
-/// Rewards the period, checks whether the episode ends, and shows the policy what it may know.
+/// Computes the reward, checks whether the episode ends, and writes the next observation.
 template <class T>
 FLAPPY_INLINE void reward_and_terminate(const FlightSpace<T>& s, const FlightPlan<T>& plan, int first) {
   FlightBlock<T>& f = s.flight;
@@ -305,7 +306,7 @@ FLAPPY_INLINE void reward_and_terminate(const FlightSpace<T>& s, const FlightPla
   store_rows(episode, f.episode, first);
 }
 
-/// Of a counter that runs evenly: the processor's time stamp, or nanoseconds where there is none.
+/// The processor's time-stamp counter; ticks of the steady clock on other architectures than x86-64.
 std::uint64_t cycles_now() {
 #if defined(__x86_64__)
   return __rdtsc();
@@ -314,7 +315,7 @@ std::uint64_t cycles_now() {
 #endif
 }
 
-/// Adds the time since the last lap to a stage, where a benchmark asked for it.
+/// Adds the time since the last lap to a stage; does nothing if `cycles` is null.
 class Stopwatch {
  public:
   explicit Stopwatch(std::uint64_t* cycles) : cycles_(cycles), last_(cycles != nullptr ? cycles_now() : 0) {}

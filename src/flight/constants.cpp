@@ -41,7 +41,7 @@ FlightConstants flight_constants(const FleetOptions& options) {
   });
   TaskConstants<double>& task = k.task;
   task.tick_s = period_s;
-  // half-way between ticks, so that rounding cannot move an end by one
+  // place limits half-way between ticks, so that rounding cannot shift them by a tick
   for (double* from : {&task.limits.time_s, &task.hand_back.at_s, &task.success.keep_from_s, &task.reward.until_s})
     *from = (std::ceil(*from / period_s - 1e-6) - 0.5) * period_s;
   for (double* after :

@@ -1,11 +1,11 @@
-// The numbers that sensors, estimator, controller and task of a fleet work with, from what its user states.
+// Working constants of sensors, estimator, controller and task, derived from the options of a fleet.
 #pragma once
 
 #include "flight/fleet.hpp"
 
 namespace flappy::flight {
 
-/// The same numbers in another precision.
+/// A struct of doubles converted to numbers of type T.
 template <class T, template <class> class S>
 S<T> rounded(const S<double>& from) {
   static_assert(sizeof(S<T>) / sizeof(T) == sizeof(from) / sizeof(double));
@@ -24,10 +24,10 @@ struct FlightConstants {
   TaskConstants<double> task;
 };
 
-/// Of the control period that the options ask for, in whole physics steps.
+/// Derives the constants. The control period is rounded to whole physics steps.
 FlightConstants flight_constants(const FleetOptions& options);
 
-/// What the estimator knows at the start of a flight.
+/// Covariance of the estimate at the start of a flight.
 Covariance<double> start_covariance(const Sensors& sensors);
 
 }  // namespace flappy::flight

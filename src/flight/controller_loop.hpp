@@ -1,11 +1,11 @@
-// What every controller is told of the loop that it flies in; its constants begin with it.
+// Constants of the control loop that every controller gets. The constants of each controller begin with them.
 #pragma once
 
 namespace flappy::flight {
 
 template <class T>
 struct LoopConstants {
-  T velocity_share, rate_share;  // of a new value in the low-passed one
+  T velocity_share, rate_share;  // share of a new value in the low-passed velocity and body rate
   T period_s, per_period_Hz, gravity_m_s2;
 };
 

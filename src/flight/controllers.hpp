@@ -1,15 +1,15 @@
-// Every controller. A new one is a file with its table of functions, and added to the list here; nothing else knows it by name.
+// List of all controllers. A new controller is a file with a table of functions, added to the list here; no other code names it.
 //
 // A table C has
-//   kName                        what configurations call it
-//   Constants<T>, Memory<T>      what it is told, beginning with LoopConstants<T>, and what it remembers; all members are T
-//   fields(constants, add)       add(key, number, range) for each number of its configuration
+//   kName                        its name in configurations
+//   Constants<T>, Memory<T>      its constants, beginning with LoopConstants<T>, and its memory; all members are T
+//   fields(constants, add)       add(key, number, range) for each parameter of its configuration
 //   start(memory, estimate)      memory, all 0 before, at the start of a flight
 //   update(constants, memory, estimate, set point)    inputs of the wing beat for the next control period
-//   trim(constants, memory)      the inputs that it has learnt: those of a settled vehicle
-//   unlearn(held, before, now)   takes back what it learnt in the last period in the lanes `held`
-//   rotate(sin, cos, memory)     memory of a flight that is rotated about z of W
-//   kSource, exported(constants, add)    where it can be exported: its C code (kSource.h and kSource_types.h in src/deploy/c),
+//   trim(constants, memory)      the inputs that it has learnt to hold; in a settled vehicle, those of hover
+//   unlearn(held, before, now)   restores the learnt part of the memory in the lanes `held`
+//   rotate(sin, cos, memory)     rotates the memory about z of W
+//   kSource, exported(constants, add)    only if it can be exported: its C code (kSource.h and kSource_types.h in src/deploy/c),
 //                                        and add(member, number or struct of numbers) for each of its constants there
 #pragma once
 
@@ -25,7 +25,7 @@ inline namespace FLAPPY_ISA {
 
 using Controllers = std::tuple<PidController, ArcController>;
 
-/// A kind of controller is its index in the list.
+/// A controller is identified by its index in the list.
 inline constexpr int kNoController = -1, kControllers = std::tuple_size_v<Controllers>;
 
 template <class C, int I = 0>
@@ -34,7 +34,7 @@ constexpr int kind_of() {
   else return kind_of<C, I + 1>();
 }
 
-/// Calls `use(table)` for the controller of this kind; not at all where there is none.
+/// Calls `use(table)` for the controller of this kind; does nothing for kNoController.
 template <int I = 0>
 FLAPPY_INLINE void with_controller(int kind, const auto& use) {
   if constexpr (I < kControllers) {
@@ -63,7 +63,7 @@ struct ControllerConstants : ConstantsOf<T, Controllers> {
   }
 };
 
-/// Rows that suffice for the memory of any.
+/// Rows of memory: those of the controller that needs most.
 inline constexpr int kControllerRows = ControllerConstants<float>::kRows;
 
 }  // namespace FLAPPY_ISA

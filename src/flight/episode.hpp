@@ -1,10 +1,10 @@
-// The course of an episode, lane by lane: what a policy sees, what it adds, what that earned, and whether it is over.
+// One episode, lane by lane: observation, action, reward and termination.
 #pragma once
 
 #include "flight/pid.hpp"
 #include "flight/task.hpp"
 
-#ifdef __clang__  // conditions that are written for lanes are bits of bools for one flapper
+#ifdef __clang__  // & and | of lane masks become bitwise operations on bools where there is one lane
 #pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wbitwise-instead-of-logical"
 #endif
@@ -12,32 +12,31 @@
 namespace flappy::flight {
 inline namespace FLAPPY_ISA {
 
-/// What an episode remembers, as rows.
+/// State of an episode, stored as rows. Elements of an action beyond the task's are 0.
 template <class T>
 struct Episode {
-  // of actions, the numbers beyond the task's are 0
-  T action[kMaxActions];    // of the policy, in [-1, 1]
-  T previous[kMaxActions];  // the one before
-  T adds
-      [kMaxActions];  // what its action adds to the controller's output, V, V, V, split cycle; or the motors' voltages
-  T added[kMaxActions];  // besides
+  T action[kMaxActions];    // from the policy, in [-1, 1]
+  T previous[kMaxActions];  // action in the control period before
+  T adds[kMaxActions];   // scaled action: offset to the controller's output (V, V, V, split cycle), or motor voltages
+  T added[kMaxActions];  // offset to the controller's output that does not come from the policy (Fleet::set_added)
   T handed_back;         // 0 or 1
-  T reward;              // of the last control period
+  T reward;              // in the last control period
   T action_reward;       // sum of rewards since the policy last acted
-  T noise[kMaxActions];  // on its actions, of deviation 1
-  T captured_s;          // when the goal was captured first; 0: not yet
-  T lost_s;              // when it was not kept first; 0: never
+  T noise[kMaxActions];  // exploration noise, standard deviation 1
+  T captured_s;          // time at which the goal was first captured; 0: not yet
+  T lost_s;              // time at which the goal was first not kept; 0: never
 };
 
-/// What an action of the policy adds to input `i`, or the voltage of motor `i`.
+/// Maps action element `i` from [-1, 1] to the task's range: an offset to wing-beat input `i`, or the voltage of motor
+/// `i`.
 template <class T>
 FLAPPY_INLINE T scaled_action(const TaskConstants<Element<T>>& k, int i, const T& action) {
   const T middle(0.5 * (k.action_low[i] + k.action_high[i])), half(0.5 * (k.action_high[i] - k.action_low[i]));
-  // NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage): no width is 0
+  // NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage): no layer has width 0
   return middle + half * clamp(action, T(-1), T(1));
 }
 
-/// What a policy and whoever else may add do to the controller's output.
+/// Controller output plus the policy's offset (until the hand-back) and the offset of Fleet::set_added.
 template <class T>
 FLAPPY_INLINE WingBeat<T> add_action(const Episode<T>& e, const WingBeat<T>& base) {
   T sum[kMaxActions] = {base.amplitude_V, base.difference_V, base.bias_V, base.split_cycle};
@@ -45,13 +44,13 @@ FLAPPY_INLINE WingBeat<T> add_action(const Episode<T>& e, const WingBeat<T>& bas
   return {sum[0], sum[1], sum[2], sum[3]};
 }
 
-/// The true state as scored: relative to the set point, axes of W, angles about its heading.
+/// True state relative to the set point. Vectors are in W; yaw is relative to the set point's heading.
 template <class T>
 struct Score {
   Vec3<T> position_m, velocity_m_s;
   T roll_rad, pitch_rad, yaw_rad;
-  T facing, upright;  // R_00 as seen from the set point's heading, and R_22: the cosine of tilt
-  T heading_cos;      // of the heading error: the body's x axis projected on the level
+  T facing, upright;  // R'_00: R_00 in the set point's heading frame; R_22, the cosine of the tilt
+  T heading_cos;      // cosine of the heading error; heading: direction of the body's x axis in the horizontal plane
 };
 
 template <class T>
@@ -69,7 +68,7 @@ FLAPPY_INLINE Score<T> score_of(const Truth<T>& t, const Setpoint<T>& ref) {
           facing / sqrt(max(T(facing * facing + aside * aside), T(1e-12)))};
 }
 
-/// What every period earns: the sum r in task.hpp, but for goal G.
+/// Reward of a control period: r of Reward (task.hpp) without the term goal G.
 template <class T>
 FLAPPY_INLINE T running_reward(const Reward<Element<T>>& k, const Score<T>& s, const Truth<T>& t, const Episode<T>& e) {
   T effort(0), change(0);
@@ -91,7 +90,7 @@ FLAPPY_INLINE T running_reward(const Reward<Element<T>>& k, const Score<T>& s, c
           T(k.near) / T(T(1) + T(k.near_1_m) * T(k.near_1_m) * dot(s.position_m, s.position_m)));
 }
 
-/// 1 at the goal and at rest there, falling off with every error: G in task.hpp.
+/// G of Reward (task.hpp): 1 at rest at the goal, lower for any error.
 template <class T>
 FLAPPY_INLINE T closeness(const Reward<Element<T>>& k, const Score<T>& s, const Truth<T>& t) {
   const T tilt = T(k.goal_1_tilt) * atan2(sqrt(max(T(T(1) - s.upright * s.upright), T(0))), s.upright);
@@ -105,8 +104,9 @@ FLAPPY_INLINE T closeness(const Reward<Element<T>>& k, const Score<T>& s, const 
   return T(1) / product;
 }
 
-/// The reward of the period that ends at `time_s`, as task.hpp has it. `done`: lanes where the policy's work is done by then;
-/// `e` knows already whether the goal is captured and kept, and not yet that it is handed back now.
+/// Reward of the control period that ends at `time_s` (Reward, task.hpp). `done`: lanes that meet the hand-back
+/// condition at `time_s`. Call after note_success() and before e.handed_back is updated, so that the arrival is paid
+/// once.
 template <class T>
 FLAPPY_INLINE T reward_of(const Reward<Element<T>>& k, const Score<T>& s, const Truth<T>& t, const T& time_s,
                           const T& tick_s, auto done, const Episode<T>& e) {
@@ -130,7 +130,7 @@ FLAPPY_INLINE auto shorter(const Vec3<T>& v, const Element<T>& limit) {
   return dot(v, v) < T(limit) * T(limit);
 }
 
-/// Lanes where the policy's work is done. `touches`: 0 or 1, whether a point of contact touches something.
+/// Lanes that meet the hand-back condition. `touches`: 0 or 1, whether a contact point touches something.
 template <class T>
 FLAPPY_INLINE auto arrived(const HandBack<Element<T>>& k, const Score<T>& s, const Vec3<T>& body_rate, const T& time_s,
                            const T& touches = T(1)) {
@@ -141,7 +141,7 @@ FLAPPY_INLINE auto arrived(const HandBack<Element<T>>& k, const Score<T>& s, con
   return (T(k.enabled) > T(0)) & (there | (time_s >= T(k.at_s)));
 }
 
-/// Notes when the goal was first captured, and when it was first not kept.
+/// Sets e.captured_s at the first capture and e.lost_s when the goal is first not kept.
 template <class T>
 FLAPPY_INLINE void note_success(const Success<Element<T>>& k, const Score<T>& s, const Vec3<T>& body_rate,
                                 const T& time_s, Episode<T>& e, const T& touches = T(1)) {
@@ -156,7 +156,7 @@ FLAPPY_INLINE void note_success(const Success<Element<T>>& k, const Score<T>& s,
   e.lost_s = where(asked & !keeps & (e.lost_s == T(0)), time_s, e.lost_s);
 }
 
-/// Calls mark(mask, bit) for each end.
+/// Calls mark(lanes that end, bit of Ended) for each rule that ends an episode.
 template <class T, class Mark>
 FLAPPY_INLINE void check_termination(const Limits<Element<T>>& k, const Score<T>& s, const T& time_s,
                                      const Mark& mark) {
@@ -170,7 +170,7 @@ FLAPPY_INLINE void check_termination(const Limits<Element<T>>& k, const Score<T>
   mark(time_s >= T(k.time_s), kTimeOut);
 }
 
-/// Strokes and their rates.
+/// Stroke angles and rates.
 template <class T>
 struct Wings {
   T left_rad, right_rad, left_rad_s, right_rad_s;
@@ -181,7 +181,8 @@ FLAPPY_INLINE Wings<T> wings_of(const State<T>& x) {
   return {x.left.stroke_rad, x.right.stroke_rad, x.left.stroke_rate_rad_s, x.right.stroke_rate_rad_s};
 }
 
-/// Writes the observed parts; returns how many rows they are. `actions`: numbers of an action.
+/// Writes the observed parts to `row` and returns the number of rows. `parts`: bits of Part. `actions`: elements of an
+/// action.
 template <class T>
 FLAPPY_INLINE int observe(std::uint32_t parts, int actions, const Estimate<T>& x, const Setpoint<T>& ref,
                           const Episode<T>& e, const T& beat_fraction, const T& time_s, const WingBeat<T>& trim,

@@ -1,22 +1,22 @@
 // Estimator: error-state Kalman filter with delayed motion capture (Lefferts, Markley and Shuster 1982; Sola 2017).
 //
-// A late pose belongs to the past. The filter keeps its state at the time of the last pose that arrived (the horizon)
-// and the IMU increments since: a new pose moves the horizon up to its own time through those increments, corrects
-// there, exactly where it belongs, and the rest of the increments is run again up to now. Between poses the present
-// moves on alone.
+// A pose arrives late, so it describes the past. The filter keeps its state at the time of the last pose that arrived (the
+// horizon) and the IMU increments since then. A new pose moves the horizon through those increments to the pose's own time
+// and corrects it there. The remaining increments are then replayed from the horizon to the present. Between poses only the
+// present moves.
 //
 // Errors, true = estimate + error, angle in B:
-//   angle'  = -bias_g - noise_g        (the turn of B between poses is neglected)      bias_g' = drift
+//   angle'  = -bias_g - noise_g        (the rotation of B between poses is neglected)  bias_g' = drift
 //   position' = velocity      velocity' = -R bias_a - R noise_a                        bias_a' = drift
 // Pose and noise are isotropic, so all axes share one covariance: 3 numbers for angle and gyro bias, 6 for position,
-// velocity and accelerometer bias. Tilt error leaks gravity into velocity; it is counted as velocity drift.
+// velocity and accelerometer bias. A tilt error makes gravity act as an acceleration error; the filter treats it as velocity drift.
 #pragma once
 
 #include "flight/sensors.hpp"
 
 namespace flappy::flight {
 
-/// Spectral densities and variances.
+/// Spectral densities of process noise, and variances of mocap noise on each axis.
 template <class T>
 struct EstimatorConstants {
   T angle_noise_rad2_s, gyro_bias_drift_rad2_s3;
@@ -28,14 +28,15 @@ struct EstimatorConstants {
 
 inline namespace FLAPPY_ISA {
 
-/// Attitude, velocity and position, moved by IMU increments.
+/// Attitude B to W, position and velocity in W.
 template <class T>
 struct Pose {
   Quaternion<T> attitude;
   Vec3<T> position_m, velocity_m_s;
 };
 
-/// Turn and velocity gained over some time, in B at its middle, as measured.
+/// Measured rotation and gain of velocity over an interval, in the frame B at the middle of the interval; biases
+/// included.
 template <class T>
 struct Increment {
   Vec3<T> rotation_rad, velocity_m_s;
@@ -43,35 +44,37 @@ struct Increment {
 
 template <class T>
 struct Covariance {
-  T angle, angle_bias, gyro_bias;  // rad^2, rad^2/s, ...
+  T angle, angle_bias, gyro_bias;  // rad^2, rad^2/s, rad^2/s^2
   T position, position_velocity, position_bias, velocity, velocity_bias, accel_bias;
 };
 
-/// The filter, as rows. Its poses are those of the point where the IMU sits: no lever arm turns its readings into motion.
+/// State of the filter, stored as rows. Its poses are those of the IMU's position, so that IMU increments need no lever
+/// arm.
 template <class T>
 struct Estimator {
   Pose<T> horizon, now;
   Vec3<T> gyro_bias_rad_s, accel_bias_m_s2;
   Covariance<T> covariance;
-  Increment<T> gathered;                    // since the last control tick
-  Vec3<T> body_rate_rad_s;                  // of the newest sample, bias taken out
-  T angle_innovation, position_innovation;  // of the last pose: r.r/S, three degrees of freedom each
+  Increment<T> gathered;                    // IMU samples since the last control tick
+  Vec3<T> body_rate_rad_s;                  // mean over the newest increment, less the bias
+  T angle_innovation, position_innovation;  // r.r/S for the last pose, three degrees of freedom each
 };
 
-/// What the controllers and the observation know of a flapper: the same numbers as the truth, not the same values.
+/// The estimated motion of the torso, for controllers and observations.
 template <class T>
 using Estimate = Truth<T>;
 
+/// Appends an IMU sample over `interval_s` to an increment.
 template <class T>
 FLAPPY_INLINE void gather(Increment<T>& sum, const ImuSample<T>& sample, const T& interval_s) {
   const Vec3<T> turn = interval_s * sample.gyro_rad_s, gained = interval_s * sample.accel_m_s2;
-  // the later sample, seen from the frame of the earlier ones
+  // both velocity gains, to first order in the frame at the middle of the joint interval
   sum.velocity_m_s =
       sum.velocity_m_s + (gained + T(0.5) * cross(sum.rotation_rad, gained)) - T(0.5) * cross(turn, sum.velocity_m_s);
   sum.rotation_rad = sum.rotation_rad + turn;
 }
 
-/// Moves a pose by `share` of an increment that took `duration_s` in all.
+/// Moves a pose by `share` of an increment, whose whole duration is `duration_s`.
 template <class T>
 FLAPPY_INLINE void advance(Pose<T>& x, const Increment<T>& increment, const Vec3<T>& gyro_bias,
                            const Vec3<T>& accel_bias, const T& share, const T& duration_s, const T& gravity_m_s2) {
@@ -85,6 +88,7 @@ FLAPPY_INLINE void advance(Pose<T>& x, const Increment<T>& increment, const Vec3
   x.attitude = rotated(middle, quarter);
 }
 
+/// Propagates the covariance over `time` seconds.
 template <class T>
 FLAPPY_INLINE void spread(Covariance<T>& c, const EstimatorConstants<Element<T>>& k, const T& time) {
   c.angle = c.angle + time * T(T(k.angle_noise_rad2_s) + (time * c.gyro_bias - T(2) * c.angle_bias));
@@ -103,7 +107,7 @@ FLAPPY_INLINE Vec3<T> imu_position(const EstimatorConstants<Element<T>>& k) {
   return {T(k.imu_position_m[0]), T(k.imu_position_m[1]), T(k.imu_position_m[2])};
 }
 
-/// Motion of the torso origin.
+/// Motion of the torso origin, from the pose of the IMU.
 template <class T>
 FLAPPY_INLINE Estimate<T> torso(const EstimatorConstants<Element<T>>& k, const Pose<T>& imu, const Vec3<T>& body_rate) {
   const Matrix3<T> R = rotation_matrix(imu.attitude);
@@ -111,7 +115,7 @@ FLAPPY_INLINE Estimate<T> torso(const EstimatorConstants<Element<T>>& k, const P
   return {imu.position_m - R * arm, imu.attitude, imu.velocity_m_s - R * cross(body_rate, arm), body_rate};
 }
 
-/// The pose of the IMU.
+/// Pose of the IMU, from the motion of the torso origin.
 template <class T>
 FLAPPY_INLINE Pose<T> imu_pose(const EstimatorConstants<Element<T>>& k, const Estimate<T>& torso) {
   const Matrix3<T> R = rotation_matrix(torso.attitude);
@@ -119,7 +123,7 @@ FLAPPY_INLINE Pose<T> imu_pose(const EstimatorConstants<Element<T>>& k, const Es
   return {torso.attitude, torso.position_m + R * arm, torso.velocity_m_s + R * cross(torso.body_rate_rad_s, arm)};
 }
 
-/// Corrects the horizon by a pose taken at its time; a lost pose changes nothing.
+/// Corrects the horizon by a mocap pose of the same time; a lost pose changes nothing.
 template <class T>
 FLAPPY_INLINE void correct(Estimator<T>& f, const EstimatorConstants<Element<T>>& k, const MocapSample<T>& z) {
   const auto lost = z.valid <= T(0);

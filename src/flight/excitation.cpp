@@ -13,7 +13,7 @@ namespace {
 constexpr std::array<double sim::Input::*, 4> kInputs = {&sim::Input::amplitude_V, &sim::Input::difference_V,
                                                          &sim::Input::bias_V, &sim::Input::split_cycle};
 const std::vector<std::string> kNames = {"amplitude_V", "difference_V", "bias_V", "split_cycle"};
-constexpr double kSame_s = 1e-9;  // times closer than this are the same
+constexpr double kSame_s = 1e-9;  // times closer than this count as equal
 constexpr io::Range kTime{0, 1e5}, kSize{-18, 18};
 
 /// cos(2 pi x).
@@ -32,7 +32,7 @@ double value(const Wave& w, double t_s) {
   return w.amplitude * sum;
 }
 
-/// Harmonics of multisine `index` of `of`.
+/// Harmonics of multisine number `index`, counted from 0, out of `of` multisines in the flight.
 std::vector<int> harmonics(const io::Table& table, const Wave& w, int count, int index, int of) {
   std::vector<int> own, chosen;
   const auto first = static_cast<int>(std::ceil(w.from_hz * w.period_s - 1e-9));

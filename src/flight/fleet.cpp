@@ -33,7 +33,7 @@ Fleet<T>::Fleet(std::size_t count, const model::Vehicle& vehicle, const FleetOpt
     throw std::invalid_argument("a task of voltages has no controller");
   storage_ = std::make_unique<Storage>(count, vehicle, options, static_cast<int>(std::lround(steps)),
                                        sim::kernel_of<T>(fly_floats, fly_doubles, options.batch.instruction_set));
-  // lanes beyond the last flapper fly along, so that no lane ever holds numbers of no flight
+  // lanes beyond the last flapper fly a copy of it, so that every lane holds valid numbers
   Storage& s = *storage_;
   for (std::size_t i = 0; i < count; ++i) start(i, 0);
   for (std::size_t i = count; count > 0 && i < s.blocks.size() * kLanes<T>; ++i) {
@@ -448,9 +448,9 @@ std::vector<std::span<std::byte>> Fleet<T>::memory() {
     all.push_back(std::as_writable_bytes(std::span(body.contact_rows)));
     all.push_back(std::as_writable_bytes(std::span(body.contact_memory)));
   }
-  if (body.mean) {
-    all.push_back(std::as_writable_bytes(std::span(body.mean->rows)));
-    all.push_back(std::as_writable_bytes(std::span(body.mean->memory)));
+  if (body.beat_averaged) {
+    all.push_back(std::as_writable_bytes(std::span(body.beat_averaged->rows)));
+    all.push_back(std::as_writable_bytes(std::span(body.beat_averaged->memory)));
   }
   if (body.jointed) {
     all.push_back(std::as_writable_bytes(std::span(body.jointed->rows)));

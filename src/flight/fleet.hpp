@@ -1,5 +1,5 @@
-// Many flappers in closed loop: bodies, sensors, estimators, controllers and tasks, one control period at a time. The
-// bytes of a flapper depend on its vehicle, its task and its place in the random streams, as those of a Batch do.
+// Many flappers in closed loop: bodies, sensors, estimators, controllers and tasks, one control period at a time. As in a
+// Batch, every bit of a flapper's flight depends only on its vehicle, its task and its number in the random streams.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ namespace flappy::flight {
 template <class T>
 struct Tap;
 
-/// What is common to all flappers of a fleet.
+/// Options shared by all flappers of a fleet.
 struct FleetOptions {
   Sensors sensors;
   Controller controller;
@@ -26,25 +26,27 @@ struct FleetOptions {
   sim::BatchOptions batch;
 };
 
-/// Noise on a policy's actions: an autoregressive one of first order, in units of the action.
+/// Exploration noise on a policy's actions: first-order autoregressive, in units of the action.
 struct Exploration {
-  double low = 0, high = 0;  ///< standard deviation of the first and of the last flapper of a fleet
-  double kept = 0;           ///< correlation from one action to the next
+  /// Standard deviation for the first and for the last flapper of a fleet; linear in between.
+  double low = 0, high = 0;
+  double kept = 0;  ///< correlation from one action to the next
 };
 
-/// A flapper's motion, true or estimated. SI units; attitude w, x, y, z, body to world.
+/// Motion of a flapper's torso origin, true or estimated. Position and velocity in W, attitude w, x, y, z (B to W),
+/// body rate in B.
 struct Motion {
   double position_m[3], attitude[4], velocity_m_s[3], body_rate_rad_s[3];
 };
 
-/// Where a flapper is meant to be.
+/// Set point of a flapper, in W.
 struct Target {
   double position_m[3], velocity_m_s[3], acceleration_m_s2[3];
   double heading_cos, heading_sin, heading_rate_rad_s;
 };
 
-/// What the flappers of a block show after a period, each list one number for each; a number of the observation is `lanes` after the
-/// one before it. Of observations with a history, the present.
+/// Views of a block's flappers after a control period. Each list has one number per lane; `observation` is
+/// [element][lanes] and holds the present observation without its history.
 template <class T>
 struct Shown {
   std::size_t lanes;
@@ -52,26 +54,26 @@ struct Shown {
   const std::uint32_t *ended, *tick;
 };
 
-/// A flapper in mid-flight: its vehicle with its effects, state, sensors' biases, and what estimator and controller have learnt.
+/// A flapper in mid-flight: vehicle, effects, state, sensor biases, and memories of estimator and controller.
 template <class T>
 struct Snapshot {
   std::vector<T> body, flight;  ///< rows of Block and FlightBlock
-  std::uint64_t effects = 0;    ///< in force
+  std::uint64_t effects = 0;    ///< bits of the effects in force
   std::vector<T> effect_rows, effect_states;
-  std::vector<T> motors;  ///< conductance and back-EMF's current of left and right, where energy is metered
-  /// Rows and memory of a robot that is known by the beat, or has four angles a wing.
+  std::vector<T> motors;  ///< conductance and back-EMF current of the left and right motor, where energy is metered
+  /// Rows and memory of a beat-averaged robot or of one with articulated wings; else empty.
   std::pair<std::vector<T>, std::vector<T>> own;
-  std::pair<std::vector<T>, std::vector<T>> contact;  ///< the same of points of contact
+  std::pair<std::vector<T>, std::vector<T>> contact;  ///< rows and memory of the contact points
   std::uint32_t phase, phase_per_update;
-  Target target;  ///< where it was meant to be
+  Target target;  ///< set point at the snapshot
 };
 
 template <class T>
 class Fleet {
  public:
-  /// `count` copies of `vehicle`, each at the start of its episode 0. std::invalid_argument where the control period is no
-  /// whole number of physics steps, a sensor is faster than they are, the task has no path, or it is one of voltages and there is
-  /// a controller.
+  /// `count` copies of `vehicle`, each at the start of its episode 0. Throws std::invalid_argument if the control
+  /// period is not a whole number of physics steps, if a sensor samples more than once in a physics step, if the task
+  /// has no path, or if its actions are motor voltages and there is a controller.
   Fleet(std::size_t count, const model::Vehicle& vehicle, const FleetOptions& options);
   ~Fleet();
   Fleet(Fleet&&) noexcept;
@@ -81,77 +83,80 @@ class Fleet {
   const FleetOptions& options() const;
 
   void set_vehicle(std::size_t i, const model::Vehicle& vehicle);
-  /// Starts flapper `i` anew where its task starts episode `episode`, or at `state`.
+  /// Restarts flapper `i`: at the start state that its task samples for `episode`, or at `state`.
   void start(std::size_t i, std::uint32_t episode);
   void start(std::size_t i, std::uint32_t episode, const sim::FlapperState& state, sim::Start kind);
-  /// Starts flapper `i` as the snapshot flew, moved and turned about z to where its task starts the episode.
+  /// Restarts flapper `i` from a snapshot, moved and turned about z of W to the start of the episode.
   void start(std::size_t i, std::uint32_t episode, const Snapshot<T>& snapshot);
   Snapshot<T> snapshot(std::size_t i) const;
 
-  /// The actor that acts from now on, or none: then the last actions stay. std::invalid_argument unless its observation and
-  /// action are those of the task.
+  /// Sets the actor that acts from now on. With no actor the last actions stay in force. Throws std::invalid_argument
+  /// unless its observation and action are those of the task.
   void set_actor(const std::shared_ptr<const policy::Actor>& actor);
-  /// Actions of all flappers of a block for the next period, row after row, each number in [-1, 1], for what they observe now; an actor
-  /// would overwrite them.
+  /// Sets the actions of a block's flappers for the next control period: [flapper][element], each in [-1, 1], in
+  /// response to the present observations. Use it without an actor, which would overwrite them.
   void set_actions(std::size_t block, const T* actions);
-  /// The action of flapper `i` by what it adds to the controller's output, or the voltages that it sets, each within the task's range.
-  /// std::invalid_argument unless they are as many as the task's actions.
+  /// Sets the action of flapper `i` in physical units: offsets to the controller's output, or motor voltages; clipped
+  /// to the task's range. Throws std::invalid_argument unless there are as many as the task's actions.
   void set_adds(std::size_t i, std::span<const double> adds);
-  /// Adds to the controller's output from now on: open-loop flight, excitation. std::invalid_argument for anything but nothing
-  /// where the task is one of voltages.
+  /// Sets an offset to the controller's output from now on, for open-loop flight or excitation. Throws
+  /// std::invalid_argument for an offset other than 0 if the task's actions are motor voltages.
   void set_added(std::size_t i, const sim::Input& input);
 
-  /// Noise on the actor's actions from now on.
+  /// Sets the noise on the actor's actions from now on.
   void set_exploration(const Exploration& exploration);
 
-  /// One control period for all.
+  /// Flies all flappers through one control period.
   void step();
-  /// The same in parts: begin() plans `periods` control periods, then fly_block() takes a block of flappers through all of
-  /// them, each block once, in any order and on any thread, and end() closes them.
+  /// step() in parts: begin() plans `periods` control periods; fly_block() then flies one block through all of them, to
+  /// be called once for each block, in any order and on any thread; end() closes them.
   void begin(int periods);
   void fly_block(std::size_t block);
   void end();
   std::size_t blocks() const;
-  /// Flappers of a block: the first, and the one after the last.
+  /// Range of flappers in a block: first, and one after the last.
   std::pair<std::size_t, std::size_t> flappers(std::size_t block) const;
   Shown<T> shown(std::size_t block) const;
 
   Motion truth(std::size_t i) const;
   Motion estimate(std::size_t i) const;
   Target target(std::size_t i) const;
-  /// As the controller and actor last set it, before the driver clips it; nothing where the task is one of voltages.
+  /// Wing-beat input as controller and actor last set it, before the driver clips it. Without meaning if the task's
+  /// actions are voltages.
   sim::Input input(std::size_t i) const;
   double reward(std::size_t i) const;
   std::uint32_t ended(std::size_t i) const;  ///< bits of Ended, since the start
-  /// Bits of sim::Status that are events, since the start: of a vehicle with points of contact whose task does not end by it, touching
-  /// is none.
+  /// Bits of sim::Status that are events, since the start. Contact is not an event for a vehicle with contact points
+  /// whose task does not end on contact.
   std::uint32_t events(std::size_t i) const;
   std::uint32_t tick(std::size_t i) const;  ///< control periods since the start
   bool handed_back(std::size_t i) const;
-  double captured_s(std::size_t i) const;  ///< when the goal was first captured; 0: not yet
-  double lost_s(std::size_t i) const;      ///< when it was first not kept, as the task asks; 0: never
+  double captured_s(std::size_t i) const;  ///< time at which the goal was first captured; 0: not yet
+  double lost_s(std::size_t i) const;      ///< time at which the goal was first not kept as the task demands; 0: never
+  /// Observation with its history, newest first.
   std::vector<double> observation(std::size_t i) const;
   void observation(std::size_t i, T* row) const;
-  /// Of the policy, its noise included, and what that adds to the controller's output, or the voltages that it sets: numbers of the
-  /// task's actions, then zeros.
+  /// Last action of the policy with its noise, in [-1, 1]; 0 beyond the task's actions.
   std::array<T, kMaxActions> action(std::size_t i) const;
+  /// Last action in physical units: offset to the controller's output, or motor voltages; 0 beyond the task's actions.
   std::array<T, kMaxActions> adds(std::size_t i) const;
-  T action_reward(std::size_t i) const;  ///< rewards since the policy last acted, or was told how
-  /// Squared innovations of the last pose over their variance: angle and position, three degrees of freedom each.
+  T action_reward(std::size_t i) const;  ///< sum of rewards since the last action of the actor or set_actions()
+  /// Normalised squared innovations of the last mocap pose: angle and position, three degrees of freedom each.
   std::pair<double, double> innovation(std::size_t i) const;
   std::array<double, 3> gyro_bias_rad_s(std::size_t i) const;  ///< true
-  /// What the IMU means of late, without noise and bias: rates, rad/s, and specific force, m/s^2, in B.
+  /// Low-passed IMU signal without noise and bias, in B: rates in rad/s, specific force in m/s^2.
   std::pair<std::array<double, 3>, std::array<double, 3>> felt(std::size_t i) const;
 
   sim::Batch<T>& batch();
   const sim::Batch<T>& batch() const;
   double period_s() const;
 
-  /// Counts processor cycles of each Stage (flight_block.hpp) into `cycles` from now on; for fleets on one thread.
+  /// Adds the processor cycles of each Stage (flight_block.hpp) to cycles[Stage] from now on; for fleets on one thread.
   void count_cycles(std::uint64_t* cycles);
 
-  /// What a recorder sees of the last period's samples: none unless record(true) came before it. Poses of a flapper with a
-  /// mocap_delay are those that arrived, as one that is early is known no sooner.
+  /// Samples of the last control period, for recorders; empty unless record(true) was called before it. For a flapper
+  /// with mocap_delay, mocap_samples() gives the poses that arrived in the period, because a pose with a negative delay
+  /// is known only then.
   struct ImuRecord {
     double arrival_s, gyro_rad_s[3], accel_m_s2[3];
   };
@@ -163,15 +168,15 @@ class Fleet {
   std::vector<ImuRecord> imu_samples(std::size_t i) const;
   std::vector<MocapRecord> mocap_samples(std::size_t i) const;
 
-  /// All that changes in flight, for who keeps and restores it: then restored() must follow, with the control periods
-  /// flown.
+  /// All memory that changes in flight, for checkpoints. Call restored() after writing to it, with the number of
+  /// control periods flown.
   std::vector<std::span<std::byte>> memory();
   void restored(std::int64_t periods);
-  std::int64_t periods() const;  ///< flown so far
+  std::int64_t periods() const;  ///< control periods flown so far
 
   std::uint64_t hash(std::size_t first, std::size_t last) const;
   std::uint64_t hash() const { return hash(0, size()); }
-  /// Of sensors, estimator, controller and task, beyond Batch::bytes_per_flapper().
+  /// Memory of sensors, estimator, controller and task; add Batch::bytes_per_flapper() for the body.
   std::size_t bytes_per_flapper() const;
 
  private:

@@ -1,4 +1,4 @@
-// What a Fleet holds, and how a flight starts in it.
+// Storage of a Fleet, and the start of a flight in it.
 #pragma once
 
 #include <algorithm>
@@ -16,12 +16,12 @@ using sim::get;
 using sim::put;
 using One = model::Lanes<double, 1>;
 
-/// Numbers of a lane in each kind of block, up to its integers.
+/// Floating-point rows of sim::Block and of FlightBlock; the integer members that follow are not counted.
 inline constexpr int kBodyRows = sim::kParameterRows + sim::kStateRows + sim::kDriveRows;
 template <class T>
 inline constexpr int kFlightRows = offsetof(FlightBlock<T>, flapper) / sizeof(T[kLanes<T>]);
 
-/// The rows of a block, from its first to its last.
+/// A block as its rows of lanes.
 template <class T, class B>
 auto rows_of(B& block) {
   return reinterpret_cast<std::conditional_t<std::is_const_v<B>, const T, T>(*)[kLanes<T>]>(&block);
@@ -40,13 +40,13 @@ struct Fleet<T>::Storage {
   int period_steps;
   std::vector<FlightBlock<T>> blocks;
   std::vector<T> ring, queue;  // [block][slot][row][lane]
-  std::vector<T> remembered;   // [block][action ago][row of the observation][lane]
+  std::vector<T> remembered;   // earlier observations: [block][action ago][row of the observation][lane]
   std::size_t ring_size, queue_size, past_size;
   std::vector<Segment<T>> path;
   std::shared_ptr<const policy::Actor> actor;
   std::vector<T> actor_numbers;
-  std::vector<Period> periods;       // being flown, or flown last
-  std::vector<FlightPlan<T>> plans;  // of each of them
+  std::vector<Period> periods;       // control periods that are flown now, or were flown last
+  std::vector<FlightPlan<T>> plans;  // one for each of `periods`
   std::vector<T> imu_tap, mocap_tap;
   std::size_t imu_tap_size = 0, mocap_tap_size = 0;
   bool recording = false;
@@ -97,7 +97,8 @@ struct Fleet<T>::Storage {
     plan.path = {path.data(), static_cast<std::uint32_t>(path.size()), static_cast<T>(k.period_s)};
   }
 
-  /// std::invalid_argument where the sensors cannot be as late or early as the vehicle's mocap_delay has it.
+  /// Throws std::invalid_argument if the vehicle's mocap_delay would make a pose precede its motion or outlast the
+  /// motion memory.
   void check_delay(const model::Vehicle& v) const {
     const auto own = v.effects.find(model::MocapDelay::kInfo.id);
     if (own == v.effects.end()) return;
@@ -123,11 +124,11 @@ struct Fleet<T>::Storage {
     return {blocks[i / kLanes<T>], place.lane};
   }
 
-  /// Number `k` of what flapper `i` remembers.
+  /// Element `k` of the earlier observations of flapper `i`, newest observation first.
   T* past_at(std::size_t i, int k) {
     return &remembered[i / kLanes<T> * past_size + static_cast<std::size_t>(k) * kLanes<T> + i % kLanes<T>];
   }
-  /// Flapper `i` acts on what it observes.
+  /// Pushes the observation of flapper `i` into its history, as each action of a policy does.
   void remember(std::size_t i) {
     const auto [f, lane] = at(i);
     for (int k = plan.past - 1; k >= 0; --k)
@@ -151,13 +152,14 @@ struct Fleet<T>::Storage {
                                   std::to_string(plan.actions));
   }
 
-  /// What an action adds to input `k`, or sets motor `k` to, as the lanes work it out.
+  /// scaled_action() for one element, in the arithmetic of the lanes, so that the bits agree.
   T scaled(int k, T action) const {
     using L = model::Lanes<T, 1>;
     return L(scaled_action(plan.task, k, L(action))).raw[0];
   }
 
-  /// Calls `change(table of functions, memory)` for the controller of flapper `i`; not at all where there is none.
+  /// Calls `change(controller type, memory)` for the controller of flapper `i` and stores the memory. Does nothing
+  /// without a controller.
   void change_controller(std::size_t i, const auto& change) {
     const auto [f, lane] = at(i);
     with_controller(options.controller.kind, [&, &f = f, lane = lane]<class C>(C table) {
@@ -167,7 +169,8 @@ struct Fleet<T>::Storage {
     });
   }
 
-  /// Calls `add(time taken, sample)` for what the tap holds of flapper `i`; `taken`: by which slices.
+  /// Calls `add(sample time, sample)` for each sample of flapper `i` in the tap. `taken`: the flag of slices that took
+  /// a sample. Throws std::out_of_range.
   template <template <class> class Sample>
   void for_samples(std::size_t i, const std::vector<T>& tap, std::size_t tap_size, bool Slice::*taken,
                    const auto& add) const {
@@ -193,7 +196,7 @@ struct Fleet<T>::Storage {
   void start_estimator(std::size_t i, const Truth<double>& truth, sim::RandomKey key);
 };
 
-/// What every start has in common: numbers, sensors, estimator, a fresh episode.
+/// The part that all starts share: random-number keys, sensors, estimator, episode.
 template <class T>
 void Fleet<T>::Storage::start_lane(std::size_t i, std::uint32_t episode, const Truth<double>& truth) {
   const auto [f, lane] = at(i);
@@ -218,7 +221,7 @@ void Fleet<T>::Storage::start_lane(std::size_t i, std::uint32_t episode, const T
   put(fresh, f.episode, lane);
 }
 
-/// The observation before the first period.
+/// Computes the observation before the first control period, and fills the history with it.
 template <class T>
 void Fleet<T>::Storage::show(std::size_t i) {
   const auto [f, lane] = at(i);
@@ -228,7 +231,7 @@ void Fleet<T>::Storage::show(std::size_t i) {
   for (int k = 0; k < plan.past; ++k) *past_at(i, k) = row[k % plan.observed];
 }
 
-/// In the arithmetic of the lanes, to the bit.
+/// Computes the observation of one flapper in the arithmetic of the lanes, so that the bits agree.
 template <class T>
 void Fleet<T>::Storage::observe_lane(std::size_t i, T* row) {
   using L = model::Lanes<T, 1>;
@@ -273,7 +276,7 @@ Snapshot<T> Fleet<T>::Storage::snapshot(std::size_t i, const Target& target) {
   Snapshot<T> s{{}, {}, 0, {}, {}, {}, {}, {}, block.phase[lane], block.phase_per_update[lane], target};
   s.effects = body.get_effects(i, s.effect_rows, s.effect_states);
   s.motors = body.get_motors(i);
-  s.own = body.jointed ? body.get_jointed(i) : body.get_mean(i);
+  s.own = body.jointed ? body.get_jointed(i) : body.get_beat_averaged(i);
   s.contact = body.get_contact(i);
   for (int r = 0; r < kBodyRows; ++r) s.body.push_back(rows_of<T>(block)[r][lane]);
   for (int r = 0; r < kFlightRows<T>; ++r) s.flight.push_back(rows_of<T>(f)[r][lane]);
@@ -288,14 +291,14 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const Snapsh
   for (int r = 0; r < kFlightRows<T>; ++r) rows_of<T>(f)[r][lane] = s.flight[static_cast<std::size_t>(r)];
   sim::storage_of(batch).put_effects(i, s.effects, s.effect_rows, s.effect_states);
   sim::storage_of(batch).put_motors(i, s.motors);
-  sim::storage_of(batch).put_mean(i, s.own.first, s.own.second);
+  sim::storage_of(batch).put_beat_averaged(i, s.own.first, s.own.second);
   sim::storage_of(batch).put_jointed(i, s.own.first, s.own.second);
   sim::storage_of(batch).clear_energy(i);
   block.phase[lane] = s.phase;
   block.phase_per_update[lane] = s.phase_per_update;
   block.status[lane] = 0;
 
-  // from where it was meant to be to where it starts now
+  // the rigid motion from the snapshot's set point to the start of this episode
   const std::uint32_t flapper = options.first_flapper + static_cast<std::uint32_t>(i);
   const sim::FlapperState to = options.task.sample_start({options.seed, flapper, episode, sim::Stream::start});
   const auto now =
@@ -316,7 +319,7 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const Snapsh
   x.attitude = rotated_q(x.attitude);
   x.com_velocity_m_s = rotated_z(x.com_velocity_m_s);
   put(x, block.state, lane);
-  auto contact = s.contact;  // its anchors go along
+  auto contact = s.contact;  // friction anchors are points in W: they move too
   for (std::size_t k = 0; k + 3 < contact.second.size(); k += 4) {
     T* const anchor = &contact.second[k];
     if (!(anchor[3] > 0)) continue;
@@ -343,8 +346,8 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const Snapsh
   show(i);
 }
 
-/// The estimator has watched the flapper before its start, as well as one pose shows it: what it has in store is a past of
-/// steady motion.
+/// Starts the estimator as if it had observed the flapper before its start, with the accuracy of one mocap pose: its
+/// ring holds IMU increments of steady motion.
 template <class T>
 void Fleet<T>::Storage::start_estimator(std::size_t i, const Truth<double>& truth, sim::RandomKey key) {
   const auto [f, lane] = at(i);
@@ -379,7 +382,8 @@ void Fleet<T>::Storage::start_estimator(std::size_t i, const Truth<double>& trut
     T* rows = &ring[i / kLanes<T> * ring_size + static_cast<std::size_t>(a.slot * kIncrementRows * kLanes<T>)];
     put(Increment<double>{{0, 0, 0}, a.duration_s * weight}, reinterpret_cast<T(*)[kLanes<T>]>(rows), lane);
   }
-  for (int slot = 0; slot < schedule.queue_slots(); ++slot) {  // poses from before the start are not its own
+  // poses sampled before the start belong to another flight
+  for (int slot = 0; slot < schedule.queue_slots(); ++slot) {
     T* rows = &queue[i / kLanes<T> * queue_size + static_cast<std::size_t>(slot * kMocapRows * kLanes<T>)];
     put(MocapSample<double>{truth.position_m, truth.attitude, 0}, reinterpret_cast<T(*)[kLanes<T>]>(rows), lane);
   }

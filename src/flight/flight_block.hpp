@@ -1,4 +1,4 @@
-// What flies a block of flappers: one row for each number, beside the block of their bodies.
+// Sensors, estimator, controller and episode of a block of flappers, one row for each number. Bodies are in sim::Block.
 #pragma once
 
 #include "flight/controllers.hpp"
@@ -20,27 +20,27 @@ inline constexpr int kImuSampleRows = model::kRows<ImuSample>;
 template <class T>
 struct alignas(64) FlightBlock {
   T imu[kImuRows][kLanes<T>];
-  T seen[1][kLanes<T>];  // by motion capture
+  T seen[1][kLanes<T>];  // 1: motion capture sees the flapper; 0: a burst of losses
   T estimator[kEstimatorRows][kLanes<T>];
   T truth[kTruthRows][kLanes<T>];        // at the end of the last period
-  T estimate[kEstimateRows][kLanes<T>];  //   the same
+  T estimate[kEstimateRows][kLanes<T>];  // at the end of the last period
   T controller[kControllerRows][kLanes<T>];
   T episode[kEpisodeRows][kLanes<T>];
   T observation[kMaxObservation][kLanes<T>];
-  std::uint32_t flapper[kLanes<T>], flight[kLanes<T>];  // whose noise: part of the key of random numbers
+  std::uint32_t flapper[kLanes<T>], flight[kLanes<T>];  // key of the random numbers: flapper and episode
   std::uint32_t tick[kLanes<T>];                        // control periods since the start
-  std::uint32_t segment[kLanes<T>];                     // of the path
+  std::uint32_t segment[kLanes<T>];                     // current segment of the path
   std::uint32_t ended[kLanes<T>];                       // bits of Ended
 };
 
-/// Samples of one control period, for whoever records them: [sample][row][lane].
+/// Where the samples of one control period are written for recorders, [sample][row][lane]; null: nowhere.
 template <class T>
 struct Tap {
   T* imu = nullptr;    // rows of ImuSample
   T* mocap = nullptr;  // rows of MocapSample
 };
 
-/// One block and what belongs to it.
+/// All memory of one block.
 template <class T>
 struct FlightSpace {
   sim::Block<T>& body;
@@ -48,7 +48,7 @@ struct FlightSpace {
   FlightBlock<T>& flight;
   T* ring;   // [slot][row of Increment][lane]
   T* queue;  // [slot][row of MocapSample][lane]
-  T* past;   // [action ago][row of the observation][lane]; none without a history
+  T* past;   // earlier observations, [action ago][row of the observation][lane]; unused without a history
   Tap<T> tap;
   sim::Ahead ahead;
 };
@@ -56,7 +56,7 @@ struct FlightSpace {
 /// Stages of a control period, in order.
 enum Stage { kSteer, kPhysics, kSense, kEstimate, kReward, kStages };
 
-/// How all blocks fly through one control period.
+/// Everything that a control period has in common for all blocks.
 template <class T>
 struct FlightPlan {
   sim::StepBlock<T> step;
@@ -76,19 +76,19 @@ struct FlightPlan {
   int controller_kind;
   ControllerConstants<T> controller;
   TaskConstants<T> task;
-  int actions;          // numbers of an action
-  bool sets_voltages;   // the action is the motors' voltages, not what is added to the wing beat's inputs
-  std::uint32_t parts;  // observed
-  int observed, past;   // rows of an observation, and of those remembered
+  int actions;          // elements of an action
+  bool sets_voltages;   // an action sets motor voltages; else it is an offset to the wing-beat inputs
+  std::uint32_t parts;  // observed parts, bits of Part
+  int observed, past;   // rows of the present observation, and of all earlier ones together
   PathView<T> path;
   policy::ActorView<T> actor;
-  std::uint32_t action_repeat;  // control periods for which an action stays
-  std::uint32_t period;         // since the fleet began; counts samples of exploration
+  std::uint32_t action_repeat;  // control periods per action
+  std::uint32_t period;  // control periods since the fleet began: counter of the exploration noise's random numbers
   bool explores;
-  T noise_kept, noise_fresh;  // shares of the last and of a new normal in the noise, from action to action
-  T noise_low, noise_more;    // its standard deviation: of the fleet's first flapper, and from each to the next
+  T noise_kept, noise_fresh;  // weights of the last noise and of a new standard normal in the next noise
+  T noise_low, noise_more;    // standard deviation for the fleet's first flapper, and its increment per flapper
   std::uint32_t first_flapper;
-  std::uint64_t* cycles = nullptr;  // spent in each stage, for a benchmark on one thread
+  std::uint64_t* cycles = nullptr;  // processor cycles of each Stage, for a benchmark on one thread
 };
 
 /// Flies a block through one control period.

@@ -1,4 +1,4 @@
-// Where a flapper is meant to be: a chain of quintic segments in x, y, z and heading over whole control ticks.
+// The reference path of a flapper: quintic segments in x, y, z (in W) and heading. Segments start at whole control ticks.
 #pragma once
 
 #include <cstdint>
@@ -7,14 +7,14 @@
 
 namespace flappy::flight {
 
-/// One segment: coefficients of (t - start)^n, lowest first.
+/// Polynomial segment: coefficients[x, y, z, heading][n] of (t - start)^n; m, rad and s.
 template <class T>
 struct Segment {
   std::uint32_t start_tick;
   T coefficients[4][6];
 };
 
-/// Ordered by start; the last one holds for ever.
+/// Segments in order of their start; the last one never ends.
 template <class T>
 struct PathView {
   const Segment<T>* segments;
@@ -31,7 +31,8 @@ struct Setpoint {
   T heading_rate_rad_s;
 };
 
-/// The set point of each lane at its own tick. `segment`: where each lane was last, moved on here.
+/// The set point of each lane at its own tick. `segment`: each lane's current segment, advanced here; ticks must not go
+/// back.
 template <class L, class T>
 FLAPPY_INLINE Setpoint<L> setpoint_at(const PathView<T>& path, const std::uint32_t* tick, std::uint32_t* segment) {
   constexpr int kN = sizeof(L) / sizeof(T);

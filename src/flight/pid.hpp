@@ -1,11 +1,12 @@
-// Cascaded PID controller (Fei et al. 2019; structure of ArduPilot's): position P -> velocity PID -> lean angles ->
+// Cascaded PID controller (Fei et al. 2019; same structure as ArduPilot): position P -> velocity PID -> lean angles ->
 // attitude PID -> wing-beat inputs. Index f: forward, l: left, in the heading frame (W turned by the yaw angle).
 //   v_sp = v_ref + k (p_ref - p)             e = v_sp - v        a_f,l = a_ref + PID(e)       V_z = PID(e_z)
 //   pitch_sp = atan(a_f / g)                 roll_sp = -atan(a_l cos(pitch_sp) / g)
 //   V_d = PID(roll_sp - roll)                V_0 = PID(pitch_sp - pitch)      d_sigma = PID(yaw_ref - yaw)
 //   V_amp = V_hover + V_z / (cos roll cos pitch)
-// The derivative of an attitude error is the negative of the low-passed body rate, that of a velocity error comes from
-// the low-passed velocity. Integrators are clamped, and stand still while what they drive is at its limit.
+// The derivative of a roll or pitch error is the negative low-passed body rate (yaw: relative to the set point's rate); the
+// derivative of a velocity error comes from the low-passed velocity. Integrators are clamped. They do not move further out while
+// the output that they drive is at its limit (anti-windup).
 #pragma once
 
 #include <string>
@@ -20,7 +21,7 @@ namespace flappy::flight {
 template <class T>
 struct PidGains {
   T p, i, d;
-  T integral_limit;  // |i * integral| is clamped to it, in the unit of the output
+  T integral_limit;  // limit of |i * integral|, in the unit of the output
 };
 
 template <class T>
@@ -35,7 +36,7 @@ struct PidConstants : LoopConstants<T> {
 
 inline namespace FLAPPY_ISA {
 
-/// What it remembers, as rows.
+/// Memory of the controller, stored as rows.
 template <class T>
 struct Pid {
   T integral_x, integral_y;               // m/s^2, in W
@@ -45,7 +46,7 @@ struct Pid {
   Vec3<T> velocity_m_s, body_rate_rad_s;  // low-passed
 };
 
-/// Where the nose points: cosine and sine of the yaw angle.
+/// Sine and cosine of the yaw angle.
 template <class T>
 FLAPPY_INLINE SinCos<T> heading_of(const Matrix3<T>& R) {
   const T c = R.row_x.x, s = R.row_y.x;
@@ -53,7 +54,8 @@ FLAPPY_INLINE SinCos<T> heading_of(const Matrix3<T>& R) {
   return {s * scale, c * scale};
 }
 
-/// Adds to an integral in the unit of the output, within its limit, and not further out while `blocked`.
+/// Integrates an error, in the unit of the output, and clamps to +-limit. `blocked_towards`: sign of the direction in
+/// which the output is saturated; the integral does not move in that direction. 0: not saturated.
 template <class T>
 FLAPPY_INLINE T integrated(const T& integral, const T& gain_and_time, const T& error, const T& limit,
                            const T& blocked_towards) {
@@ -68,7 +70,7 @@ FLAPPY_INLINE T saturation(const T& value, const T& low, const T& high) {
   return where(value > high, T(1), where(value < low, T(-1), T(0)));
 }
 
-/// Its table of functions (controllers.hpp).
+/// Table of the controller's functions (controllers.hpp).
 struct PidController {
   static constexpr const char* kName = "pid";
   template <class T>
@@ -78,7 +80,8 @@ struct PidController {
 
   static void fields(PidConstants<double>& k, const auto& add);
 
-  /// The C code that flies it on board: src/deploy/c/controller_pid.h. Members of its constants there, in their order.
+  /// C code of the controller for the robot: src/deploy/c/controller_pid.h. exported() lists the members of its struct
+  /// of constants, in their order.
   static constexpr const char* kSource = "controller_pid";
   static void exported(const PidConstants<float>& k, const auto& add) {
     add("position_xy_1_s", k.position_xy_1_s);
@@ -109,13 +112,13 @@ struct PidController {
     m.body_rate_rad_s = x.body_rate_rad_s;
   }
 
-  /// The inputs that its integrators have learnt.
+  /// Hover voltage plus the integrators, as wing-beat inputs.
   template <class T>
   static FLAPPY_INLINE WingBeat<T> trim(const PidConstants<Element<T>>& k, const Pid<T>& m) {
     return {T(k.hover_V) + m.integral_z, m.integral_roll, m.integral_pitch, m.integral_yaw};
   }
 
-  /// Low-passes go on.
+  /// Restores the integrators in the lanes `held`; the low-passes keep their new values.
   template <class T>
   static FLAPPY_INLINE void unlearn(auto held, const Pid<T>& before, Pid<T>& now) {
     constexpr T Pid<T>::*kLearnt[] = {&Pid<T>::integral_x,    &Pid<T>::integral_y,     &Pid<T>::integral_z,
@@ -182,7 +185,7 @@ FLAPPY_INLINE WingBeat<T> PidController::update(const PidConstants<Element<T>>& 
       toward(ref.position_m.z, x.position_m.z, k.position_z_1_s, ref.velocity_m_s.z, k.climb_limit_m_s)};
   const Vec3<T> before = m.velocity_m_s;
   m.velocity_m_s = add_scaled(before, T(k.velocity_share), x.velocity_m_s - before);
-  const Vec3<T> slope = T(k.per_period_Hz) * (before - m.velocity_m_s);  // of the error
+  const Vec3<T> slope = T(k.per_period_Hz) * (before - m.velocity_m_s);  // derivative of the velocity error
   const Vec3<T> error = wanted - m.velocity_m_s;
   const auto forward = [&](const T& ex, const T& ey) { return T(yaw.cos * ex + yaw.sin * ey); };
   const auto left = [&](const T& ex, const T& ey) { return T(yaw.cos * ey - yaw.sin * ex); };

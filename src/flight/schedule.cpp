@@ -7,9 +7,9 @@
 namespace flappy::flight {
 namespace {
 
-constexpr double kSame_s = 1e-9;  // times closer than this are the same
+constexpr double kSame_s = 1e-9;  // times closer than this count as equal
 
-/// In whole microseconds, as clocks on board count.
+/// Rounds to whole microseconds, the resolution of the clocks on board.
 double whole_us(double s) { return std::round(s * 1e6) / 1e6; }
 
 }  // namespace
@@ -19,8 +19,8 @@ Schedule::Schedule(const Sensors& sensors, double step_s, int period_steps)
   if (sensors.imu.rate_hz * step_s > 1 + 1e-9 || sensors.mocap.rate_hz * step_s > 1 + 1e-9)
     throw std::invalid_argument("a sensor's rate is above that of the physics steps");
   const double period_s = step_s * period_steps;
-  // a pose waits until it and the IMU's samples of its time have arrived, and for the end of the period; the ring holds what
-  // the IMU gathered since the pose before it
+  // a pose is fused at the end of the first control period in which both it and the IMU samples up to its time have
+  // arrived; the ring holds the IMU increments since the pose before
   wait_s_ =
       period_s + std::max(sensors.mocap.latency_s, sensors.imu.latency_s + lag_s_ + 1 / sensors.imu.rate_hz + period_s);
   ring_slots_ = static_cast<int>(std::ceil((wait_s_ + 1 / sensors.mocap.rate_hz) / period_s)) + 2;
@@ -28,7 +28,7 @@ Schedule::Schedule(const Sensors& sensors, double step_s, int period_steps)
   horizon_s_ = present_s_ = -lag_s_;
 }
 
-/// The physics step that takes sample `index`, counted from 1.
+/// Number of physics steps after which sample `index` is taken; samples are counted from 1.
 std::int64_t Schedule::sample_step(double rate_hz, std::int64_t index) const {
   return static_cast<std::int64_t>(std::ceil(static_cast<double>(index) / (rate_hz * step_s_) - 1e-6));
 }
@@ -44,7 +44,7 @@ const Period& Schedule::next() {
   return period_;
 }
 
-/// Cuts the period where samples are taken.
+/// Cuts the control period, up to physics step `end`, into slices that end at samples.
 void Schedule::sample(std::int64_t end) {
   const double gathered_from_s = last_imu_s_;
   while (step_ < end) {
@@ -75,7 +75,7 @@ void Schedule::sample(std::int64_t end) {
   }
 }
 
-/// A pose corrects once it has arrived and the IMU has covered its time.
+/// Plans a correction for each pose that has arrived and whose time the arrived IMU increments cover.
 void Schedule::correct_arrived() {
   const auto covered_s = [&] {
     double until = horizon_s_;
@@ -95,7 +95,7 @@ void Schedule::correct_arrived() {
       const double duration = e.to_s - e.from_s, until = std::min(e.to_s, target);
       if (until > horizon_s_ + kSame_s) period_.advance.push_back({e.slot, (until - horizon_s_) / duration, duration});
       horizon_s_ = std::max(horizon_s_, until);
-      period_.newest = {e.slot, 1, duration};  // unless replay knows a newer one
+      period_.newest = {e.slot, 1, duration};  // replay() replaces it if there is a newer one
       if (e.to_s > target + kSame_s) break;
       ring_.pop_front();
     }

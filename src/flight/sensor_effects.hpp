@@ -1,13 +1,14 @@
-// Effects of sensors, done to samples that are taken: the forms of src/model/effects, which src/gap/replay/sensor_correction.hpp undoes.
+// Effects of sensors (src/model/effects), applied to simulated samples. src/gap/replay/sensor_correction.hpp inverts them.
 //
-//   accelerometer_misalignment  force turned by e
-//   vibration_rectification     force + gain (mean square about the mean over the beat before), on every axis, of that force
+//   accelerometer_misalignment  specific force turned by the rotation vector e
+//   vibration_rectification     force + gain (variance of the force over the beat before), on every axis; the force is the turned one
 //   gyro_bias                   rate + drift (1 - exp(-t / warm_up)), t since the flight's start
-//   marker_offset               seen position p + R_WB d, R_WB the true attitude: the marker is where it is, however seen
-//   mocap_tilt                  seen position R(e) p, attitude R(e) q, of what the marker's offset left
-//   mocap_delay                 all of this of the true motion at t - delay
+//   marker_offset               position p + R_WB d, R_WB the true attitude: attitude noise does not move the marker
+//   mocap_tilt                  position R(e) p, attitude R(e) q, after marker_offset
+//   mocap_delay                 pose and the two effects above at t - delay, from the true motion
 //
-// They act on what is measured, noise and all, in the lanes in which they have a size; what shakes is the force without its noise.
+// They act on noisy samples, in the lanes in which a magnitude is not 0. The variance for vibration_rectification is that of the force
+// without sensor noise.
 #pragma once
 
 #include "flight/sensors.hpp"
@@ -24,21 +25,21 @@ constexpr int index_of() {
   else return index_of<Effect, I + 1>();
 }
 
-/// Bit of an effect in a block's set.
+/// Bit of an effect in sim::BlockEffects::set.
 template <class Effect>
 inline constexpr std::uint64_t kBit = std::uint64_t{1} << index_of<Effect>();
 inline constexpr std::uint64_t kImuEffects =
     kBit<AccelerometerMisalignment> | kBit<VibrationRectification> | kBit<GyroBias>;
 inline constexpr std::uint64_t kMocapEffects = kBit<MarkerOffset> | kBit<MocapTilt>;
 
-/// Parameter `k` of an effect in a register of lanes.
+/// Parameter `k` of an effect, for the register of lanes that begins at lane `first`.
 template <class Effect, class T>
 FLAPPY_INLINE Lanes<T, sim::kWidth<T>> effect_parameter(const sim::BlockEffects<T>& effects, int k, int first) {
   const int row = effect_rows_before<index_of<Effect>()>() + k;
   return Lanes<T, sim::kWidth<T>>::load(effects.rows + row * sim::kLanes<T> + first);
 }
 
-/// What an effect remembers in lanes in which it is `on`.
+/// Memory of an effect for the register of lanes that begins at lane `first`. Only lanes of `on` are written.
 template <class Effect, class T>
 FLAPPY_INLINE StateRows<Lanes<T, sim::kWidth<T>>> memory_of(const sim::BlockEffects<T>& effects, int first,
                                                             typename Lanes<T, sim::kWidth<T>>::Mask on) {
@@ -46,14 +47,14 @@ FLAPPY_INLINE StateRows<Lanes<T, sim::kWidth<T>>> memory_of(const sim::BlockEffe
   return {effects.states + row * sim::kLanes<T> + first, sim::kLanes<T>, on};
 }
 
-/// Lanes in which a vector is not 0.
+/// Lanes in which the magnitude vector of an effect is not 0.
 template <class T>
-FLAPPY_INLINE auto has_size(const Vec3<T>& v) {
+FLAPPY_INLINE auto is_nonzero(const Vec3<T>& v) {
   return dot(v, v) > T(0);
 }
 
-/// v turned by the rotation vector e, |e| < 0.53 rad as three axes of 0.3 have it: Rodrigues' formula, sin(x)/x and (1 - cos x)/x^2
-/// by their series, whose next terms are below 1e-13.
+/// v turned by the rotation vector e: Rodrigues' formula, with power series of sin(x)/x and (1 - cos x)/x^2 whose next
+/// terms are below 1e-13 for |e| < 0.53 rad. The effects allow 0.3 rad on each of three axes.
 template <class T>
 FLAPPY_INLINE Vec3<T> turned_by(const Vec3<T>& e, const Vec3<T>& v) {
   const T x = dot(e, e);
@@ -72,7 +73,7 @@ FLAPPY_INLINE Vec3<T> turned_by(const Vec3<T>& e, const Vec3<T>& v) {
   return add_scaled(add_scaled(v, sine, across), cosine, cross(e, across));
 }
 
-/// The quaternion of the rotation vector e, as above: series in (|e|/2)^2 < 0.07.
+/// The quaternion of the rotation vector e, |e| < 0.53 rad: power series in (|e|/2)^2 < 0.07.
 template <class T>
 FLAPPY_INLINE Quaternion<T> quaternion_of(const Vec3<T>& e) {
   const T y = T(0.25) * dot(e, e);
@@ -89,10 +90,11 @@ FLAPPY_INLINE Quaternion<T> quaternion_of(const Vec3<T>& e) {
   return {cosine, half * e.x, half * e.y, half * e.z};
 }
 
-/// The bias that vibration left in the beat before; takes note of a force at `phase` of this one.
+/// Bias from the vibration in the last beat. Adds a force sample at `phase` of this beat to the memory. Rows of memory:
+/// 0-2 bias, 3 number of samples in this beat, 4-6 sums, 7-9 sums of squares, 10 last phase.
 template <class L>
 FLAPPY_INLINE Vec3<L> rectified(const L& gain, const StateRows<L>& state, const L& phase, const Vec3<L>& force) {
-  const auto over = phase < state.get(10);  // a beat: its bias is known
+  const auto over = phase < state.get(10);  // the phase has wrapped: the last beat is complete
   const L count = state.get(3), per_count = L(1) / max(count, L(1)), none(0);
   const auto axis = [&](int k, const L& f) {
     const L sum = state.get(4 + k), squares = state.get(7 + k), mean = per_count * sum;
@@ -107,15 +109,16 @@ FLAPPY_INLINE Vec3<L> rectified(const L& gain, const StateRows<L>& state, const 
   return {axis(0, force.x), axis(1, force.y), axis(2, force.z)};
 }
 
-/// What the IMU's effects make of a sample at `time_s` since each flight's start and `phase` of its beat; `force` is without noise.
+/// Applies the IMU's effects to sample `y`. `time_s`: since each flight's start. `phase`: fraction of the wing beat.
+/// `force`: specific force without sensor noise, m/s^2, in B.
 template <class T, class L>
 FLAPPY_INLINE void disturb(const sim::BlockEffects<T>& effects, const L& time_s, const L& phase, Vec3<L> force,
                            ImuSample<L>& y, int first) {
   if (effects.set & kBit<AccelerometerMisalignment>) {
     const auto of = [&](int k) { return effect_parameter<AccelerometerMisalignment>(effects, k, first); };
     const Vec3<L> e{of(0), of(1), of(2)};
-    y.accel_m_s2 = where(has_size(e), turned_by(e, y.accel_m_s2), y.accel_m_s2);
-    force = where(has_size(e), turned_by(e, force), force);
+    y.accel_m_s2 = where(is_nonzero(e), turned_by(e, y.accel_m_s2), y.accel_m_s2);
+    force = where(is_nonzero(e), turned_by(e, force), force);
   }
   if (effects.set & kBit<VibrationRectification>) {
     const L gain = effect_parameter<VibrationRectification>(effects, 0, first);
@@ -127,24 +130,24 @@ FLAPPY_INLINE void disturb(const sim::BlockEffects<T>& effects, const L& time_s,
     const auto of = [&](int k) { return effect_parameter<GyroBias>(effects, k, first); };
     const Vec3<L> drift{of(0), of(1), of(2)};
     const L cold = exp(L(L(0) - time_s / of(3)));
-    y.gyro_rad_s = where(has_size(drift), add_scaled(y.gyro_rad_s, L(L(1) - cold), drift), y.gyro_rad_s);
+    y.gyro_rad_s = where(is_nonzero(drift), add_scaled(y.gyro_rad_s, L(L(1) - cold), drift), y.gyro_rad_s);
   }
 }
 
-/// What the effects of motion capture make of a pose that was truly at `attitude`.
+/// Applies the effects of motion capture, except mocap_delay, to pose `y`. `attitude`: the true attitude.
 template <class T, class L>
 FLAPPY_INLINE void disturb(const sim::BlockEffects<T>& effects, const Quaternion<L>& attitude, MocapSample<L>& y,
                            int first) {
   if (effects.set & kBit<MarkerOffset>) {
     const auto of = [&](int k) { return effect_parameter<MarkerOffset>(effects, k, first); };
     const Vec3<L> d{of(0), of(1), of(2)};
-    y.position_m = where(has_size(d), y.position_m + rotation_matrix(attitude) * d, y.position_m);
+    y.position_m = where(is_nonzero(d), y.position_m + rotation_matrix(attitude) * d, y.position_m);
   }
   if (effects.set & kBit<MocapTilt>) {
     const auto of = [&](int k) { return effect_parameter<MocapTilt>(effects, k, first); };
     const L none(0);
     const Vec3<L> e{of(0), of(1), none}, back{L(none - e.x), L(none - e.y), none};
-    const auto on = has_size(e);
+    const auto on = is_nonzero(e);
     const Quaternion<L> q = from_to(quaternion_of(back), y.attitude);
     y.position_m = where(on, turned_by(e, y.position_m), y.position_m);
     y.attitude = {where(on, q.w, y.attitude.w), where(on, q.x, y.attitude.x), where(on, q.y, y.attitude.y),
@@ -152,7 +155,8 @@ FLAPPY_INLINE void disturb(const sim::BlockEffects<T>& effects, const Quaternion
   }
 }
 
-/// Keeps the true motion at the start of a period, `tick` periods since each lane's start.
+/// Stores the true motion at the start of a control period, for past_truth(). `tick`: control periods since each lane's
+/// start.
 template <class T, class L>
 FLAPPY_INLINE void keep_past(const sim::BlockEffects<T>& effects, const std::uint32_t* tick, const Truth<L>& truth,
                              int first) {
@@ -165,14 +169,16 @@ FLAPPY_INLINE void keep_past(const sim::BlockEffects<T>& effects, const std::uin
       past.rows[(tick[i] % MocapDelay::kSlots * MocapDelay::kRows + r) * past.stride + i] = rows[r].raw[i];
 }
 
-/// The true pose `age` periods before the end of one, of which `now` is true and which is period `tick` of each lane's flight.
+/// The true pose `age` control periods before the end of period `tick` of each lane's flight, where the motion is
+/// `now`. Cubic Hermite interpolation in position and quaternion; velocity and body rate are those of the newer of the
+/// two support points. Ages below 0 give `now`; ages beyond the memory give the oldest motion stored.
 template <class T, class L>
 FLAPPY_INLINE Truth<L> past_truth(const sim::BlockEffects<T>& effects, const std::uint32_t* tick, const Truth<L>& now,
                                   const L& age, const T& period_s, int first) {
   constexpr std::uint32_t kSlots = MocapDelay::kSlots;
   const auto past = memory_of<MocapDelay>(effects, first, age == age);
   Truth<L> older = now, newer = now;
-  L part(0);  // of a period, from newer to older
+  L part(0);  // fraction of a period from `newer` back to `older`
   for (int i = 0; i < sim::kWidth<T>; ++i) {
     const std::uint32_t kept = tick[i] + 1 < kSlots ? tick[i] + 1 : kSlots;
     const T periods = age.raw[i] > T(0) ? age.raw[i] < T(kept) ? age.raw[i] : T(kept) : T(0);
@@ -180,9 +186,9 @@ FLAPPY_INLINE Truth<L> past_truth(const sim::BlockEffects<T>& effects, const std
     part.raw[i] = periods - static_cast<T>(from);
     const auto copy = [&](std::uint32_t back, Truth<L>& to) {
       const T* rows = past.rows + (tick[i] + 1 - back) % kSlots * MocapDelay::kRows * past.stride + i;
-      T length2 = 0;  // of the attitude
+      T length2 = 0;  // squared norm of the quaternion
       for (int r = 3; r < 7; ++r) length2 += rows[r * past.stride] * rows[r * past.stride];
-      if (back == 0 || !(length2 > 0)) return;  // now, or forgotten
+      if (back == 0 || !(length2 > 0)) return;  // the present, or never stored
       for (int r = 0; r < MocapDelay::kRows; ++r) reinterpret_cast<L*>(&to)[r].raw[i] = rows[r * past.stride];
     };
     copy(from, newer);

@@ -1,10 +1,10 @@
-// What a flapper's sensors see of its true motion.
+// Models of a flapper's sensors.
 //
-// IMU: every sample is the mean over the interval since the one before, as an integrating IMU or a decimating filter
-// delivers it, then a first-order low-pass:
+// IMU: every sample is the mean over the interval since the last sample, as an integrating IMU or a decimating filter
+// delivers it, then passes a first-order low-pass:
 //   gyro   rotation between the two attitudes / interval + constant bias + noise
-//   accel  specific force R^T (dv/dt + g z), of the point where the IMU sits, R half-way + noise
-// A mean leaves nothing of the wing beat to alias. Gravity is in it: an IMU at rest reads +g upward.
+//   accel  specific force R^T (dv/dt + g z) at the position of the IMU, R half-way between the two attitudes, + noise
+// The mean keeps the wing beat from aliasing. The specific force includes gravity: an IMU at rest reads +g upward.
 // Motion capture: pose of the torso origin, with white noise; it arrives late, and bursts of samples are lost
 // (Gilbert 1960: a loss begins with one probability and ends with another).
 #pragma once
@@ -18,7 +18,7 @@ template <class T>
 struct ImuConstants {
   T position_m[3];  // in B
   T gyro_noise_rad_s, accel_noise_m_s2;
-  T low_pass_share;  // of a new value in the low-passed one
+  T low_pass_share;  // share of a new value in the low-passed one
   T gravity_m_s2;
 };
 
@@ -32,12 +32,12 @@ inline namespace FLAPPY_ISA {
 
 using namespace model;
 
-/// What is true of the torso.
+/// True motion of the torso.
 template <class T>
 struct Truth {
-  Vec3<T> position_m;  // origin, in W
+  Vec3<T> position_m;  // torso origin, in W
   Quaternion<T> attitude;
-  Vec3<T> velocity_m_s;     // of the origin, in W
+  Vec3<T> velocity_m_s;     // torso origin, in W
   Vec3<T> body_rate_rad_s;  // in B
 };
 
@@ -56,23 +56,24 @@ struct ImuSample {
   Vec3<T> gyro_rad_s, accel_m_s2;
 };
 
-/// The IMU's own state, as rows.
+/// State of the IMU model, stored as rows.
 template <class T>
 struct Imu {
   Quaternion<T> attitude;  // at the last sample
-  Vec3<T> velocity_m_s;    //   of the IMU, in W
+  Vec3<T> velocity_m_s;    // velocity of the IMU at the last sample, in W
   ImuSample<T> low_passed;
   Vec3<T> gyro_bias_rad_s;
 };
 
-/// conj(a) b.
+/// conj(a) b: the rotation from a to b.
 template <class T>
 FLAPPY_INLINE Quaternion<T> from_to(const Quaternion<T>& a, const Quaternion<T>& b) {
   return {a.w * b.w + (a.x * b.x + (a.y * b.y + a.z * b.z)), a.w * b.x - (a.x * b.w + (a.y * b.z - a.z * b.y)),
           a.w * b.y - (a.y * b.w + (a.z * b.x - a.x * b.z)), a.w * b.z - (a.z * b.w + (a.x * b.y - a.y * b.x))};
 }
 
-/// Rotation vector of a small turn, of either sign of the quaternion: 2 asin(n)/n e for e of length n, exact to n^4.
+/// Rotation vector of a small rotation: 2 asin(n)/n e for the vector part e of length n, exact to n^4. q and -q give
+/// the same.
 template <class T>
 FLAPPY_INLINE Vec3<T> rotation_vector(const Quaternion<T>& q) {
   const Vec3<T> e{q.x, q.y, q.z};
@@ -104,7 +105,7 @@ FLAPPY_INLINE ImuSample<T> sample_imu(const ImuConstants<Element<T>>& k, const T
           add_scaled(y.accel_m_s2, T(k.accel_noise_m_s2), Vec3<T>{a.n[3], b.n[0], b.n[1]})};
 }
 
-/// A pose on its way, as rows; `valid` is 0 for a lost one.
+/// A mocap pose in transit, stored as rows; `valid` is 0 for a lost one.
 template <class T>
 struct MocapSample {
   Vec3<T> position_m;
@@ -112,7 +113,8 @@ struct MocapSample {
   T valid;
 };
 
-/// 1 while the tracker sees the flapper, 0 in a burst of losses, from what it was at the sample before.
+/// Markov chain of losses: 1 while the tracker sees the flapper, 0 in a burst of losses. `seen`: value at the last
+/// sample; `chance`: uniform in [0, 1].
 template <class T>
 FLAPPY_INLINE T next_seen(const MocapConstants<Element<T>>& k, const T& seen, const T& chance) {
   return where(seen > T(0), where(chance < T(k.loss_begins), T(0), T(1)), where(chance < T(k.loss_ends), T(1), T(0)));

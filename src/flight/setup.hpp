@@ -1,4 +1,4 @@
-// What flies a flapper, as its user states it: sensors, estimator, controllers. Read from configuration; nothing derived.
+// Sensors, estimator and controller of a flapper as the configuration states them; constants.hpp derives the working numbers.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ namespace flappy::flight {
 
 struct ImuSensor {
   double rate_hz = 0, latency_s = 0;
-  double low_pass_hz = 0;                             ///< 0: none beyond the mean over a sample's interval
+  double low_pass_hz = 0;                             ///< 0: no low-pass after the mean over the sample interval
   model::Triple position_m;                           ///< in B
   double gyro_noise_rad_s = 0, accel_noise_m_s2 = 0;  ///< standard deviation of a sample, each axis
   model::Triple gyro_bias_sd_rad_s;                   ///< sampled once for each flight
@@ -20,11 +20,11 @@ struct ImuSensor {
 struct MocapSensor {
   double rate_hz = 0, latency_s = 0;
   double position_noise_m = 0, attitude_noise_rad = 0;  ///< standard deviation, each axis
-  double loss_probability = 0;                          ///< that a sample begins a burst of losses
-  double loss_length = 1;                               ///< mean samples in a burst
+  double loss_probability = 0;                          ///< probability that a sample begins a burst of losses
+  double loss_length = 1;                               ///< mean number of samples in a burst
 };
 
-/// What the estimator is told about noise besides what the sensors declare.
+/// Noise that the estimator assumes in addition to what the sensors declare.
 struct EstimatorNoise {
   double angle_drift_rad_sqrt_s = 0;
   double velocity_drift_m_s_sqrt_s = 0;
@@ -41,29 +41,30 @@ struct Sensors {
 
 /// Share of a new value in a first-order low-pass: 1 - exp(-2 pi f dt).
 double low_pass_share(double cutoff_hz, double interval_s);
-/// By how much the IMU's low-pass makes its samples late.
+/// Delay of the IMU's samples by its low-pass.
 double low_pass_lag_s(const ImuSensor& imu);
 
 struct Controller {
-  int kind = kNoController;  ///< of controllers.hpp
+  int kind = kNoController;  ///< index in Controllers (controllers.hpp)
   ControllerConstants<double> constants{};
   double velocity_low_pass_hz = 0, body_rate_low_pass_hz = 0;  ///< 0: none
 };
 
-/// One number of a controller, by its path in the configuration.
+/// A parameter of a controller and its path in the configuration.
 struct ControllerField {
   std::string path;
   double* value;
   io::Range range;
 };
 
-/// All numbers of a controller of its kind. Pointers live as long as the controller.
+/// All parameters of a controller of its kind. The pointers are valid as long as the controller.
 std::vector<ControllerField> fields(Controller& controller);
-/// As configurations have it; "none" for kNoController, and the other way round.
+/// Name of a kind of controller in configurations; "none" for kNoController.
 std::string controller_name(int kind);
+/// Kind of a name; kNoController for "none" and for unknown names.
 int controller_kind(const std::string& name);
 
-/// io::InputError where a key is missing, unknown or out of range.
+/// Both throw io::InputError if a key is missing, unknown or out of range.
 Sensors read_sensors(const io::Table& table);
 Controller read_controller(const io::Table& table);
 

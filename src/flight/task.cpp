@@ -16,8 +16,8 @@ struct PartInfo {
   std::vector<Signal> signals;
 };
 
-/// What each Part shows, in the order of their bits; the previous action's signals are those of the task's action. Ranges are
-/// what a flying vehicle stays in.
+/// Signals of each Part, in the order of their bits; those of previous_action are added from the task's action. Ranges
+/// are those of a flying vehicle.
 const std::vector<PartInfo>& part_infos() {
   static const std::vector<PartInfo> infos = [] {
     std::vector<PartInfo> list = {
@@ -57,7 +57,7 @@ const std::vector<PartInfo>& part_infos() {
   return infos;
 }
 
-/// Quintic from rest to rest (minimum jerk).
+/// Quintic from rest to rest (minimum-jerk trajectory).
 Segment<double> rest_to_rest(std::uint32_t start_tick, double duration_s, const double (&from)[4],
                              const double (&to)[4]) {
   Segment<double> s{start_tick, {}};
@@ -82,7 +82,8 @@ struct Knot {
   double at[4];
 };
 
-/// Velocities at the knots of the cubic spline through them that starts and ends at rest: its acceleration has no jumps.
+/// Knot velocities of coordinate `c` of the cubic spline that passes through the knots and starts and ends at rest. Its
+/// acceleration is continuous.
 std::vector<double> spline_velocities(const std::vector<Knot>& knots, int c, double tick_s) {
   const std::size_t n = knots.size();
   std::vector<double> v(n, 0), upper(n, 0);
@@ -217,7 +218,7 @@ Reward<double> read_reward(const io::Table& table) {
   return r;
 }
 
-/// Cosine of an angle that may not be exceeded; angles above pi do not limit.
+/// Cosine of the largest angle allowed; -2, which excludes nothing, for angles above pi.
 double cosine_limit(double angle_rad) { return angle_rad > std::numbers::pi ? -2 : model::sin_cos_wide(angle_rad).cos; }
 
 void read_hand_back(const io::Table& table, HandBack<double>& h) {
@@ -242,7 +243,7 @@ void read_hand_back(const io::Table& table, HandBack<double>& h) {
 
 void read_success(const io::Table& table, Success<double>& s) {
   const auto t = table.optional_table("success");
-  if (!t) return;  // never captured, nothing to keep
+  if (!t) return;  // all bounds are 0: the goal is never captured
   const auto angle = [&](const char* name) { return cosine_limit(t->number(name, io::positive(4))); };
   s = {t->number("capture.by_s", io::positive()),
        t->number("capture.distance_m", io::positive()),
@@ -258,7 +259,7 @@ void read_success(const io::Table& table, Success<double>& s) {
        t->boolean_or("capture.touching", false) ? 1.0 : 0.0};
 }
 
-/// What an action is, and what -1 and 1 of it are.
+/// Reads the kind of action and the range that -1 and 1 stand for.
 void read_action(const io::Table& table, Task& task) {
   const bool voltages = table.choice_or("action.kind", "wing_beat", {"wing_beat", "voltages"}) == "voltages";
   task.action_kind = voltages ? ActionKind::voltages : ActionKind::wing_beat;
@@ -276,9 +277,10 @@ void read_action(const io::Table& table, Task& task) {
   }
 }
 
-/// A policy of voltages flies alone: there is no controller that could start, hold or take over, and no wing beat.
+/// Throws io::InputError if a task whose actions are voltages needs a controller or a wing beat, which it does not
+/// have.
 void refuse_control(const io::Table& table, const Task& task) {
-  const std::string alone = ", but an action of kind \"voltages\" has no controller beside it";
+  const std::string alone = ", but an action of kind \"voltages\" has no controller";
   if (task.constants.holds_trim > 0) table.fail("base", "is \"trim\"" + alone, "no base, or \"controller\"");
   if (table.has("hand_back")) table.fail("hand_back", "is given" + alone, "a task without it");
   if (task.start.settled) table.fail("start.kind", "is \"settled\"" + alone, "\"flying\" or \"standing\"");
@@ -286,7 +288,7 @@ void refuse_control(const io::Table& table, const Task& task) {
     if (task.parts >> static_cast<int>(part) & 1)
       table.fail("observation",
                  std::string(part_infos()[static_cast<std::size_t>(part)].name) +
-                     " is of a controller or a wing beat, which an action of kind \"voltages\" has not",
+                     " belongs to a controller or a wing beat, and an action of kind \"voltages\" has neither",
                  "other parts; \"wings\" shows where the strokes are");
 }
 
@@ -405,7 +407,7 @@ Task read_task(const io::Table& table, double tick_s) {
               limit("arrived_by_s", kFar),
               limit("arrived_x_m", -kFar)};
 
-  // "trim": what the controller has learnt, until it is handed back to
+  // "trim": before the hand-back, the controller's output is its learnt trim
   k.holds_trim = table.choice_or("base", "controller", {"controller", "trim"}) == "trim" ? 1 : 0;
   read_hand_back(table, k.hand_back);
   read_success(table, k.success);

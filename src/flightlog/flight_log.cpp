@@ -21,7 +21,8 @@ using io::shortest_digits;
 
 constexpr double kUnitTolerance = 1e-3;
 
-/// A column of a stream and the largest magnitude that is still read; what is merely odd is left to the checks.
+/// A column of a stream and the largest absolute value that is accepted. Values that are merely improbable are left to
+/// the checks.
 template <class Stream>
 struct Field {
   const char* name;
@@ -29,7 +30,7 @@ struct Field {
   double limit;
 };
 
-constexpr double kLatest = 1e10;  // s; clocks that count from 1970 still have room
+constexpr double kLatest = 1e10;  // s; allows clocks that count from 1970
 const std::vector<Field<CommandStream>> kCommandFields = {{"t_s", &CommandStream::t_s, kLatest},
                                                           {"left_voltage_V", &CommandStream::left_voltage_V, 100},
                                                           {"right_voltage_V", &CommandStream::right_voltage_V, 100}};
@@ -79,14 +80,15 @@ std::optional<double> limit_in(const std::vector<Field<Stream>>& fields, const s
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-/// Whether a stream has a part that those with voltages must have.
+/// Reads the boolean `key`, by default true, that says whether a stream has a part. Only logs with declared inputs may
+/// lack it.
 bool has_part(const io::Table& stream, const char* key, bool declared_inputs) {
   const bool has = stream.boolean_or(key, true);
   if (!has && !declared_inputs) stream.fail(key, "is false in a log with voltages", "true, or [command] inputs");
   return has;
 }
 
-/// Length 1 to the last digits, so that what was written reads back exactly.
+/// Divides by the length, unless it is 1 to the last digits, so that written values read back exactly.
 void normalise(double length, std::initializer_list<double*> components) {
   if (std::abs(length - 1) <= 4 * std::numeric_limits<double>::epsilon()) return;
   for (double* c : components) *c /= length;
@@ -236,7 +238,8 @@ std::string header_text(const FlightHeader& h) {
 
 // ---- a stream
 
-/// Takes columns out of a table that is known to have these and perhaps those columns, and no others.
+/// Reads columns from a table. InputError where a required column is missing or a column is neither required nor
+/// optional.
 class StreamReader {
  public:
   StreamReader(std::string_view text, const fs::path& path, const std::vector<std::string>& required,
@@ -340,13 +343,14 @@ CommandStream parse_command(const std::string& text, const fs::path& path) {
     else missing += (missing.empty() ? "" : ", ") + std::string(field.name);
   }
   if (command.inputs && !missing.empty())
-    refuse(path.string() + ":1", missing + ": missing beside other inputs of the wing beat", "all four or none");
+    refuse(path.string() + ":1", missing + ": missing, while other inputs of the wing beat are given",
+           "all four or none");
   if (command.inputs) reader.fill(*command.inputs, kInputFields);
   if (reader.has(kPhase)) command.phase_rad = reader.take(kPhase, kPhaseLimit);
   return command;
 }
 
-/// A stream with a quaternion.
+/// Parses a stream with a quaternion; checks its length and normalises it.
 template <class Stream>
 Stream parse_turned(const std::string& text, const fs::path& path, const std::vector<Field<Stream>>& fields) {
   Stream m = parse_stream(text, path, fields);
@@ -419,7 +423,7 @@ const std::string& text_of(const LogFiles& files, const std::string& name, const
   return found->second;
 }
 
-/// The stream of an optional file, which the header's table of the same name says how to read.
+/// InputError where an optional file exists but the header has no table of the same name.
 void require_declared(const std::string& name, const fs::path& folder, bool declared) {
   const std::string table = "[" + name.substr(0, name.find('.')) + "]";
   if (!declared)

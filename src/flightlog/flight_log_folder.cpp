@@ -1,4 +1,4 @@
-// Flight logs as folders.
+// Reads and writes flight logs as folders.
 #include <unistd.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ using namespace log_file;
   throw io::InputError(place.string() + ": " + what + (accepted.empty() ? "" : "; accepted: " + std::string(accepted)));
 }
 
-/// The vehicle that a log declares, whose file may lie in it; none in a log that cannot be read.
+/// Name of the vehicle that a log declares, whose file may be in the folder; empty where the header cannot be read.
 std::string declared_vehicle(const fs::path& folder) {
   try {
     return io::Config::load(folder / kHeader).root().string("vehicle");
@@ -33,7 +33,7 @@ void require_log(const fs::path& folder) {
   if (!fs::exists(folder / kHeader, ignored)) refuse(folder, "is no flight log", "a folder with " + kHeader);
 }
 
-/// Refuses a place that holds something other than a flight log.
+/// InputError where `folder` exists and holds anything that does not belong to a flight log.
 void require_replaceable(const fs::path& folder) {
   std::error_code error;
   const fs::file_status status = fs::status(folder, error);
@@ -54,7 +54,7 @@ void require_replaceable(const fs::path& folder) {
   if (!empty && !has_header) refuse(folder, "holds files, but no " + kHeader, kAccepted);
 }
 
-/// A folder beside another, gone at the end.
+/// A temporary folder next to another one; the destructor removes it.
 struct SiblingFolder {
   explicit SiblingFolder(const fs::path& beside) : path(beside.string() + ".tmp" + std::to_string(getpid())) {
     fs::create_directories(path);
@@ -85,7 +85,7 @@ FlightLog read_flight_log(const fs::path& folder) {
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
     if (!name.ends_with(".csv") || name == kTruth || name == kJoints) continue;
-    // An optional stream under a wrong name would be left out in silence.
+    // A misspelt name of an optional stream is an error, because the stream would otherwise be ignored silently.
     const std::string nearest = io::nearest_name(name, optional);
     if (!nearest.empty() && nearest != name)
       refuse(entry.path(), "is no stream of a flight log", io::joined(optional) + io::did_you_mean(name, optional));
@@ -110,7 +110,7 @@ void write_flight_log(const fs::path& folder, const FlightLog& log) {
   require_replaceable(folder);
   try {
     const fs::path named = folder.has_filename() ? folder : folder.parent_path();
-    const fs::path target = fs::weakly_canonical(named);  // or a link would be replaced instead of the folder
+    const fs::path target = fs::weakly_canonical(named);  // else a link would be replaced, not its folder
     const SiblingFolder fresh(target);
     for (const auto& [name, text] : files) io::write_atomically(fresh.path / name, text);
     if (fs::exists(target)) {

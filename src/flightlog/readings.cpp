@@ -9,12 +9,15 @@
 namespace flappy::flightlog {
 namespace {
 
-/// No flapper turns or travels so far between two poses: markers were taken for others. They are so for some poses at most.
+/// A pose leaps if it turns or moves by more than these offset and rate allow; no flapper does, so its markers were
+/// swapped. Swaps last kMaxSwapped poses at most.
 constexpr double kLeap_rad = 0.5, kLeap_rad_s = 40, kLeap_m = 0.05, kLeap_m_s = 10;
-constexpr std::size_t kMostSwapped = 10;
-/// Nor do two estimators differ by so much, or by so many times what they usually differ by.
+constexpr std::size_t kMaxSwapped = 10;
+/// Markers were also swapped where mocap differs from the second estimator by more than kTurned_rad and more than
+/// kTurnedUsual times the median difference.
 constexpr double kTurned_rad = 0.35, kTurnedUsual = 6;
-/// Over how long their difference is one, of how many poses it is taken, and across how many missing samples.
+/// The yaw offset between the estimators is constant over kBlock_s and is taken from about kTried poses. attitude.csv
+/// is interpolated over gaps of up to kLongestBridged intervals.
 constexpr double kBlock_s = 10, kLongestBridged = 3.5;
 constexpr std::size_t kTried = 100;
 
@@ -24,7 +27,7 @@ bool leaps(const PoseReading& from, const PoseReading& to) {
          (to.position_m - from.position_m).norm() > kLeap_m + kLeap_m_s * dt_s;
 }
 
-/// Without lost ones.
+/// All poses except lost ones, which repeat the pose before although noise is declared.
 std::vector<PoseReading> fresh_poses(const FlightLog& log) {
   const MocapStream& m = log.mocap;
   std::vector<PoseReading> poses;
@@ -38,13 +41,13 @@ std::vector<PoseReading> fresh_poses(const FlightLog& log) {
   return poses;
 }
 
-/// Without poses that leap away from those before, and back.
+/// Removes poses that leap away from the pose before, if the poses leap back within kMaxSwapped.
 std::vector<PoseReading> without_swaps(const std::vector<PoseReading>& poses) {
   std::vector<PoseReading> kept;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (!kept.empty() && leaps(kept.back(), poses[i])) {
       std::size_t back = i + 1;
-      const std::size_t last = std::min(poses.size(), i + 1 + kMostSwapped);
+      const std::size_t last = std::min(poses.size(), i + 1 + kMaxSwapped);
       while (back < last && leaps(kept.back(), poses[back])) ++back;
       if (back < last) i = back;
     }
@@ -53,15 +56,16 @@ std::vector<PoseReading> without_swaps(const std::vector<PoseReading>& poses) {
   return kept;
 }
 
-/// Fewer samples say nothing of a clock. Of a period: how far a sample may come from its instant, and the mean of a block, which wanders
-/// where the clock is none.
-constexpr std::size_t kLeastSamples = 200, kBlock = 100;
-constexpr double kMostJitter = 0.6, kMostWander = 0.08;
+/// Least number of samples for a clock, and of samples in a block. Limits, as a share of the period: kMaxJitter for one
+/// sample's deviation from the clock, kMaxWander for the mean deviation of a block, which is large where the clock is
+/// not regular.
+constexpr std::size_t kMinSamples = 200, kBlock = 100;
+constexpr double kMaxJitter = 0.6, kMaxWander = 0.08;
 constexpr int kRounds = 3;
 
 void put_on_clock(Column& t_s) {
   const std::size_t n = t_s.size();
-  if (n < kLeastSamples) return;
+  if (n < kMinSamples) return;
   Column intervals_s;
   for (std::size_t i = 1; i < n; ++i) intervals_s.push_back(t_s[i] - t_s[i - 1]);
   double period_s = io::upper_median(intervals_s), first_s = t_s[0];
@@ -85,10 +89,10 @@ void put_on_clock(Column& t_s) {
   double block = 0;
   for (std::size_t i = 0; i < n; ++i) {
     const double late = (t_s[i] - first_s) / period_s - count[i];
-    if (std::abs(late) > kMostJitter || (i > 0 && count[i] <= count[i - 1])) return;
+    if (std::abs(late) > kMaxJitter || (i > 0 && count[i] <= count[i - 1])) return;
     block += late / kBlock;
     if (i % kBlock != kBlock - 1) continue;
-    if (std::abs(block) > kMostWander) return;
+    if (std::abs(block) > kMaxWander) return;
     block = 0;
   }
   for (std::size_t i = 0; i < n; ++i) t_s[i] = first_s + count[i] * period_s;
@@ -126,7 +130,7 @@ std::vector<char> swapped_poses(const FlightLog& log) {
   const std::size_t n = m.t_s.size();
   std::vector<char> swapped(n, 0);
   const std::vector<std::optional<Eigen::Quaterniond>> others = second_attitudes(log);
-  // How mocap's W lies in that of the other: it wanders with the other's yaw, slowly.
+  // The rotation between the world frames of both estimators drifts slowly, with the yaw of the second one.
   std::vector<double> angles(n, 0), known;
   for (std::size_t begin = 0, end = 0; begin < n; begin = end) {
     while (end < n && m.t_s[end] <= m.t_s[begin] + kBlock_s) ++end;
@@ -135,7 +139,7 @@ std::vector<char> swapped_poses(const FlightLog& log) {
       if (others[i])
         turns.emplace_back(i, Eigen::Quaterniond(m.qw[i], m.qx[i], m.qy[i], m.qz[i]) * others[i]->conjugate());
     if (turns.empty()) continue;
-    // The one that is least far from all, of some.
+    // Median rotation: the one with the least sum of angles to the others, from a subset.
     const std::size_t stride = turns.size() / kTried + 1;
     double least = std::numeric_limits<double>::infinity();
     const Eigen::Quaterniond* middle = &turns.front().second;
@@ -148,7 +152,7 @@ std::vector<char> swapped_poses(const FlightLog& log) {
   }
   const double most = known.empty() ? 0 : std::max(kTurned_rad, kTurnedUsual * io::median(known));
   for (std::size_t i = 0; i < n && !known.empty(); ++i) swapped[i] = angles[i] > most ? 1 : 0;
-  // Of the rest, those that leap are not kept.
+  // Among the remaining poses, mark those that leap.
   std::vector<PoseReading> rest;
   for (const PoseReading& pose : fresh_poses(log))
     if (!swapped[pose.row]) rest.push_back(pose);

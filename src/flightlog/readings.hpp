@@ -1,4 +1,4 @@
-// What motion capture and IMU of a log read, as vectors: the one place that takes a log's columns for motion.
+// Samples of motion capture and IMU as vectors. All code that needs motion takes it from here instead of from the log's columns.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -10,30 +10,31 @@
 
 namespace flappy::flightlog {
 
-/// A pose of motion capture at the instant at which it was so: t_s of the log less the declared latency.
+/// A pose of motion capture. t_s is the measured instant: t_s of the log less the declared latency.
 struct PoseReading {
   double t_s;
   Eigen::Vector3d position_m;
-  std::array<double, 4> quaternion;  ///< as logged, declared w, x, y, z
-  std::size_t row;                   ///< of mocap.csv, from 0
+  std::array<double, 4> quaternion;  ///< as logged, in the declared order w, x, y, z
+  std::size_t row;                   ///< in mocap.csv, from 0
   Eigen::Quaterniond attitude() const { return {quaternion[0], quaternion[1], quaternion[2], quaternion[3]}; }
 };
-/// Of the log, without lost ones, which repeat the pose before where noise is declared, and without those whose markers were taken for
-/// others, which leap away and back within a few frames.
+/// The poses of the log without lost ones and without those that leap away and back within a few frames, as swapped
+/// markers make them. A pose is lost if it repeats the pose before although noise is declared.
 std::vector<PoseReading> pose_readings(const FlightLog& log);
 
-/// Of each pose of mocap.csv, the attitude that attitude.csv has at its instant; nothing where it has none, or a gap.
+/// For each row of mocap.csv, the attitude from attitude.csv at the same instant; nothing outside its time and in its
+/// gaps.
 std::vector<std::optional<Eigen::Quaterniond>> second_attitudes(const FlightLog& log);
 
-/// Of each pose of mocap.csv, whether its markers were taken for others: it leaps away and back within a few frames, or is turned
-/// against attitude.csv by far more than those around it.
+/// For each row of mocap.csv, whether its markers were swapped: the pose leaps away and back within a few frames, or is
+/// turned against attitude.csv by far more than the poses around it.
 std::vector<char> swapped_poses(const FlightLog& log);
 
-/// The log with samples of motion capture, IMU and power at the instants of the regular clocks that took them, where their times are
-/// those of arrival: a line through them, gaps counted. Left as they are where no such clock is found.
+/// Replaces times of arrival by sampling instants: fits a regular clock (first instant and period, gaps counted) to the
+/// times of motion capture, IMU and power. A stream whose times fit no regular clock keeps them.
 FlightLog on_its_clocks(FlightLog log);
 
-/// A sample of the IMU, in B; its rate is 0 where there is no gyro.
+/// A sample of the IMU, in B; the rate is 0 where there is no gyro.
 struct ImuReading {
   Eigen::Vector3d rate_rad_s, force_m_s2;
 };
@@ -43,7 +44,7 @@ inline ImuReading imu_reading(const ImuStream& s, std::size_t i) {
   return {{s.gyro_x_rad_s[i], s.gyro_y_rad_s[i], s.gyro_z_rad_s[i]}, force};
 }
 
-/// Index of the last of increasing `times` not after a time; 0 before the first.
+/// Index of the last element of `times`, which increase, that is not after t_s; 0 if all are after it.
 std::size_t last_not_after(const std::vector<double>& times, double t_s);
 
 }  // namespace flappy::flightlog

@@ -1,4 +1,4 @@
-// Rotation vectors of quaternions and back, for what is worked out once for a flight; src/flight/sensors.hpp has that of lanes.
+// Rotation vectors to quaternions and back, for single values; src/flight/sensors.hpp has the same for lanes.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -13,7 +13,7 @@ inline Eigen::Quaterniond exponential(const Eigen::Vector3d& turn) {
   return {std::cos(angle / 2), scale * turn.x(), scale * turn.y(), scale * turn.z()};
 }
 
-/// The rotation vector of a quaternion of length 1, the shorter way round.
+/// The rotation vector, rad, of a quaternion of length 1, the shorter way round.
 inline Eigen::Vector3d logarithm(const Eigen::Quaterniond& q) {
   const double sine = q.vec().norm(), sign = q.w() < 0 ? -1 : 1;
   if (sine < 1e-12) return 2 * sign * q.vec();

@@ -17,18 +17,18 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kPi = std::numbers::pi;
-/// What no header declares: a consumer accelerometer's bias (BMI088 data sheet: 20 mg), slow drifts, any velocity of a
-/// small flapper.
+/// Standard deviations that no header declares: the bias of a consumer accelerometer (BMI088 data sheet: 20 mg), slow
+/// drifts of both biases, and the initial velocity of a small flapper.
 constexpr double kAccelBiasSd_m_s2 = 0.2;
 constexpr double kGyroBiasDrift_rad_s_sqrt_s = 1e-4, kAccelBiasDrift_m_s2_sqrt_s = 0.01;
 constexpr double kVelocitySd_m_s = 3;
-/// Without samples the motion within the beat goes on unseen: about these rates and accelerations, for about this long
-/// in one direction.
+/// In a gap of the IMU the motion within the beat is not measured. It is modelled as random, with about these rates and
+/// accelerations, each for about this long in one direction.
 constexpr double kUnseenRate_rad_s = 5, kUnseenAcceleration_m_s2 = 30, kUnseenFor_s = 0.01;
-/// Noise below which a filter in double would see nothing but rounding, where a header declares none.
-constexpr double kLeastAngle_rad = 1e-6, kLeastPosition_m = 1e-7, kLeastRate_rad_s = 1e-5, kLeastForce_m_s2 = 1e-4;
+/// Least noise of the filter, for headers that declare less: below it, rounding errors in double precision dominate.
+constexpr double kMinAngle_rad = 1e-6, kMinPosition_m = 1e-7, kMinRate_rad_s = 1e-5, kMinForce_m_s2 = 1e-4;
 constexpr double kSame_s = 1e-9;
-/// Bound of the frames lost in a row.
+/// Longest gap of motion capture that covers() accepts, in frames.
 constexpr double kLongestUnseenFrames = 4;
 
 Matrix3d cross_matrix(const Vector3d& v) {
@@ -37,8 +37,8 @@ Matrix3d cross_matrix(const Vector3d& v) {
   return m;
 }
 
-/// Share of a new value in the low-pass that, after the mean over an interval, passes 1/sqrt(2) at the bandwidth; 1
-/// where the mean alone does.
+/// Weight of a new value in the first-order low-pass that, together with the mean over an interval, passes 1/sqrt(2) at
+/// the bandwidth; 1 (no low-pass) where the mean alone already does.
 double low_pass_share(const ImuHeader& h) {
   const double x = kPi * h.bandwidth_hz / h.rate_hz;
   if (x >= kPi) return 1;
@@ -46,7 +46,7 @@ double low_pass_share(const ImuHeader& h) {
     const double past = 1 - share;
     return std::sin(x) / x * share / std::sqrt(1 - 2 * past * std::cos(2 * x) + past * past);
   };
-  constexpr double kWhole = 0.98;  // a header in round numbers
+  constexpr double kWhole = 0.98;  // tolerance for a rounded bandwidth in the header
   if (passes(1) <= std::numbers::sqrt2 / 2 / kWhole) return 1;
   double low = 1e-4, high = 1;
   for (int i = 0; i < 60; ++i) (passes((low + high) / 2) > std::numbers::sqrt2 / 2 ? high : low) = (low + high) / 2;
@@ -55,7 +55,7 @@ double low_pass_share(const ImuHeader& h) {
 
 }  // namespace
 
-/// Spectral densities and variances.
+/// Spectral densities of the IMU's noise, and variances of poses and biases.
 struct Smoother::Noise {
   double angle_rad2_s, velocity_m2_s3;
   double pose_angle_rad2, pose_position_m2;
@@ -66,17 +66,17 @@ struct Smoother::Noise {
       return std::max(sd, least) * std::max(sd, least) / h.imu.rate_hz;
     };
     const auto variance = [](double sd, double least) { return std::max(sd, least) * std::max(sd, least); };
-    angle_rad2_s = density(h.imu.gyro_noise_rad_s, kLeastRate_rad_s);
-    velocity_m2_s3 = density(h.imu.accel_noise_m_s2, kLeastForce_m_s2);
-    pose_angle_rad2 = variance(h.mocap.attitude_noise_rad, kLeastAngle_rad);
-    pose_position_m2 = variance(h.mocap.position_noise_m, kLeastPosition_m);
+    angle_rad2_s = density(h.imu.gyro_noise_rad_s, kMinRate_rad_s);
+    velocity_m2_s3 = density(h.imu.accel_noise_m_s2, kMinForce_m_s2);
+    pose_angle_rad2 = variance(h.mocap.attitude_noise_rad, kMinAngle_rad);
+    pose_position_m2 = variance(h.mocap.position_noise_m, kMinPosition_m);
     for (int i = 0; i < 3; ++i)
-      gyro_bias_rad2_s2[i] = variance(h.imu.gyro_bias_sd_rad_s[static_cast<std::size_t>(i)], kLeastRate_rad_s);
+      gyro_bias_rad2_s2[i] = variance(h.imu.gyro_bias_sd_rad_s[static_cast<std::size_t>(i)], kMinRate_rad_s);
   }
 };
 
-/// What the IMU says of a piece of one of its intervals. Velocity is gained in B as it is in the middle of the whole
-/// interval: a mean knows no other frame.
+/// Integrals of the IMU's signals over a part of one of its intervals. Changes of velocity and position are in B at the
+/// middle of the whole interval, because the frame of a mean is known no better.
 struct Smoother::Reading {
   double duration_s, to_middle_s;
   Vector3d rotation_rad, turn_to_middle_rad, gained_m_s, moved_m;
@@ -89,12 +89,12 @@ struct Smoother::Pose {
   Quaterniond attitude;
 };
 
-/// How an error goes on: F = 1 but for blocks of three. Errors are of angle (0), position (3), velocity (6), gyro bias (9),
-/// accelerometer bias (12).
+/// The transition matrix F of the error state over a time dt: 1 except for blocks of 3 x 3. Offsets of the errors:
+/// angle 0, position 3, velocity 6, gyro bias 9, accelerometer bias 12.
 struct Smoother::Transition {
   double dt;
   Matrix3d turn, half;
-  Matrix3d leans;  ///< velocity for an angle
+  Matrix3d leans;  ///< d velocity error / d angle error
 
   /// F times a matrix.
   template <class M>
@@ -105,7 +105,7 @@ struct Smoother::Transition {
     m.template topRows<3>() = (turn * m.template topRows<3>() - dt * m.template middleRows<3>(9)).eval();
     return m;
   }
-  /// Its transpose times a matrix.
+  /// F transposed times a matrix.
   template <class M>
   M transposed_of(M m) const {
     const auto gained = (m.template middleRows<3>(6) + dt / 2 * m.template middleRows<3>(3)).eval();
@@ -117,7 +117,8 @@ struct Smoother::Transition {
   }
 };
 
-/// A pose's word about the errors: S^-1 of its innovation, and the gain.
+/// The update by one pose: observation matrix h, Kalman gain, inverse S^-1 of the innovation's covariance, innovation
+/// `off`.
 struct Smoother::Correction {
   Eigen::Matrix<double, 6, 15> h;
   Eigen::Matrix<double, 15, 6> gain;
@@ -125,7 +126,8 @@ struct Smoother::Correction {
   Eigen::Matrix<double, 6, 1> off;
 };
 
-/// What the filter leaves: of every node, from every node to the next, of every pose but the first.
+/// Results of the forward filter for the backward pass: covariance of every node, transition from every node to the
+/// next, correction by every pose except the first.
 struct Smoother::Filtered {
   std::vector<Covariance> covariance;
   std::vector<Transition> transition;
@@ -175,8 +177,8 @@ void Smoother::read_imu(const FlightLog& log) {
     force_before = force;
   }
   bounds_s_.push_back(s.t_s.back() - late_s + interval_s / 2);
-  gyro_ = MeanSpline(bounds_s_, std::move(gyro));
-  accel_ = MeanSpline(bounds_s_, std::move(accel));
+  gyro_ = BeatAveragedSpline(bounds_s_, std::move(gyro));
+  accel_ = BeatAveragedSpline(bounds_s_, std::move(accel));
 }
 
 auto Smoother::read_poses(const FlightLog& log) const -> std::vector<Pose> {
@@ -222,7 +224,8 @@ auto Smoother::moved(const State& x, const Reading& r) const -> State {
   const Quaterniond middle = to_middle(x, r);
   const Vector3d down(0, 0, -gravity_m_s2_);
   State y = x;
-  // not half of what was gained: the beat's acceleration A would leave A dt^2/12 in the position, some 0.01 mm
+  // Position uses the second integral, not half of the gained velocity: with an acceleration A of the beat this would
+  // leave A dt^2/12, some 0.01 mm.
   y.position_m += dt * x.velocity_m_s + middle * (r.moved_m - dt * dt / 2 * x.accel_bias) + dt * dt / 2 * down;
   y.velocity_m_s += middle * (r.gained_m_s - dt * x.accel_bias) + dt * down;
   y.attitude = (x.attitude * exponential(turn)).normalized();
@@ -289,7 +292,7 @@ auto Smoother::filter(const std::vector<Pose>& poses, const Noise& noise) -> Fil
       Vector3d::Constant(kVelocitySd_m_s * kVelocitySd_m_s), noise.gyro_bias_rad2_s2,
       Vector3d::Constant(kAccelBiasSd_m_s2 * kAccelBiasSd_m_s2);
   const Pose& first = poses.front();
-  // the arm turns the first pose's error of angle into one of the IMU's position
+  // Through the lever arm, the angle error of the first pose becomes an error of the IMU's position.
   Covariance from_pose = Covariance::Identity();
   from_pose.block<3, 3>(3, 0) = -first.attitude.toRotationMatrix() * cross_matrix(arm_m_);
   p = (from_pose * p * from_pose.transpose()).eval();
@@ -298,7 +301,7 @@ auto Smoother::filter(const std::vector<Pose>& poses, const Noise& noise) -> Fil
   Filtered list;
   list.covariance.reserve(nodes_.size());
   list.transition.reserve(nodes_.size());
-  std::size_t next_pose = 1;  // the first is the start
+  std::size_t next_pose = 1;  // the first pose is the initial state
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     if (i > 0) {
       const Reading r = reading(nodes_[i - 1].interval, nodes_[i - 1].t_s, nodes_[i].t_s);
@@ -317,8 +320,8 @@ auto Smoother::filter(const std::vector<Pose>& poses, const Noise& noise) -> Fil
   return list;
 }
 
-/// Backwards by the adjoint of the errors, lambda, and its covariance: what is smoothed is the filtered state + P lambda, of covariance
-/// P - P Lambda P.
+/// Goes backward with the adjoint lambda of the errors and its covariance Lambda: smoothed state = filtered state + P
+/// lambda, with covariance P - P Lambda P.
 void Smoother::smooth(const Filtered& filtered, const Noise& noise) {
   Eigen::Matrix<double, 15, 1> lambda = Eigen::Matrix<double, 15, 1>::Zero();
   Covariance of_lambda = Covariance::Zero();
@@ -356,7 +359,7 @@ double Smoother::imu_bound_s(double t_s) const {
   return k + 1 < bounds_s_.size() && bounds_s_[k + 1] - t_s < t_s - bounds_s_[k] ? bounds_s_[k + 1] : bounds_s_[k];
 }
 
-Vector3d Smoother::mean(const MeanSpline& signal, double from_s, double to_s) const {
+Vector3d Smoother::mean(const BeatAveragedSpline& signal, double from_s, double to_s) const {
   Vector3d sum = Vector3d::Zero();
   for (std::size_t k = last_not_after(bounds_s_, from_s); k + 1 < bounds_s_.size() && bounds_s_[k] < to_s; ++k) {
     const double length = bounds_s_[k + 1] - bounds_s_[k];

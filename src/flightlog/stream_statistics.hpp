@@ -1,4 +1,4 @@
-// How regularly the samples of a stream come.
+// Rate, gaps and regularity of the samples of a stream.
 #pragma once
 
 #include <optional>
@@ -10,13 +10,14 @@ namespace flappy::flightlog {
 
 struct StreamStatistics {
   std::string name;
-  std::size_t samples = 0, missing = 0;  ///< missing only where a rate is declared
+  std::size_t samples = 0, missing = 0;  ///< missing is counted only where a rate is declared
   double duration_s = 0, rate_hz = 0, longest_gap_s = 0;
-  double jitter_s = 0;  ///< standard deviation of the intervals that miss no sample
+  double jitter_s = 0;  ///< standard deviation of the intervals in which no sample is missing
   std::optional<double> declared_hz;
 };
 
-/// Of at least two times, which increase. A gap lacks samples by the median of the intervals, two and two together: bunches of samples lack none.
+/// `t_s`: at least two times, which increase. The usual interval is half the median span of two intervals, so that
+/// samples that arrive in pairs count as regular; a longer interval counts its missing samples by it.
 StreamStatistics stream_statistics(const std::string& name, const Column& t_s, std::optional<double> declared_hz);
 
 }  // namespace flappy::flightlog

@@ -1,4 +1,4 @@
-// The room of a log, to fly in once more.
+// Conversion between the surroundings in a log's header and the world of the simulator.
 #pragma once
 
 #include "flappy/world.hpp"
@@ -8,7 +8,7 @@ namespace flappy::flightlog {
 
 sim::World world_of(const FlightHeader& header);
 
-/// A solid of a world as a log has it.
+/// Adds a solid of a world to the surroundings of a log.
 void add_solid(const sim::Shape& shape, LogAmbient& ambient);
 
 }  // namespace flappy::flightlog

@@ -1,4 +1,4 @@
-// Which parameters of a vehicle a fit may move, and how far.
+// The parameters of a vehicle that a fit may change, and their bounds.
 //
 //   schema = 1
 //   unseen_share = 0.5              # a parameter whose 95 % interval is wider than this share of its bounds is unseen
@@ -26,9 +26,9 @@ struct FitConfig {
   double unseen_share = 0;
 };
 
-/// Keeps those `chosen` by path, all where none is chosen. InputError "file:line:column: key: ..." for a parameter that the
-/// vehicle lacks, that comes twice, or whose bounds are empty, leave what the vehicle's file accepts or leave out the
-/// vehicle's own value.
+/// Reads the parameters whose paths are in `chosen`, or all if it is empty. InputError "file:line:column: key: ..." for
+/// a parameter that the vehicle lacks, that comes twice, or whose bounds are empty, exceed the range that a vehicle
+/// file accepts or exclude the vehicle's own value.
 FitConfig read_fit_config(const std::filesystem::path& path, const model::Vehicle& vehicle,
                           const std::vector<std::string>& chosen = {});
 

@@ -7,7 +7,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr double kJump = 1;  // second difference, in standard deviations
+constexpr double kJump = 1;  // least second difference of a jump, in standard deviations
 
 double square(double x) { return x * x; }
 

@@ -1,4 +1,5 @@
-// Vehicles as points of the unit cube of a fit's bounds, judged against a measured map with its standard deviations.
+// The cost function of a fit: a vehicle is a point of the unit cube, each axis one parameter from its lower to its upper bound. Its
+// residuals are simulated less measured forces and torques, over their standard deviations.
 #pragma once
 
 #include <algorithm>
@@ -10,15 +11,15 @@
 namespace flappy::identify {
 
 struct MapError {
-  double total = 0;  ///< %
-  Wrench rms{};      ///< of measured - simulated, in N and N m
+  double total = 0;  ///< total error of force_fit.hpp, %
+  Wrench rms{};      ///< rms of measured - simulated for each channel, in N and N m
 };
 MapError map_error(const std::vector<Wrench>& measured, const std::vector<Wrench>& simulated);
 
-/// Root mean square of forces and of torques.
+/// Root mean square of all forces, N, and of all torques, N m.
 std::array<double, 2> group_rms(const std::vector<Wrench>& wrenches);
 
-/// Refers to all that it is made of.
+/// Holds references to the arguments of its constructor; they must outlive it.
 class Problem {
  public:
   Problem(const model::Vehicle& vehicle, const FitConfig& config, const MeasuredMap& measured, const MapOptions& map)
@@ -46,7 +47,7 @@ class Problem {
   }
   const FitConfig& config() const { return config_; }
 
-  /// Simulated wrenches of each point, one point after the other.
+  /// Simulated wrenches, [point][input].
   template <class T>
   std::vector<Wrench> maps(const std::vector<Eigen::VectorXd>& points) const {
     std::vector<model::Vehicle> vehicles;
@@ -82,11 +83,13 @@ class Problem {
   MapOptions map_;
 };
 
-/// What is left of forces and of torques, as the noise of each value.
+/// Estimates the standard deviation of each measured value as the rms residual of all forces or of all torques,
+/// corrected for the number of fitted `parameters`.
 std::vector<Wrench> estimated_sd(const MeasuredMap& measured, const std::vector<Wrench>& simulated,
                                  std::size_t parameters);
 
-/// Inputs whose second differences about `point` are no curvature: smooth ones stay below 0.2 standard deviations.
+/// Inputs at which the simulated map jumps about `point`: the second difference of a residual over a small step of a
+/// parameter exceeds 1 standard deviation. Where the map is smooth it stays below 0.2.
 std::vector<std::size_t> jumping_inputs(const Problem& problem, const Eigen::VectorXd& point);
 
 }  // namespace flappy::identify

@@ -15,7 +15,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr double kImpossible = 1e30;  // cost of a vehicle that comes apart
+constexpr double kImpossible = 1e30;  // cost of a vehicle whose simulation leaves the plausible range
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -26,7 +26,7 @@ class Fit {
   Fit(const Problem& problem, const FitOptions& options, ForceFit& result)
       : problem_(problem), options_(options), result_(result) {}
 
-  /// Downhill from `start`, as a stage of its own.
+  /// Minimises from `start` as a separate stage; returns the point.
   VectorXd polish(const std::string& name, const VectorXd& start) {
     const auto began = std::chrono::steady_clock::now();
     const LeastSquares found = minimise(problem_, start, [&](const LeastSquares& s) {
@@ -37,7 +37,7 @@ class Fit {
     return found.point;
   }
 
-  /// The optimum, by the method chosen.
+  /// Returns the optimum of the chosen method.
   VectorXd optimum(const VectorXd& nominal) {
     if (options_.method == Method::gauss_newton) return from_several(nominal);
     const bool genetic = options_.method == Method::genetic;
@@ -95,8 +95,8 @@ class Fit {
   double cost_ = 0;
 };
 
-/// Puts unseen parameters back to `nominal`, one after the other, as long as the rest then fit as well as noise explains.
-/// Returns those that are back.
+/// Puts unseen parameters back to `nominal`, one at a time, and fits the rest again, as long as noise explains the
+/// increase of the cost. Returns the parameters put back.
 std::vector<Eigen::Index> put_back(const Problem& problem, const FitOptions& options, ForceFit& result, VectorXd& point,
                                    const VectorXd& nominal) {
   const auto began = std::chrono::steady_clock::now();
@@ -128,7 +128,7 @@ std::vector<Eigen::Index> put_back(const Problem& problem, const FitOptions& opt
     if (!rest.empty()) {
       double last = std::numeric_limits<double>::infinity();
       const LeastSquares found = minimise(residuals, tried(rest), [&](const LeastSquares& s) {
-        const bool gains = s.cost < last - 1e-3 * noise;  // less is no better fit of anything
+        const bool gains = s.cost < last - 1e-3 * noise;  // stop at gains far below the noise
         last = s.cost;
         return gains && (!options.progress || options.progress(stage.name, 0, s.cost));
       });
@@ -196,11 +196,11 @@ ForceFit fit_forces(const model::Vehicle& nominal, const MeasuredMap& measured, 
   result.unchecked = check_signs(measured, before);
   result.before = map_error(measured.wrenches, before);
   result.sd_declared = !measured.sd.empty();
-  MeasuredMap fitted = measured;  // with the sd that the fit assumes
+  MeasuredMap fitted = measured;  // the rows that are fitted, with the assumed sd
   const auto scale = group_rms(measured.wrenches);
   if (!result.sd_declared)
     fitted.sd.assign(measured.size(), {scale[0], scale[0], scale[0], scale[1], scale[1], scale[1]});
-  std::vector<std::size_t> rows(measured.size());  // of `measured`, that are in `fitted`
+  std::vector<std::size_t> rows(measured.size());  // rows of `measured` that are in `fitted`
   std::iota(rows.begin(), rows.end(), std::size_t{0});
   const Problem problem(nominal, config, fitted, options.map);
   Fit fit(problem, options, result);
@@ -212,7 +212,7 @@ ForceFit fit_forces(const model::Vehicle& nominal, const MeasuredMap& measured, 
     point = fit.polish("Gauss-Newton, noise estimated", point);
   };
   estimate_noise();
-  // a fit that jumps have led astray sees others once it is back
+  // Repeat: a first fit that jumps misled finds other jumping inputs once it is corrected.
   for (int round = 0; round < 3; ++round) {
     std::vector<std::size_t> smooth(fitted.size()), jumping;
     std::iota(smooth.begin(), smooth.end(), std::size_t{0});
@@ -235,7 +235,7 @@ ForceFit fit_forces(const model::Vehicle& nominal, const MeasuredMap& measured, 
   const std::vector<Eigen::Index> back = put_back(problem, options, result, point, start);
   result.known = describe(problem, point, start, likely);
   result.vehicle = problem.vehicle(point);
-  // a parameter that is back keeps its nominal digits
+  // A parameter put back keeps the exact nominal value, without rounding errors.
   model::Vehicle untouched = nominal;
   const std::vector<double*> values = fitted_values(config, result.vehicle), digits = fitted_values(config, untouched);
   for (std::size_t i = 0; i < count; ++i) {

@@ -1,14 +1,15 @@
-// Fits parameters of a vehicle to a measured force map, and says how well each is known.
+// Fits parameters of a vehicle to a measured force map, with an interval for each.
 //
 //   cost = sum of ((measured - simulated) / sd)^2 over all inputs and channels
 //   total error = 100 norm(D (measured - simulated)) / norm(D measured), D = 1/rms of the measured forces, of the torques
 //
-// Where no sd is declared the first fit weighs by D, and the scatter it leaves in forces and in torques is the sd of the second.
-// Inputs at which the simulated map jumps about the optimum (wings that hardly flip, strokes that meet their stops) can
-// neither steer a fit nor tell how well it is known: they are left out of it, but not of the errors.
-// A parameter whose interval is wider than a share of its bounds is unseen. Unseen ones go back to their nominal value one
-// at a time, the widest first, and the rest are fitted once more: what two of them share is then known of the other. One
-// whose nominal value the map contradicts stays as fitted. All intervals still count what the unseen ones could be.
+// Where no sd is declared, the first fit uses the weights D; the rms residual that it leaves in forces and in torques is the sd of the
+// second fit. Inputs at which the simulated map jumps about the optimum (wings that hardly flip, strokes that meet their stops) have no
+// useful slopes: the fit leaves them out, the errors include them.
+// A parameter is unseen if its interval is wider than a share of its bounds. Unseen parameters return to their nominal value one at a
+// time, the widest interval first, and the rest are fitted again; if the map determines only a combination of two parameters, fixing one
+// determines the other. A parameter whose nominal value contradicts the map stays as fitted. The intervals include the uncertainty of
+// the unseen parameters.
 #pragma once
 
 #include <functional>
@@ -23,17 +24,17 @@ enum class Method { gauss_newton, genetic, cma_es };
 struct FitOptions {
   Method method = Method::gauss_newton;
   MapOptions map;
-  unsigned population = 200, generations = 200;  ///< of the genetic algorithm and CMA-ES
-  int starts = 3;                                ///< of Gauss-Newton: the nominal vehicle, then random ones
+  unsigned population = 200, generations = 200;  ///< for the genetic algorithm and CMA-ES
+  int starts = 3;                                ///< for Gauss-Newton: first the nominal vehicle, then random points
   std::uint64_t seed = 1;
-  /// Called now and then with the stage, its part done and its lowest cost; false ends the stage.
+  /// Called repeatedly with the stage, the fraction done and the lowest cost so far; returning false ends the stage.
   std::function<bool(const std::string& stage, double done, double cost)> progress;
 };
 
-/// What a part of the fit took, and the total error that it reached.
+/// Effort of one stage of the fit, and the total error, %, that it reached.
 struct Stage {
   std::string name;
-  std::size_t evaluations = 0;  ///< of vehicles: a map each
+  std::size_t evaluations = 0;  ///< number of simulated force maps
   double wall_s = 0, error = 0;
 };
 
@@ -44,17 +45,17 @@ struct ForceFit {
   std::vector<Stage> stages;
   bool sd_declared = false;
   std::vector<std::size_t> left_out;      ///< rows of the measured map at which the simulated one jumps
-  std::vector<std::size_t> jumping_kept;  ///< the same, fitted all the same: without them too few remain
-  std::vector<std::string> unchecked;     ///< columns whose sign these inputs do not tell
-  std::vector<End> ends;                  ///< of Gauss-Newton's starts, with costs as the starts had them
-  int starts_agreed = 0;                  ///< of them; with fewer than 2, another optimum may lie elsewhere
+  std::vector<std::size_t> jumping_kept;  ///< such rows that the fit keeps because too few inputs would remain
+  std::vector<std::string> unchecked;     ///< columns whose sign the inputs do not determine
+  std::vector<End> ends;                  ///< where each Gauss-Newton start ended, with its cost at that time
+  int starts_agreed = 0;                  ///< number of ends at the lowest cost; below 2, a better optimum may exist
 };
 
-/// For each side whose two spring stiffnesses were both to be fitted: whether the map tells them apart.
+/// A line for each side with both spring stiffnesses fitted: whether the map tells them apart.
 std::vector<std::string> spring_verdicts(const ForceFit& fit);
 
-/// InputError where there are fewer different inputs than parameters, forces or torques are all zero, the vehicle cannot be
-/// simulated at an input, or check_signs() refuses.
+/// InputError where there are fewer different inputs than parameters, where all forces or all torques are zero, where
+/// the vehicle cannot be simulated at an input, or where check_signs() finds a wrong sign.
 ForceFit fit_forces(const model::Vehicle& nominal, const MeasuredMap& measured, const FitConfig& config,
                     const FitOptions& options = {});
 

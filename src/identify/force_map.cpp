@@ -7,10 +7,10 @@
 namespace flappy::identify {
 
 Window whole_beats(const model::Driver& driver) {
-  constexpr int kFewest = 10, kMost = 20;
+  constexpr int kFewest = 10, kMax = 20;
   Window best{};
   double least = std::numeric_limits<double>::infinity();
-  for (int beats = kFewest; beats <= kMost; ++beats) {
+  for (int beats = kFewest; beats <= kMax; ++beats) {
     const double holds = beats / (driver.flapping_Hz * driver.hold_s);
     const double off = std::abs(holds - std::round(holds));
     if (off >= least - 1e-9) continue;

@@ -23,7 +23,7 @@ MeasuredMap simulate_forces(const model::Vehicle& vehicle, const std::vector<sim
   if (!(sensor.noise_steps > 0)) return {"", inputs, whole_map(vehicle, inputs, options), {}};
   const int each = static_cast<int>(std::lround(1 / (sensor.rate_hz * kStep_s)));
   const int samples = whole_beats(vehicle.driver).steps / each;
-  MapOptions alone = options;  // threads that meet after every sample would wait more than work
+  MapOptions alone = options;  // one thread: synchronising after every sample would cost more than it gains
   alone.threads = 1;
   auto batch = welded_batch<double>(std::span(&vehicle, 1), inputs, alone);
   batch.step(settle_steps(vehicle.driver, options.settle_s));
@@ -48,7 +48,7 @@ MeasuredMap simulate_forces(const model::Vehicle& vehicle, const std::vector<sim
   }
   for (std::size_t i = 0; i < inputs.size(); ++i)
     if (batch.status(i) & sim::kFrozen) refuse_apart(vehicle.name, inputs[i]);
-  // rounding to steps adds the variance of a uniform error, 1/12
+  // Quantisation adds the variance of a uniform error, 1/12 of a step squared.
   const double sd = std::sqrt((sensor.noise_steps * sensor.noise_steps + 1.0 / 12) / samples);
   for (Wrench& each_sd : map.sd)
     for (int k = 0; k < kChannels; ++k)

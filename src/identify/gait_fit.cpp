@@ -24,13 +24,13 @@ std::string digits(double x) { return io::format("%.3g", x); }
   throw io::InputError(table.name + ": " + column + ": " + what + "; accepted: " + accepted);
 }
 
-/// Samples by the beat, not yet their fraction.
+/// Times of the samples in beats.
 std::vector<double> beats_of(const io::CsvTable& table, const GaitOptions& options) {
   const bool by_time = std::ranges::count(table.names, "t_s") > 0;
   if (!by_time && std::ranges::count(table.names, "beat") == 0)
     throw io::InputError(table.name + ": no column of time; accepted: t_s, with --frequency-Hz, or beat");
   if (by_time && !options.frequency_Hz)
-    fail(table, "t_s", "says nothing of the beat by itself", "--frequency-Hz besides, or a column beat");
+    fail(table, "t_s", "does not tell the beat's phase", "--frequency-Hz, too, or a column beat");
   const char* const name = by_time ? "t_s" : "beat";
   std::vector<double> beats = table.column(name);
   for (std::size_t i = 1; i < beats.size(); ++i)
@@ -42,7 +42,7 @@ std::vector<double> beats_of(const io::CsvTable& table, const GaitOptions& optio
   return beats;
 }
 
-/// Every phase must be near enough to a sample for the harmonics asked for.
+/// InputError where the samples leave a gap in the phase that is too wide for the harmonics asked for.
 void check_phases(const io::CsvTable& table, const std::vector<double>& beats, const GaitOptions& options) {
   std::vector<double> phases;
   for (const double x : beats) phases.push_back(x - std::floor(x));
@@ -74,9 +74,9 @@ std::vector<double> radians(const io::CsvTable& table, const std::string& column
 }  // namespace
 
 std::vector<FittedAngle> fit_gait(const std::filesystem::path& path, const GaitOptions& options) {
-  if (options.harmonics < 1 || options.harmonics > model::kMostHarmonics)
+  if (options.harmonics < 1 || options.harmonics > model::kMaxHarmonics)
     throw io::InputError("--harmonics: " + std::to_string(options.harmonics) + " of them; accepted: 1 to " +
-                         std::to_string(model::kMostHarmonics));
+                         std::to_string(model::kMaxHarmonics));
   const io::CsvTable table = io::read_csv(path);
   const std::vector<double> beats = beats_of(table, options);
   check_phases(table, beats, options);

@@ -13,7 +13,7 @@
 namespace flappy::identify {
 namespace {
 
-/// What the problem hears, and what it answers. Shared by all copies of the problem that pagmo makes.
+/// Points that pagmo asks for, and the costs it gets. Shared by all copies of the problem that pagmo makes.
 struct Exchange {
   BatchCost cost;
   bool answering = false;
@@ -52,10 +52,11 @@ struct Exchanged {
 
 pagmo::algorithm algorithm_of(Search method, unsigned seed) {
   if (method == Search::cma_es) {
-    constexpr double kFirstStep = 0.2;  // of the range
+    constexpr double kFirstStep = 0.2;  // initial step, as a share of the range
     return pagmo::algorithm(pagmo::cmaes(1, -1, -1, -1, -1, kFirstStep, 0, 0, true, true, seed));
   }
-  // crossover of most pairs near their parents, one mutation for each individual of twelve genes
+  // Crossover probability 0.9, offspring near their parents (distribution index 10); mutation probability 0.08 per
+  // gene: about one mutation in twelve genes.
   return pagmo::algorithm(pagmo::sga(1, 0.9, 10, 0.08, 20, 2, "sbx", "polynomial", "tournament", seed));
 }
 

@@ -10,11 +10,11 @@ namespace {
 
 using Eigen::MatrixXd, Eigen::VectorXd;
 
-constexpr double kUniformPrecision = 12;  // of a uniform distribution over [0, 1]
+constexpr double kUniformPrecision = 12;  // 1 / variance of a uniform distribution over [0, 1]
 constexpr double kConfounded = 0.9;
 
 struct Linear {
-  MatrixXd slopes;  ///< in standard deviations of the noise, widened by a misfit
+  MatrixXd slopes;  ///< Jacobian of the residuals, in standard deviations of the noise, which a misfit increases
   double misfit = 0;
 };
 
@@ -35,7 +35,7 @@ MatrixXd covariance(const MatrixXd& slopes) {
 }
 
 std::vector<WeakDirection> weak_directions(const Eigen::JacobiSVD<MatrixXd>& svd, const FitConfig& config) {
-  constexpr double kMember = 0.3;  // a twelfth of the direction's square
+  constexpr double kMember = 0.3;  // least component of a member: its square is about a twelfth of the sum
   std::vector<WeakDirection> weak;
   for (Eigen::Index k = svd.singularValues().size() - 1; k >= 0; --k) {
     if (svd.singularValues()[k] * svd.singularValues()[k] >= kUniformPrecision) break;
@@ -62,7 +62,7 @@ double explained_by_noise(std::size_t parameters, double noise) {
 int count_agreed(const std::vector<double>& costs, Eigen::Index residuals, Eigen::Index parameters, bool declared) {
   const double lowest = *std::ranges::min_element(costs);
   const double noise = declared ? 1 : variance_left(lowest, residuals, parameters);
-  constexpr double kNothing = 1e-12;  // of the map's own square: errors of the sixth digit are no difference
+  constexpr double kNothing = 1e-12;  // relative to the square of the map: errors in the sixth digit do not count
   const double most = 1.01 * lowest + noise + kNothing * static_cast<double>(residuals);
   return static_cast<int>(std::ranges::count_if(costs, [&](double c) { return c <= most; }));
 }

@@ -1,9 +1,9 @@
-// How well a fit knows its parameters.
+// Uncertainty of fitted parameters.
 //
-// Intervals are those of the linearised map at the optimum: in units of the bounds, with Jacobian J of the cost's terms,
-// covariance C = (J'J + 12 I)^-1. The 12 is the precision of a uniform distribution over the bounds: what is known before
-// anything is measured. A misfit far above the noise (a map no parameters reach) widens C by its ratio.
-// Where starts end in several places whose costs the noise does not tell apart, intervals hold them all.
+// The intervals come from the map linearised at the optimum: in units of the bounds, with the Jacobian J of the residuals, the
+// covariance is C = (J'J + 12 I)^-1. 12 is the precision of the prior, a uniform distribution over the bounds. Where the misfit is far
+// above the noise (no parameters reproduce the map), it multiplies the noise variance. Where several starts end at different points
+// whose costs differ by no more than noise explains, the intervals contain all of them.
 #pragma once
 
 #include <string>
@@ -16,57 +16,60 @@ namespace flappy::identify {
 
 struct FittedParameter {
   std::string path;
-  double nominal = 0, value = 0, low = 0, high = 0;  ///< 95 % interval, within the bounds
+  double nominal = 0, value = 0, low = 0, high = 0;  ///< low, high: 95 % interval, within the bounds
   double lower_bound = 0, upper_bound = 0;
-  bool seen = true;  ///< its interval is narrower than a share of its bounds
+  bool seen = true;  ///< whether its interval is narrower than a share of its bounds
   bool at_bound = false;
-  bool at_nominal = false;  ///< unseen, and put back; the others are fitted with it there
+  bool at_nominal = false;  ///< unseen and put back to nominal before the last fit of the others
 };
 
-/// Two parameters that the map tells apart badly.
+/// Two parameters that the map hardly tells apart.
 struct Confounded {
   std::string first, second;
   double correlation = 0;
 };
 
-/// A combination of parameters, each in units of its bounds, that is known from the bounds alone.
+/// A combination of parameters, in units of their bounds, that only the bounds constrain.
 struct WeakDirection {
   double singular_value = 0;
-  std::vector<std::pair<std::string, double>> members;  ///< weights of the vector of length 1, largest first
+  std::vector<std::pair<std::string, double>> members;  ///< largest components of the unit vector, largest first
 };
 
-/// Where a start ended.
+/// The point at which a start ended.
 struct End {
   double cost = 0;
   Eigen::VectorXd point;
 };
 
-/// Variance of a residual, of those that a fit leaves: 1 where it leaves the declared noise alone.
+/// Cost per degree of freedom: the variance of a residual after the fit, 1 where only the declared noise is left.
 double variance_left(double cost, Eigen::Index residuals, Eigen::Index parameters);
 
-/// Cost above the lowest that noise explains in 19 of 20 maps, for `parameters` of them. `noise`: variance of a residual.
+/// Cost above the lowest one that noise alone explains in 19 of 20 maps (95 % quantile of chi squared with `parameters`
+/// degrees of freedom). `noise`: variance of a residual.
 double explained_by_noise(std::size_t parameters, double noise);
 
-/// Starts that ended as low as the lowest, of `residuals` in standard deviations where those are `declared`, else in
-/// units of the map itself.
+/// Number of starts that ended as low as the lowest. `residuals`, `parameters`: their numbers. `declared`: whether
+/// residuals are in declared standard deviations; else they are relative to the map, and their variance is estimated
+/// from the lowest cost.
 int count_agreed(const std::vector<double>& costs, Eigen::Index residuals, Eigen::Index parameters, bool declared);
 
-/// Those `ends` whose cost, over what is fitted in the end, noise allows above the lowest of them and of `point`.
+/// The `ends` whose cost in `problem` exceeds the lowest cost, `point` included, by no more than noise explains.
+/// Updates their costs.
 std::vector<End> likely_ends(const Problem& problem, std::vector<End> ends, const Eigen::VectorXd& point);
 
 struct Intervals {
   std::vector<FittedParameter> parameters;
-  std::vector<Confounded> confounded;  ///< beyond +-0.9
+  std::vector<Confounded> confounded;  ///< pairs with a correlation beyond +-0.9
   std::vector<double>
-      singular_values;              ///< of J, largest first: below sqrt(12) a direction is known from its bounds alone
-  std::vector<WeakDirection> weak;  ///< those, weakest first
+      singular_values;  ///< singular values of J, largest first; below sqrt(12) only the bounds constrain a direction
+  std::vector<WeakDirection> weak;  ///< these directions, weakest first
   double misfit = 0;                ///< cost per degree of freedom; about 1 where only noise is left
 };
 Intervals describe(const Problem& problem, const Eigen::VectorXd& point, const Eigen::VectorXd& nominal,
                    const std::vector<End>& ends);
 
-/// The widest of those `free` whose interval is that of an unseen parameter while all others stay where they are not free;
-/// -1 where all are seen.
+/// The parameter of `candidates` with the widest interval among the unseen ones, if only the `free` parameters are
+/// uncertain; -1 where all candidates are seen.
 Eigen::Index widest_unseen(const Problem& problem, const Eigen::VectorXd& point, const std::vector<Eigen::Index>& free,
                            const std::vector<Eigen::Index>& candidates);
 

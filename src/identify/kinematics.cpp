@@ -18,9 +18,9 @@ namespace {
 using Eigen::VectorXd;
 
 constexpr double kTurn = 2 * std::numbers::pi;
-constexpr Eigen::Index kMostHarmonics = 20;
+constexpr Eigen::Index kMaxHarmonics = 20;
 
-/// 1, cos, sin, cos 2, sin 2, ... of a phase.
+/// Design matrix: columns 1, cos, sin, cos 2, sin 2, ... of the phases.
 Eigen::MatrixXd harmonics_at(const std::vector<double>& phases, Eigen::Index harmonics) {
   Eigen::MatrixXd m(static_cast<Eigen::Index>(phases.size()), 2 * harmonics + 1);
   for (Eigen::Index i = 0; i < m.rows(); ++i) {
@@ -37,7 +37,7 @@ VectorXd as_vector(const std::vector<double>& values) {
   return Eigen::Map<const VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
-/// Four angles as Fourier series.
+/// The four angles as Fourier series, coefficients as the columns of harmonics_at().
 struct Beat {
   Eigen::Index harmonics = 0;
   std::array<VectorXd, 4> coefficients;
@@ -46,17 +46,17 @@ struct Beat {
     const VectorXd y = harmonics_at(phases, harmonics) * coefficients[angle];
     return {y.begin(), y.end()};
   }
-  /// First harmonic as amplitude and phase of a cosine.
+  /// First harmonic as a complex number: amplitude and phase of a cosine.
   std::complex<double> first(std::size_t angle) const { return {coefficients[angle][1], -coefficients[angle][2]}; }
 };
 
 std::optional<Beat> beat_of(const std::vector<double>& phases, const std::array<std::vector<double>, 4>& angles) {
   Beat beat;
-  beat.harmonics = std::min(kMostHarmonics, (static_cast<Eigen::Index>(phases.size()) / 4 - 1) / 2);
+  beat.harmonics = std::min(kMaxHarmonics, (static_cast<Eigen::Index>(phases.size()) / 4 - 1) / 2);
   if (beat.harmonics < 1) return std::nullopt;
   const Eigen::MatrixXd m = harmonics_at(phases, beat.harmonics);
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver(m);
-  // of times that leave a gap some wave that lives in the gap is hardly seen
+  // Where the samples leave a gap, the coefficients of some wave that is large in the gap are undetermined.
   const VectorXd diagonal = solver.matrixR().diagonal().cwiseAbs();
   if (diagonal.minCoeff() < 0.05 * diagonal.maxCoeff()) return std::nullopt;
   for (std::size_t a = 0; a < 4; ++a) beat.coefficients[a] = solver.solve(as_vector(angles[a]));
@@ -82,7 +82,7 @@ Beat simulated_beat(const model::Vehicle& vehicle, const sim::Input& input, cons
   return *beat_of(phases, angles);
 }
 
-BeatFigures figures_of(const std::vector<double>& curve, std::complex<double> first) {
+BeatParameters parameters_of(const std::vector<double>& curve, std::complex<double> first) {
   const auto [low, high] = std::ranges::minmax(curve);
   return {(high - low) / 2, (high + low) / 2, std::arg(first)};
 }
@@ -164,8 +164,8 @@ WingComparison compare_wings(const model::Vehicle& vehicle, const sim::Input& in
     c.measured_rad[a] = measured->on(points, a);
     c.simulated_rad[a] = simulated.on(points, a);
     AngleComparison& angle = c.angles[a];
-    angle.measured = figures_of(c.measured_rad[a], measured->first(a));
-    angle.simulated = figures_of(c.simulated_rad[a], simulated.first(a));
+    angle.measured = parameters_of(c.measured_rad[a], measured->first(a));
+    angle.simulated = parameters_of(c.simulated_rad[a], simulated.first(a));
     angle.phase_rad = std::arg(measured->first(a) * std::conj(simulated.first(a)));
     angle.rms_rad = rms(samples.angles_rad[a], simulated.on(phases, a));
     angle.scatter_rad = rms(samples.angles_rad[a], measured->on(phases, a));

@@ -7,23 +7,24 @@
 namespace flappy::identify {
 namespace {
 
-constexpr int kMostIterations = 50;
-constexpr double kLeastGain = 1e-7;   // of the cost, by an iteration
-constexpr double kLeastCost = 1e-16;  // of where it started: residuals of the eighth digit
+constexpr int kMaxIterations = 50;
+constexpr double kMinGain = 1e-7;   // least relative gain of an iteration
+constexpr double kMinCost = 1e-16;  // relative to the initial cost: residuals in the eighth digit
 
 double cost_of(const Eigen::VectorXd& residuals) {
   const double cost = residuals.squaredNorm();
   return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
 }
 
-/// The damped step among parameters that are free to move, cut off at the bounds.
+/// The point after a damped step of the parameters that the gradient does not push against a bound; clamped to the
+/// bounds.
 Eigen::VectorXd stepped(const Eigen::MatrixXd& normal, const Eigen::VectorXd& gradient, const Eigen::VectorXd& point,
                         double damping) {
   std::vector<Eigen::Index> free;
   for (Eigen::Index i = 0; i < point.size(); ++i)
     if (!(point[i] <= 0 && gradient[i] > 0) && !(point[i] >= 1 && gradient[i] < 0)) free.push_back(i);
   Eigen::MatrixXd a = normal(free, free);
-  // a diagonal of its own for parameters without any slope
+  // A small constant keeps the matrix regular for parameters without slope.
   a.diagonal() += damping * a.diagonal() + Eigen::VectorXd::Constant(a.rows(), 1e-12 * normal.trace() + 1e-300);
   const Eigen::VectorXd step = a.ldlt().solve(gradient(free));
   Eigen::VectorXd next = point;
@@ -38,7 +39,7 @@ Eigen::MatrixXd first_steps(Eigen::Index size) { return kDifference * Eigen::Mat
 
 Eigen::MatrixXd steps_along(const Eigen::MatrixXd& slopes, const Eigen::VectorXd& point, double noise) {
   Eigen::MatrixXd steps = first_steps(point.size());
-  std::vector<Eigen::Index> inner;  // those at a bound keep a step of their own: it is one-sided
+  std::vector<Eigen::Index> inner;  // parameters at a bound keep their own, one-sided step
   for (Eigen::Index i = 0; i < point.size(); ++i)
     if (point[i] >= kDifference && point[i] <= 1 - kDifference) inner.push_back(i);
   if (inner.empty()) return steps;
@@ -78,11 +79,11 @@ LeastSquares minimise(const Residuals& residuals, const Eigen::VectorXd& start,
                       const std::function<bool(const LeastSquares&)>& more) {
   Eigen::VectorXd r = residuals({start}).front();
   LeastSquares best{start, cost_of(r), 0, 1};
-  const double enough = kLeastCost * best.cost;
+  const double enough = kMinCost * best.cost;
   double damping = 1e-3;
   Eigen::MatrixXd steps = first_steps(start.size());
   int without_gain = 0;
-  while (best.cost > enough && best.iterations < kMostIterations && without_gain < 2 && (!more || more(best))) {
+  while (best.cost > enough && best.iterations < kMaxIterations && without_gain < 2 && (!more || more(best))) {
     ++best.iterations;
     const Eigen::MatrixXd j = jacobian(residuals, best.point, steps);
     best.evaluations += 2 * static_cast<std::size_t>(start.size());
@@ -99,7 +100,7 @@ LeastSquares minimise(const Residuals& residuals, const Eigen::VectorXd& start,
     for (std::size_t i = 1; i < tried.size(); ++i)
       if (cost_of(tried[i]) < cost_of(tried[lowest])) lowest = i;
     const double cost = cost_of(tried[lowest]);
-    without_gain = cost < best.cost * (1 - kLeastGain) ? 0 : without_gain + 1;
+    without_gain = cost < best.cost * (1 - kMinGain) ? 0 : without_gain + 1;
     damping = std::clamp(damping * (lowest == 0 ? 0.1 : factors[lowest]), 1e-9, 1e6);
     if (!(cost < best.cost)) {
       damping = std::min(damping * 100, 1e6);

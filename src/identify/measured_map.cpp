@@ -14,7 +14,7 @@ using Names = std::vector<std::string>;
 
 std::string unit_of(const std::string& name) { return name.substr(name.rfind('_') + 1); }
 
-/// The column that differs from `wrong` in nothing but its unit, whatever that of `wrong` is; empty when there is none.
+/// The known column that differs from `wrong` in its unit only; empty when there is none.
 std::string but_for_its_unit(const std::string& wrong, const Names& known) {
   static const std::set<std::string> kUnits = {"V", "N", "Nm", "rad", "s"};
   const std::string stem = wrong.substr(0, wrong.size() - unit_of(wrong).size());
@@ -68,7 +68,8 @@ MeasuredMap map_of(const io::CsvTable& table, const model::Driver& driver) {
 }  // namespace
 
 void check_columns(const io::CsvTable& table, const Names& required, const Names& optional) {
-  // unknown ones first: a column in a wrong unit is both unknown and missing, and the unit is what is wrong
+  // Report unknown columns first: a column in a wrong unit is both unknown and missing, and the message must name the
+  // unit.
   Names known = required;
   known.insert(known.end(), optional.begin(), optional.end());
   for (const std::string& name : table.names) {

@@ -10,7 +10,7 @@
 namespace flappy::identify {
 namespace {
 
-constexpr double kSignificant = 4;  // standard deviations of a slope; twice as many where its sign is less sure
+constexpr double kSignificant = 4;  // standard deviations of a slope; twice as many for less reliable signs
 constexpr double kNoise = 6;        // standard deviations of a value
 constexpr const char* kFlipped = "likely a flipped axis";
 constexpr const char* kAccepted = "; accepted: frame B, x forward, y left, z up";
@@ -18,7 +18,7 @@ constexpr const char* kAccepted = "; accepted: frame B, x forward, y left, z up"
 struct Answer {
   std::size_t input, channel;
   const char* what;
-  double least;  ///< how steep the opposite must be, of the vehicle's
+  double least;  ///< least steepness of an opposite slope, relative to the vehicle's
 };
 constexpr std::array<Answer, 6> kAnswers{{{0, 2, "thrust", 0},
                                           {1, 3, "roll", 0},
@@ -29,7 +29,8 @@ constexpr std::array<Answer, 6> kAnswers{{{0, 2, "thrust", 0},
 
 bool clear(const Slope& slope, double times = 1) { return std::abs(slope.value) > times * kSignificant * slope.sd; }
 
-/// Beyond what noise does to a value of that channel; where none is declared, to a fiftieth of all forces or torques.
+/// Largest plausible noise of a value: kNoise standard deviations. Without declared sd, a standard deviation is 1/50 of
+/// the rms of all forces or torques.
 double noise(const MeasuredMap& map, std::size_t row, std::size_t channel) {
   constexpr double kUndeclared = 0.02;
   return kNoise * (map.sd.empty() ? kUndeclared * group_rms(map.wrenches)[is_force(static_cast<int>(channel)) ? 0 : 1]
@@ -41,7 +42,8 @@ double noise(const MeasuredMap& map, std::size_t row, std::size_t channel) {
                        "; " + kFlipped + kAccepted);
 }
 
-/// Refuses two rows that differ in the answer's input alone and contradict the vehicle; whether there were any that could.
+/// InputError where two rows differ in the answer's input alone and contradict the vehicle. Returns whether any pair
+/// could be tested.
 bool check_pairs(const MeasuredMap& map, const std::vector<Wrench>& simulated, const Answer& a) {
   double most = 0;
   for (const Wrench& w : simulated) most = std::max(most, std::abs(w[a.channel]));
@@ -64,7 +66,7 @@ bool check_pairs(const MeasuredMap& map, const std::vector<Wrench>& simulated, c
   return any;
 }
 
-/// Refuses a row whose thrust pulls down where the vehicle's lifts.
+/// InputError for a row whose thrust points down although the vehicle's points up.
 void check_thrust(const MeasuredMap& map, const std::vector<Wrench>& simulated) {
   double most = 0;
   for (const Wrench& w : simulated) most = std::max(most, w[2]);
@@ -74,9 +76,9 @@ void check_thrust(const MeasuredMap& map, const std::vector<Wrench>& simulated) 
       refuse(map, i, 2, "thrust is " + in_short(is) + ", the vehicle's " + in_short(expected));
 }
 
-/// Refuses a row whose torque is opposite to the vehicle's plus the map's own offset, out of all proportion to other rows.
+/// InputError for a row whose torque is opposite to the vehicle's plus the map's offset and an outlier among the rows.
 void check_rows(const MeasuredMap& map, const std::vector<Wrench>& simulated, const Answer& a) {
-  constexpr std::size_t kFewest = 9;  // for an offset and a scatter that one row cannot move far
+  constexpr std::size_t kFewest = 9;  // least number of rows for a robust offset and scatter
   constexpr double kScatter = 8 * 1.4826;
   if (map.size() < kFewest) return;
   std::vector<double> differences;
@@ -120,7 +122,7 @@ std::array<std::array<Slope, kChannels>, 4> slopes(const std::vector<sim::Input>
   design.col(0).setOnes();
   for (Eigen::Index k = 1; k < columns; ++k) design.col(k) = all.col(varied[static_cast<std::size_t>(k - 1)]);
   const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(design);
-  if (solver.rank() < columns) return result;  // inputs that only ever move together
+  if (solver.rank() < columns) return result;  // inputs that always change together
   const Eigen::MatrixXd inverse = (design.transpose() * design).inverse();
   for (std::size_t c = 0; c < kChannels; ++c) {
     Eigen::VectorXd y(n);
@@ -143,7 +145,7 @@ std::vector<std::string> check_signs(const MeasuredMap& measured, const std::vec
       if (!check_pairs(measured, simulated, a) && a.channel != 2) unchecked.push_back(channel_names()[a.channel]);
       continue;
     }
-    // a torque that answers in another column's place, where the vehicle's does not answer at all
+    // Swapped columns: another torque responds to this input, although in the vehicle it does not.
     std::string elsewhere;
     for (const Answer& b : kAnswers) {
       const double ratio = m[a.input][b.channel].value / expected.value;

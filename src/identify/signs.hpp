@@ -1,12 +1,12 @@
-// Whether a measured map has its axes as the vehicle's: what answers an input with the opposite sign, beyond noise and
-// beyond what a wrong model can do, is a mistake of the table and no property of a robot.
+// Checks whether a measured map uses the axes of the vehicle. A channel that responds to an input with the opposite sign, beyond noise
+// and beyond the error of any model, is a mistake of the table and not a property of a robot.
 //
-//   - thrust, roll, pitch and yaw answer amplitude, difference, bias and split cycle. Force x answers bias and force y
-//     difference, less surely: their opposite must be half as steep as the vehicle's answer, and twice as clear. Slopes
-//     are over all rows; where rows are too few for them, between any two that differ in that input alone;
-//   - a single row: thrust against its own sign; a torque against the vehicle's plus the offset of the whole map, where it
-//     stands out of what the other rows leave. Force x and y of single rows have no reliable sign: asymmetry of the wings
-//     moves them more than any input does.
+//   - Slopes: thrust, roll, pitch and yaw respond to amplitude, difference, bias and split cycle. Force x responds to bias and force y
+//     to difference, less reliably: an opposite slope counts only if it is half as steep as the vehicle's and twice as significant.
+//     Slopes are fitted over all rows; where rows are too few, pairs of rows that differ in one input alone are compared.
+//   - Single rows: thrust must not be opposite to the vehicle's; a torque must not be opposite to the vehicle's plus the offset of the
+//     whole map while it is an outlier among the rows. Force x and y of single rows are not checked, because an asymmetry of the wings
+//     changes them more than any input does.
 #pragma once
 
 #include <string>
@@ -16,7 +16,7 @@
 
 namespace flappy::identify {
 
-/// Slope of a channel against an input, the other inputs held.
+/// Slope of a channel against an input while the other inputs are constant.
 struct Slope {
   double value = 0, sd = 0;
 };
@@ -25,8 +25,8 @@ struct Slope {
 std::array<std::array<Slope, kChannels>, 4> slopes(const std::vector<sim::Input>& inputs,
                                                    const std::vector<Wrench>& wrenches);
 
-/// InputError "file:line: column: ..." for a sign that the simulated map contradicts, or a torque that answers in another's
-/// place. Returns the columns whose sign these inputs do not tell.
+/// InputError "file:line: column: ..." for a sign that the simulated map contradicts and for swapped torque columns.
+/// Returns the columns whose sign these inputs do not determine.
 std::vector<std::string> check_signs(const MeasuredMap& measured, const std::vector<Wrench>& simulated);
 
 }  // namespace flappy::identify

@@ -15,14 +15,15 @@
 namespace flappy::identify {
 namespace {
 
-/// Beats until wings at rest have come into phase.
+/// Beats of spin-up, after which wings that started at rest are in phase.
 constexpr double kSpinUpBeats = 3;
-/// Of what a logged stroke is off, taken back once in each interval of the IMU: a quarter of its noise remains.
+/// Share of the deviation from a logged stroke that is corrected in each interval of the IMU; a quarter of the logged
+/// noise remains.
 constexpr double kStrokeShare = 0.1;
-constexpr double kLeastChords = 5;
-/// Innovations of the smoother, over what the declared noise predicts, in standard deviations.
+constexpr double kMinChords = 5;  ///< least height above the ground, in mean chords
+/// Largest accepted rms innovation or bias of the smoother, in units of the declared noise.
 constexpr double kLargestInnovation = 5;
-/// Commands that come later than this many of their usual intervals were lost.
+/// A longer interval between commands, in median intervals, means that commands were lost.
 constexpr double kLongestHold = 5;
 
 StateVector state_vector(const sim::FlapperState& s) {
@@ -42,7 +43,7 @@ StateVector state_vector(const sim::FlapperState& s) {
           r[2]};
 }
 
-/// Angles the shorter way round.
+/// a - b, angles the shorter way round.
 StateVector difference(const StateVector& a, const StateVector& b) {
   StateVector d;
   for (std::size_t k = 0; k < d.size(); ++k) {
@@ -52,11 +53,11 @@ StateVector difference(const StateVector& a, const StateVector& b) {
   return d;
 }
 
-/// A state whose body rate is the mean since another.
+/// The state `x` with the mean body rate since the state `before`.
 sim::FlapperState with_mean_rate(const sim::FlapperState& before, sim::FlapperState x, double interval_s) {
   const auto of = [](const double* q) { return Eigen::Quaterniond(q[0], q[1], q[2], q[3]); };
   const Eigen::Quaterniond turn = of(before.attitude).conjugate() * of(x.attitude);
-  // of a turn of 0.1 rad, exact to 4e-4
+  // Small-angle formula: for a turn of 0.1 rad, exact to 4e-4.
   for (int k = 0; k < 3; ++k) x.body_rate_rad_s[k] = std::copysign(2 / interval_s, turn.w()) * turn.vec()[k];
   return x;
 }
@@ -66,18 +67,18 @@ std::string in_ms(const std::array<double, 2>& window_s) {
   return ms(window_s[0]) + " and " + ms(window_s[1]) + " ms";
 }
 
-/// Largest angle, rate and so on that a sensor's noise would add to the range of a state at rest.
+/// Standard deviation of each state from the sensors' noise: the least range of a state.
 StateVector noise_of(const flightlog::FlightHeader& h) {
   const double x = h.mocap.position_noise_m, angle = h.mocap.attitude_noise_rad, rate = h.imu.gyro_noise_rad_s;
-  // what the accelerometer's noise adds to a velocity within a beat
+  // Noise of a velocity that the accelerometer's noise integrates to within a beat.
   const double v = h.imu.accel_noise_m_s2 / std::sqrt(h.imu.rate_hz * h.flapping_Hz);
   return {x, x, x, angle, angle, angle, v, v, v, rate, rate, rate};
 }
 
-/// The full state of a simulated flight.
+/// truth.csv: the full state of a simulated flight.
 class Truth {
  public:
-  /// InputError for rows that do not come at equal intervals of whole steps.
+  /// InputError for rows that are not at equal intervals of whole steps.
   explicit Truth(const std::filesystem::path& folder) : table_(io::read_csv(folder / flightlog::log_file::kTruth)) {
     const auto& t = t_s();
     if (t.size() < 2)
@@ -148,14 +149,14 @@ struct Transitions::Flight {
     vehicle.air_density_kg_m3 = log.header.ambient.air_density_kg_m3;
   }
 
-  /// Where states are known best: the ends of the IMU's intervals, or the rows of truth.csv.
+  /// Spacing of the instants at which states are known best: intervals of the IMU, or rows of truth.csv.
   double grid_s() const { return truth ? truth->interval_s() : imu_interval_s; }
   int grid_steps() const { return std::max(1, static_cast<int>(std::lround(grid_s() / sim::kDefaultStep_s))); }
-  /// Steps of so many beats, on the grid.
+  /// Number of steps of `beats` beats, rounded to the grid.
   int beat_steps(double beats) const {
     return std::max(1, static_cast<int>(std::lround(beats * beat_s / grid_s()))) * grid_steps();
   }
-  /// One and two beats on the grid.
+  /// Length of one and of two beats, rounded to the grid.
   std::array<double, 2> window_s() const {
     return {beat_steps(1) * sim::kDefaultStep_s, beat_steps(2) * sim::kDefaultStep_s};
   }
@@ -176,7 +177,7 @@ struct Transitions::Flight {
     return x;
   }
 
-  /// Which of the poses a replay can start from.
+  /// Selects the poses from which a replay can start.
   void choose_starts() {
     std::vector<double> holds;
     for (std::size_t i = 1; i < voltages.t_s.size(); ++i) holds.push_back(voltages.t_s[i] - voltages.t_s[i - 1]);
@@ -191,8 +192,7 @@ struct Transitions::Flight {
     };
     const double before_s = kSpinUpBeats * beat_s + grid_s(), after_s = 2 * beat_s + grid_s();
     const double least_z_m =
-        world.ground_z_m +
-        kLeastChords * (vehicle.left.planform.mean_chord_m + vehicle.right.planform.mean_chord_m) / 2;
+        world.ground_z_m + kMinChords * (vehicle.left.planform.mean_chord_m + vehicle.right.planform.mean_chord_m) / 2;
     for (const double pose_s : track.pose_s()) {
       ++recorded;
       const double t_s = truth ? truth->t_s()[truth->row_near(pose_s)] : track.imu_bound_s(pose_s);
@@ -204,7 +204,7 @@ struct Transitions::Flight {
     }
   }
 
-  /// Of each state within the beat from a start.
+  /// Range of each state within the beat that follows a start.
   StateVector range(double start_s) const {
     constexpr int kLooks = 30;
     StateVector least{}, most{};
@@ -274,7 +274,7 @@ TransitionReport Transitions::run() const {
       windows.push_back({f->starts_s[index - before], &f->vehicle, &f->voltages});
     }
     before += f->starts_s.size();
-    // the body rate is compared as a gyro sees it: its mean over one interval
+    // The body rate is compared as a gyro measures it: the mean over one interval.
     const int ends[2] = {f->beat_steps(1), f->beat_steps(2)}, interval = f->grid_steps();
     const std::vector<int> checkpoints = {ends[0] - interval, ends[0], ends[1] - interval, ends[1]};
     sim::ReplayOptions o;

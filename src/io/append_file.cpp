@@ -42,7 +42,7 @@ void AppendFile::write(std::string_view text) {
 }
 
 void AppendFile::sync() {
-  // a pipe or a device has no disk
+  // pipes and devices cannot be synchronised
   if (fsync(descriptor_) != 0 && errno != EINVAL && errno != EROFS) refuse(errno);
 }
 
@@ -58,7 +58,7 @@ FolderLock::FolderLock(const std::filesystem::path& folder)
   };
   if (descriptor_ < 0) refuse("cannot be read: " + std::generic_category().message(errno));
   if (flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
-    // a file system without locks: then there is none
+    // other errors mean a file system without locks: go on without one
     if (errno == EWOULDBLOCK) refuse("another process is at work here; accepted: wait for it, or another folder");
   }
   static const std::regex temporary(R"(.+\.tmp\d+-\d+)");

@@ -1,4 +1,4 @@
-// A file that grows record by record, and one process at a time in a folder.
+// Files that grow record by record, and locks that give one process a folder for itself.
 #pragma once
 
 #include <cstdint>
@@ -7,18 +7,17 @@
 
 namespace flappy::io {
 
-/// Every write() is whole or not there. InputError, naming the file, when it cannot be written.
+/// A write() appears in the file completely or not at all. Throws InputError, which names the file, where it cannot be written.
 class AppendFile {
  public:
-  /// Goes on after the first `keep` bytes; what was behind them is cut off.
+  /// Keeps the first `keep` bytes of the file, cuts off the rest, and appends from there.
   explicit AppendFile(std::filesystem::path path, std::uint64_t keep = 0);
   ~AppendFile();
   AppendFile(const AppendFile&) = delete;
   AppendFile& operator=(const AppendFile&) = delete;
 
-  /// Handed to the system when it returns.
+  /// Hands the text to the operating system; sync() brings it onto the disk.
   void write(std::string_view text);
-  /// Onto the disk.
   void sync();
 
  private:
@@ -29,8 +28,8 @@ class AppendFile {
   std::uint64_t size_;
 };
 
-/// Takes a folder for this process alone, until the object or the process ends, and removes what a killed process left
-/// half written in it (AtomicFile). InputError when another process has the folder.
+/// Locks a folder for this process until the object or the process ends, and removes temporary files that a killed process left in it
+/// (AtomicFile). Throws InputError where another process has locked the folder. Has no effect on file systems without locks.
 class FolderLock {
  public:
   explicit FolderLock(const std::filesystem::path& folder);

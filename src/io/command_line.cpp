@@ -53,7 +53,7 @@ bool Option::given() const { return option_->count() > 0; }
 template <class T>
 Option Command::option(const std::string& name, T& value, const std::string& help) const {
   CLI::Option* const option = app_->add_option(name, value, help);
-  if constexpr (std::is_unsigned_v<T>)  // which CLI11 takes -1 for, too
+  if constexpr (std::is_unsigned_v<T>)  // CLI11 would accept -1
     option->check([](const std::string& text) {
       return text.find('-') == std::string::npos ? "" : "Value " + text + " is below 0";
     });

@@ -1,4 +1,4 @@
-// Options and commands of a program. CLI11 parses them; it stands behind this wall because its templates take seconds in every
+// Options and commands of a program, parsed by CLI11. CLI11 is hidden behind this header because its templates take seconds to compile in every
 // file that includes them.
 #pragma once
 
@@ -13,7 +13,7 @@ class Option;
 
 namespace flappy::io {
 
-/// An option, and what else is asked of it; each of these returns the option itself.
+/// An option. Its functions add conditions or display settings and return the option itself.
 class Option {
  public:
   Option() = default;
@@ -24,13 +24,13 @@ class Option {
   Option range(std::uint64_t low, std::uint64_t high) const;
   Option range(double low, double high) const;
   Option one_of(const std::vector<std::string>& accepted) const;
-  /// Its value before parsing is the default that --help shows.
+  /// Shows the variable's present value as the default in --help.
   Option shows_default() const;
   Option needs(Option other) const;
   Option excludes(Option other) const;
-  /// A list that takes one value each time it is given, so that what follows is left to others.
+  /// For a list: the option takes one value each time it is given, so that words after it go to other options.
   Option one_at_a_time() const;
-  /// A list that one value holds whole.
+  /// For a list: splits a value at `separator`.
   Option separated_by(char separator) const;
 
   bool given() const;
@@ -39,23 +39,23 @@ class Option {
   CLI::Option* option_ = nullptr;
 };
 
-/// A program's command line, or that of one of its commands.
+/// The command line of a program or of one of its commands.
 class Command {
  public:
   explicit Command(CLI::App* app) : app_(app) {}
 
-  /// T: int, unsigned, std::uint64_t, double, std::string, std::filesystem::path, or a vector of strings, doubles or paths. A name without dashes
-  /// is a place on the command line.
+  /// T: int, unsigned, std::uint64_t, double, std::string, std::filesystem::path, or a vector of strings, doubles or
+  /// paths. A name without dashes makes a positional argument.
   template <class T>
   Option option(const std::string& name, T& value, const std::string& help) const;
-  /// "!--name" clears `value`.
+  /// A name of the form "!--name" sets `value` to false.
   Option flag(const std::string& name, bool& value, const std::string& help) const;
-  /// A flag that --help does not show: where it is given, InputError says its new name.
+  /// Accepts the old name of a flag, hidden from --help, and throws InputError with its new name.
   void renamed_flag(const std::string& name, const std::string& now) const;
   Command command(const std::string& name, const std::string& help) const;
-  /// A command that --help does not show, with any arguments: what a name of old is met with.
+  /// A command hidden from --help that takes any arguments, to report the new name of a renamed command.
   Command hidden_command(const std::string& name) const;
-  /// From `least` to `most` of its commands are to be given.
+  /// Requires from `least` to `most` commands.
   void expect_commands(std::size_t least, std::size_t most) const;
 
   bool given() const;

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "io/renamed_keys.hpp"
 #include "io/schema.hpp"
 #include "io/toml.hpp"
 #include "io/toml_writer.hpp"
@@ -14,7 +15,7 @@
 namespace flappy::io {
 namespace detail {
 
-/// One table and the keys that the reader asked it for.
+/// A table and the keys of it that the reader asked for.
 struct Section {
   Document* document;
   toml::table* table;
@@ -40,7 +41,7 @@ using detail::Document;
 using detail::Section;
 
 constexpr std::size_t kMaxBytes = 1 << 20;  // toml++ takes quadratic time for some files
-constexpr std::size_t kMaxDepth = 32;       // toml++ destroys what dotted keys nest recursively
+constexpr std::size_t kMaxDepth = 32;       // toml++ destroys tables that dotted keys nest recursively
 
 constexpr std::string_view kTooDeep = "tables and arrays nest too deeply";
 constexpr std::string_view kDepthAccepted = "at most 32 levels";
@@ -49,7 +50,7 @@ constexpr std::string_view kString = "a string";
 constexpr std::string_view kFile = "the name of a file";
 constexpr std::string_view kTable = "a table";
 
-/// What a reader asks for: a key of a section, its full path, and its value where there is one.
+/// A key that a reader asks for: its section, its full path, and its value, if any.
 struct Entry {
   Section* section;
   std::string_view key;  ///< below the section; dotted when tables on the way are missing
@@ -59,7 +60,7 @@ struct Entry {
 
 std::string element_of(const std::string& path, std::size_t index) { return path + "[" + std::to_string(index) + "]"; }
 
-/// `file:line:column`; an override is its own place, and a default has only the file.
+/// `file:line:column`; for an override the override itself; for a default only the file.
 std::string place(const toml::source_region& source, const std::string& file) {
   if (!source.path || !source.begin) return file;
   if (*source.path != file) return *source.path;
@@ -106,6 +107,8 @@ std::string kind(const toml::node& node) {
   const std::string where = place(key.source(), section.document->name);
   const std::string path = toml_path(section.path, key.str());
   const std::vector<std::string> names(known.begin(), known.end());
+  if (const char* now = new_name(key.str()))
+    refuse(where, path, "unknown key: it was renamed; accepted here: " + toml_string(now), "");
   const std::string same = in_another_unit(key.str(), names);
   if (!same.empty()) refuse(where, path, "unknown key; accepted here with another unit: " + toml_string(same), "");
   refuse(where, path, "unknown key", (names.empty() ? "no key here" : joined(names)) + did_you_mean(key.str(), names));
@@ -118,6 +121,9 @@ std::string kind(const toml::node& node) {
   for (const auto& [key, node] : *section.table) {
     if (!section.asked.contains(key.str())) unasked.emplace_back(key.str());
   }
+  for (const std::string& key : unasked)
+    if (const char* now = new_name(key); now && now == name)
+      refuse_unknown(section, section.table->find(key)->first, section.asked);
   const std::string same = in_another_unit(name, unasked);
   if (!same.empty()) refuse_unknown(section, section.table->find(same)->first, section.asked);
   const std::string typo = nearest_name(name, unasked);
@@ -147,7 +153,7 @@ Section& section_of(const Entry& entry) {
 /// Marks the key, and the tables on the way to it, as asked for.
 Entry find(Section& top, std::string_view key) {
   for (Section* section = &top;;) {
-    // A key that the user quoted may hold dots itself.
+    // A key that the user quoted may itself contain dots.
     const std::size_t dot = section->table->contains(key) ? std::string_view::npos : key.find('.');
     const std::string_view name = key.substr(0, dot);
     if (!section->accepted.empty() && !section->accepted.contains(name))
@@ -170,7 +176,7 @@ Entry find_required(Section& top, std::string_view key, std::string_view accepte
   return entry;
 }
 
-/// Keeps a default for Config::resolved().
+/// Writes a default into the table, for Config::resolved().
 template <class T>
 void write_default(const Entry& entry, T value) {
   toml::table* table = entry.section->table;
@@ -264,7 +270,7 @@ std::vector<double> to_row(const Entry& entry, std::size_t length, const Range& 
   return values;
 }
 
-/// Index of the last character of the string that begins there, or of its line when it is not closed.
+/// Index of the last character of the string that begins at `begin`, or of its line where the string is not closed.
 std::size_t end_of_string(std::string_view text, std::size_t begin) {
   const char mark = text[begin];
   const std::string three(3, mark);
@@ -282,8 +288,8 @@ std::size_t end_of_string(std::string_view text, std::size_t begin) {
   return text.size();
 }
 
-/// Where brackets or dotted keys nest too deeply, if anywhere. Asked before toml++ builds, and on an error
-/// destroys, what they nest.
+/// The position where brackets or dotted keys nest too deeply, if any. Checked before toml++ parses, which builds and, on an error,
+/// destroys the nested tables recursively.
 std::optional<std::size_t> find_too_deep(std::string_view text) {
   std::size_t brackets = 0, dots = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -317,7 +323,7 @@ std::size_t depth(const toml::node& node) {
   return deepest + 1;
 }
 
-/// `source` is the file or an override, and is kept with every value as its place.
+/// `source` is the file or an override; toml++ keeps it with every value as its place.
 toml::table parse_toml(std::string_view text, const std::string& source, const std::string& file) {
   if (const auto deep = find_too_deep(text)) {
     const std::string_view before = text.substr(0, *deep);
@@ -337,7 +343,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(begin, text.find_last_not_of(" \t") + 1 - begin);
 }
 
-/// The table that holds nothing but the override "a.b.c=value".
+/// A table that contains only the override "a.b.c=value".
 toml::table parse_override(std::string_view text, const std::string& file) {
   const std::string source = "--set " + std::string(text);
   const std::size_t equals = std::min(text.find('='), text.size());
@@ -365,7 +371,7 @@ void merge(toml::table& into, toml::table& from, const std::string& source, cons
     auto* old = into.get(key.str());
     const std::string here = toml_path(path, key.str());
     if (!old || !branch || branch->is_inline()) {
-      into.erase(key.str());  // or the old key's place would stay
+      into.erase(key.str());  // otherwise the old key's place would stay
       into.insert(key, std::move(node));
     } else if (auto* below = old->as_table()) {
       merge(*below, *branch, source, here);

@@ -1,11 +1,10 @@
-// Typed reading of TOML. Every fault is an InputError that says where it is, what is wrong and what is
-// accepted:
+// Typed reading of TOML. Every fault is an InputError that gives the place, the fault and the accepted values:
 //
 //   v.toml:3:11: torso.mass_kg: -0.01 is out of range; accepted: a number above 0, at most 1
 //
-// Keys are dotted paths below the table they are asked of. A reader may first accept() the keys it knows, which refuses
-// the rest before anything that is missing or contradicts. It asks for every key, then calls finish(), which refuses what
-// nobody asked for.
+// Keys are dotted paths relative to a table. A reader may first call accept() with the keys it knows: then an unknown key is reported
+// before a missing or contradictory one. It reads every key, then calls finish(), which refuses the keys that
+// were not read.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +25,7 @@ struct Document;
 struct Section;
 }  // namespace detail
 
-/// Finite numbers from low to high; `above_low` leaves low itself out.
+/// The finite numbers from low to high; `above_low` excludes low.
 struct Range {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
@@ -46,7 +45,7 @@ class Table {
   double number(std::string_view key, Range range = {}) const;
   double number_or(std::string_view key, double fallback, Range range = {}) const;
   std::int64_t integer(std::string_view key, std::int64_t low, std::int64_t high) const;
-  /// Requires the key schema, and this value of it.
+  /// Requires the key "schema" with the value `read`.
   void schema(std::int64_t read) const;
   std::int64_t integer_or(std::string_view key, std::int64_t fallback, std::int64_t low, std::int64_t high) const;
   bool boolean(std::string_view key) const;
@@ -57,31 +56,31 @@ class Table {
   std::string choice_or(std::string_view key, std::string_view fallback,
                         const std::vector<std::string>& accepted) const;
   std::vector<double> numbers(std::string_view key, Range each = {}) const;
-  /// Exactly `length` numbers.
+  /// Requires exactly `length` numbers.
   std::vector<double> numbers(std::string_view key, std::size_t length, Range each = {}) const;
-  /// Any number of arrays of exactly `width` numbers.
+  /// Reads any number of arrays of exactly `width` numbers.
   std::vector<std::vector<double>> rows(std::string_view key, std::size_t width, Range each = {}) const;
   std::vector<std::string> strings(std::string_view key) const;
-  /// A file name; a relative one starts at the folder of the configuration file. The file need not exist.
+  /// A file name; a relative name is relative to the folder of the configuration file. The file need not exist.
   std::filesystem::path file(std::string_view key) const;
 
   Table table(std::string_view key) const;
   std::optional<Table> optional_table(std::string_view key) const;
-  /// The tables of an array of tables; none when it is missing.
+  /// The tables of an array of tables; empty where it is missing.
   std::vector<Table> tables(std::string_view key) const;
 
-  /// Refuses every other key of this table (not of those below), before a missing key that it may be a misspelling of. It
-  /// is a fault of the reader to ask for a key that is not among these.
+  /// Refuses every other key of this table (not of tables below), so that a misspelt key is reported before the missing
+  /// key that was meant. A reader that then asks for a key not among `names` has a bug.
   void accept(const std::vector<std::string>& names) const;
-  /// Whether a key is present; it counts as asked for.
+  /// Whether a key is present; counts as reading it.
   bool has(std::string_view key) const;
   /// Names of the keys present, sorted.
   std::vector<std::string> keys() const;
   /// Full dotted path of this table; empty for the root.
   std::string path() const;
-  /// Reports the caller's own fault at a key, or at this table when `key` is empty.
+  /// Throws an InputError of the caller's choice about a key, or about this table where `key` is empty.
   [[noreturn]] void fail(std::string_view key, std::string_view what, std::string_view accepted) const;
-  /// Refuses every key, here and in the tables below, that nobody asked for.
+  /// Refuses every key, in this table and in tables below, that was not read.
   void finish() const;
 
  private:
@@ -98,14 +97,14 @@ class Config {
   /// which is taken as a string. They replace values and create tables; an element of an array cannot be
   /// overridden.
   static Config load(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
-  /// Reads text; `name` stands for the file in messages, and its folder is where relative file names start.
+  /// Reads text. `name` is the file name for messages; relative file names start at its folder.
   static Config parse(std::string_view text, const std::string& name, const std::vector<std::string>& overrides = {});
 
   Table root() const;
-  /// TOML text of everything, overrides applied and defaults filled in; it reads identically when parsed
-  /// under the same name. Relative file names stay as written.
+  /// The whole configuration as TOML text, with overrides and defaults. Parsed under the same name, it reads
+  /// identically. Relative file names stay as written.
   std::string resolved() const;
-  /// The same without a table of the root, which is no part of what is done.
+  /// resolved() without one table of the root, for a table that has no influence on results.
   std::string resolved_without(std::string_view table) const;
 
  private:

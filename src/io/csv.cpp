@@ -12,7 +12,7 @@ namespace {
 
 struct Cell {
   std::string_view text;
-  std::size_t column;  ///< of its first character, from 1
+  std::size_t column;  ///< column of the first character, counted from 1
 };
 
 struct Line {

@@ -12,30 +12,30 @@
 namespace flappy::io {
 
 struct CsvTable {
-  std::string name;  ///< the file, for messages
+  std::string name;  ///< file name, for messages
   std::vector<std::string> names;
-  std::vector<std::vector<double>> columns;  ///< one for each name, all of one length, finite
+  std::vector<std::vector<double>> columns;  ///< [name][row], finite
 
-  /// InputError when there is no such column.
+  /// Throws InputError where there is no such column.
   const std::vector<double>& column(std::string_view column_name) const;
 };
 
-/// Reads a file of finite numbers. Spaces around a cell, CRLF and a missing last newline are accepted;
-/// anything else that is not a plain table is an InputError with file, line and character column.
+/// Reads a file of finite numbers. Accepts spaces around a cell, CRLF and a missing last newline;
+/// throws InputError, with file, line and column of the character, for anything else that is not a plain table.
 CsvTable read_csv(const std::filesystem::path& path);
 
-/// The same from text; `name` stands for the file in messages.
+/// read_csv() for text; `name` is the file name for messages.
 CsvTable parse_csv(std::string_view text, const std::string& name);
 
-/// The text that reads back to the same table. std::invalid_argument unless all columns have one length.
+/// Text that parse_csv() reads as the same table. Throws std::invalid_argument unless all columns have the same length.
 std::string csv_text(const std::vector<std::string>& names, const std::vector<std::vector<double>>& columns);
 
-/// Writes rows in the shortest digits that read back to the same doubles. The file appears on close().
+/// Writes rows with the shortest digits that read back as the same doubles. The file appears on close().
 class CsvWriter {
  public:
-  /// InputError when the file cannot be written.
+  /// Throws InputError where the file cannot be written.
   CsvWriter(const std::filesystem::path& path, const std::vector<std::string>& names);
-  /// One value for each column; std::invalid_argument for any other number of them.
+  /// Takes one value for each column; throws std::invalid_argument for any other number.
   void row(std::span<const double> values);
   /// Call it once, last; without it no file is left.
   void close();

@@ -6,16 +6,16 @@
 namespace flappy::io {
 namespace {
 
-constexpr std::size_t kMostPeers = 64;
+constexpr std::size_t kMaxPeers = 64;
 
-/// What ROS 2 accepts as part of a name.
+/// Whether ROS 2 accepts `text` as a part of a name.
 bool is_name(const std::string& text) {
   const auto letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; };
   return !text.empty() && text.size() <= 64 && letter(text[0]) &&
          std::ranges::all_of(text, [&](char c) { return letter(c) || (c >= '0' && c <= '9'); });
 }
 
-/// An address or the name of a machine: nothing that could mean more in the XML that it goes into.
+/// Whether `text` can be an address or host name; excludes characters with a meaning in the XML that contains it.
 bool is_address(const std::string& text) {
   return !text.empty() && text.size() <= 255 && std::ranges::all_of(text, [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '-' ||
@@ -38,7 +38,7 @@ DdsConfig read_dds_config(const Table& root) {
   c.reach = static_cast<Reach>(std::ranges::find(reaches, t.choice_or("reach", "loopback", reaches)) - reaches.begin());
   c.from_environment = t.choice_or("config", "own", {"own", "environment"}) == "environment";
   if (t.has("peers")) c.peers = t.strings("peers");
-  if (c.peers.size() > kMostPeers) t.fail("peers", "has too many", "at most " + std::to_string(kMostPeers));
+  if (c.peers.size() > kMaxPeers) t.fail("peers", "has too many", "at most " + std::to_string(kMaxPeers));
   for (const std::string& peer : c.peers)
     if (!is_address(peer)) t.fail("peers", "\"" + peer + "\" is no address", "addresses or names of machines");
   if (!c.peers.empty() && c.reach != Reach::network)
@@ -51,8 +51,8 @@ DdsConfig read_dds_config(const Table& root) {
       if (number != std::floor(number)) t.fail("watch", "is no list of whole numbers", "[0, 7]");
       c.watch.push_back(static_cast<std::uint32_t>(number));
     }
-    if (c.watch.empty() || c.watch.size() > kMostWatched)
-      t.fail("watch", "has " + std::to_string(c.watch.size()) + " flappers", "1 to " + std::to_string(kMostWatched));
+    if (c.watch.empty() || c.watch.size() > kMaxWatched)
+      t.fail("watch", "has " + std::to_string(c.watch.size()) + " flappers", "1 to " + std::to_string(kMaxWatched));
   }
   c.pace = t.number_or("pace", c.pace, {0, 1000});
   c.commands = t.boolean_or("commands", false);

@@ -1,18 +1,18 @@
-// The table [dds] of a configuration: whether a program speaks to others over DDS, and to whom.
+// The table [dds] of a configuration: whether a program communicates over DDS, and with whom.
 //
 //   enabled = false
 //   domain = 0                  ROS_DOMAIN_ID
-//   reach = "loopback"          who finds us: "loopback" (those that look on this machine alone), "host" (whoever is on this
-//                               machine, however it looks), "network"
-//   peers = ["192.0.2.7"]       machines that are asked by address, where multicast does not reach; reach = "network" alone
-//   config = "own"              or "environment": CYCLONEDDS_URI alone says how
-//   namespace = "flappy"        /flappy/pose and so on; of the second flapper that is watched, /flappy_1/pose
-//   watch = [0]                 numbers of the flappers that are shown
-//   pace = 1.0                  flappy-fly: times real time; 0: as fast as it flies
-//   commands = false            whether others may steer
-//   insecure = false            commands over a network from anybody; otherwise that takes `keys`
-//   keys = "folder"             of DDS Security: identity_ca.cert.pem, cert.pem, key.pem, permissions_ca.cert.pem, governance.p7s,
-//                               permissions.p7s, as an enclave of ROS 2 has them
+//   reach = "loopback"          who can discover us: "loopback" (programs of this machine that search the loopback interface), "host" (all
+//                               programs of this machine), "network"
+//   peers = ["192.0.2.7"]       machines to contact by address, where multicast does not reach them; only for reach = "network"
+//   config = "own"              or "environment": CYCLONEDDS_URI configures DDS
+//   namespace = "flappy"        gives /flappy/pose and so on; /flappy_1/pose for the second watched flapper
+//   watch = [0]                 numbers of the flappers that are published
+//   pace = 1.0                  for flappy-fly: simulated time over real time; 0: as fast as possible
+//   commands = false            whether commands from others are accepted
+//   insecure = false            whether to accept commands over a network without `keys`
+//   keys = "folder"             folder for DDS Security: identity_ca.cert.pem, cert.pem, key.pem, permissions_ca.cert.pem, governance.p7s,
+//                               permissions.p7s, like an enclave of ROS 2
 #pragma once
 
 #include <cstdint>
@@ -39,9 +39,9 @@ struct DdsConfig {
   std::filesystem::path keys;  ///< empty: no security
 };
 
-inline constexpr std::size_t kMostWatched = 64;
+inline constexpr std::size_t kMaxWatched = 64;
 
-/// Of the table `dds` of a configuration; as above where there is none. InputError for what is not accepted.
+/// Reads the table `dds`; defaults where it is missing. Throws InputError for values that are not accepted.
 DdsConfig read_dds_config(const Table& root);
 
 }  // namespace flappy::io

@@ -25,10 +25,10 @@ bool is_digit(char c) { return c >= '0' && c <= '9'; }
 std::size_t substitution_cost(char a, char b) {
   const auto lower = [](char c) { return std::tolower(static_cast<unsigned char>(c)); };
   if (lower(a) == lower(b)) return 0;
-  return is_digit(a) && is_digit(b) ? 3 : 1;  // r22 is no misspelling of r33
+  return is_digit(a) && is_digit(b) ? 3 : 1;  // digits cost more: r22 is not a misspelling of r33
 }
 
-/// Insertions, deletions, substitutions and swaps of neighbours that turn one word into the other.
+/// The cost of insertions, deletions, substitutions and swaps of neighbours that turn one word into the other.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) last[j] = j;
@@ -88,7 +88,7 @@ std::string nearest_name(std::string_view wrong, const std::vector<std::string>&
   std::size_t least = wrong.size();
   for (const auto& name : names) {
     const std::size_t allowed = std::max(name.size(), wrong.size()) / 4;
-    // Lengths first: they bound the work whatever the user wrote.
+    // Compare lengths first, which bounds the work whatever the user wrote.
     if (name.size() > wrong.size() + allowed || wrong.size() > name.size() + allowed) continue;
     const std::size_t distance = edit_distance(wrong, name);
     if (distance <= allowed && distance < least) {
@@ -173,7 +173,7 @@ void make_folder(const std::filesystem::path& folder) {
 void sync_folder(const std::filesystem::path& folder) {
   const int descriptor = open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) refuse_file(folder, "cannot be read", errno);
-  fsync(descriptor);  // some file systems refuse this of a folder: then they have done what they can
+  fsync(descriptor);  // some file systems refuse this for a folder; nothing more can be done there
   close(descriptor);
 }
 

@@ -9,7 +9,7 @@ namespace flappy::io {
 namespace fs = std::filesystem;
 namespace {
 
-/// configs/ beside the library that this code is linked into, as a Python package has it.
+/// configs/ next to the library that contains this code, where a Python package has it.
 fs::path beside_library() {
   Dl_info library;
   if (dladdr(reinterpret_cast<void*>(&beside_library), &library) == 0) return {};

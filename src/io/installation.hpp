@@ -1,4 +1,4 @@
-// Where a program finds what lies beside it: in a build and its source folder, or under the prefix of an installation.
+// Finds the files that belong to a program: in a build and its source folder, or under the prefix of an installation.
 #pragma once
 
 #include <filesystem>
@@ -6,14 +6,14 @@
 
 namespace flappy::io {
 
-/// `name` under the folder that holds the running program's bin/.
+/// The path of `name` below the parent folder of the running program's bin/.
 std::filesystem::path beside_program(const std::filesystem::path& name);
 
-/// The project's own configurations: the folder that the environment variable FLAPPY_CONFIGS names, else
-/// share/flappy/configs of an installation, else configs/ beside the library that holds this code, else that of the source folder.
+/// The folder of the project's configurations: the value of the environment variable FLAPPY_CONFIGS, else
+/// share/flappy/configs of an installation, else configs/ next to the library that holds this code, else that of the source folder.
 std::filesystem::path configs_folder();
 
-/// One of them, as "vehicles/hummingbird_nominal.toml".
+/// The path of one of these configurations, for example "vehicles/hummingbird_nominal.toml".
 std::string config_path(const std::string& name);
 
 }  // namespace flappy::io

@@ -1,5 +1,5 @@
-// What a program notes beside its results: on stderr from a level up, and in the log.txt of the folder that it leaves. The
-// lines there carry the time of day and are outside the determinism contract.
+// The log of a program: messages on stderr from a chosen level on, and in log.txt of its output folder. Lines of
+// log.txt carry the time of day and are outside the determinism contract.
 #pragma once
 
 #include <cstdint>
@@ -11,18 +11,18 @@ namespace flappy::io {
 
 enum class LogLevel { debug, info, warning, error };
 
-/// Once, before anything is noted: the least level that stderr shows (warning until then; log.txt has at least info), and
-/// what the first line of each log.txt says.
+/// Call it once, before anything is logged. `on_stderr`: lowest level that stderr shows (until then warning; log.txt has at least info).
+/// `heading`: first line of each log.txt.
 void start_log(LogLevel on_stderr, const std::string& heading);
-/// From now on `folder`/log.txt has it all, after what is in it. InputError when it cannot be written.
+/// From now on also appends all messages to `folder`/log.txt. Throws InputError where it cannot be written.
 void log_into(const std::filesystem::path& folder);
 
-/// "warning: text" on stderr, after a progress line is cleared.
+/// Logs "warning: text", for example; clears a visible progress line first.
 void log(LogLevel level, std::string_view text);
-/// The user's mistake or ours: the text alone on stderr.
+/// Logs an error of the user or of the program; stderr shows the text without its level.
 void log_error(std::string_view text);
 
-/// Says what happens often once a second at most, and how often it did.
+/// Logs frequent warnings at most once a second, with the number of those left out.
 class CalmLog {
  public:
   void warn(const std::string& line, double now_s);

@@ -1,4 +1,4 @@
-// The bytes of a large file, read where they are looked at.
+// A large file mapped into memory; the system reads a part of it when it is first accessed.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@ namespace flappy::io {
 
 class MappedFile {
  public:
-  /// InputError when it cannot be read.
+  /// Throws InputError where it cannot be read.
   explicit MappedFile(const std::filesystem::path& path);
   ~MappedFile();
   MappedFile(const MappedFile&) = delete;

@@ -1,5 +1,5 @@
-// A loop is tasks of OpenMP: its caller and those that help each work through a stretch of their own, then take from the others'. The caller
-// waits only for helpers that have begun, so one that is kept from its processor holds nobody up.
+// A loop runs as OpenMP tasks: the caller and each helper work through a stretch of jobs of their own, then take jobs from the other stretches. The
+// caller waits only for helpers that have begun, so a helper that gets no processor delays nobody.
 #include "io/parallel.hpp"
 
 #include <omp.h>
@@ -22,14 +22,14 @@
 namespace flappy::io {
 namespace {
 
-int sharing = 1;  // processes on this machine
+int sharing = 1;  // number of processes that share this machine
 
-/// Whether a thread of this process has a team.
+/// Set while a thread of this process has a team; there is at most one team.
 std::atomic_flag team_taken;
 enum class Place { outside, with_team, in_job };
 thread_local Place place = Place::outside;
 
-/// `place` as long as this lives.
+/// Sets `place` during its lifetime.
 class At {
  public:
   explicit At(Place now) : before_(std::exchange(place, now)) {}
@@ -42,7 +42,8 @@ class At {
 };
 
 struct Loop {
-  /// Jobs from `next` to `end`. Its thread takes them from the front, as do those that have finished their own.
+  /// Jobs from `next` to before `end`. Its own thread takes jobs from the front, and so do threads that have finished
+  /// their own stretch.
   struct alignas(64) Stretch {
     std::atomic<std::size_t> next;
     std::size_t end;
@@ -84,7 +85,7 @@ struct Loop {
   std::exception_ptr failed;
 };
 
-/// Shares a loop with the other threads of the region.
+/// Runs a loop jointly with the other threads of the parallel region.
 void share(Loop& loop) {
 #pragma omp taskgroup
   {
@@ -96,9 +97,9 @@ void share(Loop& loop) {
   }
 }
 
-/// GNU's threads look on for milliseconds before they sleep, which takes processors from others; for microseconds, where there are more of
-/// them than processors: this starts so many, asleep for good. (Its environment may have been read before us, as in Python.)
-/// https://gcc.gnu.org/onlinedocs/libgomp/GOMP_005fSPINCOUNT.html
+/// GNU's OpenMP threads spin for milliseconds before they sleep, which takes processors from other programs. They spin for microseconds only where
+/// there are more threads than processors, so this starts that many threads, which sleep forever. (Setting the environment variable might come too
+/// late, as in Python, where libgomp may have read it before.) https://gcc.gnu.org/onlinedocs/libgomp/GOMP_005fSPINCOUNT.html
 void let_waiting_threads_sleep() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -106,19 +107,19 @@ void let_waiting_threads_sleep() {
     std::thread([&] {
       std::atomic<int> team = 0;
 #pragma omp parallel num_threads(omp_get_num_procs() + 1) default(none) shared(team)
-      ++team;  // gcc starts no threads for nothing
+      ++team;  // without a body, gcc would start no threads
       started.count_down();
-      for (;;) pause();  // its team lives as long
+      for (;;) pause();  // the team lives as long as this thread
     }).detach();
     started.wait();
   });
 }
 
-/// A child has none of its parent's threads: they end before, and both begin anew.
+/// A forked child has no threads of its parent's team: end the team before the fork; parent and child start new ones.
 void before_fork() {
   if (place == Place::outside) omp_pause_resource_all(omp_pause_soft);
 }
-/// Another thread of the parent may have had its team.
+/// Clears the flag, because it may stand for the team of another thread of the parent, which the child does not have.
 void in_child() {
   if (place == Place::outside) team_taken.clear();
 }
@@ -130,10 +131,10 @@ int processors_of_group(const std::filesystem::path& membership, const std::file
   double least = 0;
   for (std::string line; std::getline(in, line);) {
     if (!line.starts_with("0::/")) continue;
-    // a limit of any folder above holds as well
+    // a limit of any parent group holds as well
     for (std::filesystem::path folder = line.substr(4);; folder = folder.parent_path()) {
       double quota = 0, period = 0;
-      if (std::ifstream(root / folder / "cpu.max") >> quota >> period && period > 0 && quota > 0)  // else it says "max"
+      if (std::ifstream(root / folder / "cpu.max") >> quota >> period && period > 0 && quota > 0)  // "max": no limit
         least = least > 0 ? std::min(least, quota / period) : quota / period;
       if (folder.empty()) break;
     }
@@ -149,7 +150,7 @@ int processors() {
   const int allowed = sched_getaffinity(0, sizeof mask, &mask) == 0
                           ? CPU_COUNT(&mask)
                           : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  // a launcher may have given each process a mask of its own, but they share machine and group
+  // even where a launcher gave each process an affinity mask of its own, they share the machine and the control group
   const auto share = [](int all) { return std::max(1, all / sharing); };
   const int own = std::min(allowed, share(static_cast<int>(std::max(1U, std::thread::hardware_concurrency()))));
   return of_group > 0 ? std::min(share(of_group), own) : own;

@@ -1,4 +1,4 @@
-// A part of the project that is opened when it is first asked for, as what it needs is slow to start.
+// Plugins: shared libraries that are loaded at first use, because their dependencies are slow to start.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@ namespace flappy::io {
 
 /// Whether this build or installation has the plugin lib/flappy/`name`.so.
 bool has_plugin(const std::string& name);
-/// What it exports under the name `symbol`; never unloaded. InputError: `missing` without the plugin, or what is wrong with it.
+/// The address that the plugin exports as `symbol`; it is never unloaded. Throws InputError: `missing` where there is no plugin, else the reason.
 const void* plugin_symbol(const std::string& name, const char* symbol, const std::string& missing);
 
 template <class Functions>

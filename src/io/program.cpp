@@ -18,12 +18,12 @@ namespace {
 
 constexpr std::array<const char*, 4> kLevels = {"debug", "info", "warning", "error"};  // in the order of LogLevel
 
-/// What is wrong with a command line, and what is accepted there.
+/// The fault of a command line, and what is accepted instead.
 std::string explained(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App* at = &app;
   while (!at->get_subcommands().empty()) at = at->get_subcommands().front();
   std::vector<std::string> unknown = app.remaining(true);
-  std::erase(unknown, "--");  // what follows is no option
+  std::erase(unknown, "--");  // words after it are not options
   if (std::string_view(error.what()).starts_with("A subcommand is required")) {
     std::vector<std::string> names;
     for (const CLI::App* each : at->get_subcommands([](const CLI::App* each) { return !each->get_group().empty(); }))

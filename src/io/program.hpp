@@ -1,4 +1,4 @@
-// What every program has: --version, --json FILE, --log-level, one line for each mistake of the user, exit codes.
+// Features that every program shares: --version, --json FILE, --progress FILE, --log-level, one line for each error of the user, exit codes.
 #pragma once
 
 #include <cstdint>
@@ -13,33 +13,35 @@
 
 namespace flappy::io {
 
-/// Commit this program was built from, with "-dirty" where the tree differed.
+/// The commit that this program was built from, with "-dirty" where the source tree had changes.
 std::string commit();
-/// A hash as results show it: 16 digits.
+/// A hash as 16 hexadecimal digits, as results show it.
 std::string hexadecimal(std::uint64_t value);
 
-/// What shows results that lie at `path`: a program's last words.
+/// The last line of a program's output: the command that shows the results at `path`.
 std::string shown_by(const std::string& path);
 
 class Program {
  public:
-  /// `facts`: further lines of --version, as "name value".
+  /// `facts`: additional lines of --version, each "name value".
   Program(const std::string& name, const std::string& description, const std::vector<std::string>& facts);
 
   ~Program();
 
   Command app() { return Command(app_.get()); }
-  /// Parses, then runs `job`. 0: done; 2: the user's mistake, one line on stderr; 1: ours.
+  /// Parses the command line, then runs `job`. Returns the exit code: 0 done; 2 error of the user, one line on stderr;
+  /// 1 fault of the program.
   int run(int argc, char** argv, const std::function<void()>& job);
-  /// Several ranks may run the program together: an option --allow-network, the first rank alone speaks, and threads are shared.
+  /// Allows several ranks to run the program jointly: adds --allow-network, lets only rank 0 print, and divides the
+  /// processors.
   void takes_ranks();
-  /// The ranks that run it, none for one: meets them where it is first called. They end together. `agreed` as meet() has it.
+  /// The ranks; null where there is only one process. The first call meets the other ranks, with `agreed` as in meet().
   Ranks* ranks(const std::string& agreed);
-  /// Whether this is the rank that writes what all of them found.
+  /// Whether this rank writes the common results.
   bool writes() const { return rank_.rank == 0; }
-  /// Writes `result` where --json asked for it; nothing otherwise.
+  /// Writes `result` to the file of --json; does nothing without that option.
   void write_json(const nlohmann::ordered_json& result) const;
-  /// The same, of results that flappy-report shows, which is said then.
+  /// write_json() for results that flappy-report shows; prints that command.
   void write_shown_json(const nlohmann::ordered_json& result) const;
 
  private:

@@ -17,12 +17,12 @@
 namespace flappy::io {
 namespace {
 
-constexpr std::size_t kPoints = 4;  // where the last three advances began and ended
+constexpr std::size_t kPoints = 4;  // beginning and ends of the last three advances
 
 volatile std::sig_atomic_t interrupted_flag = 0;
-ProgressLine* visible_line = nullptr;  // on the terminal
+ProgressLine* visible_line = nullptr;  // the line on the terminal, or null
 bool silent = false;
-std::filesystem::path progress_file;  // none where empty
+std::filesystem::path progress_file;  // empty: no file
 constexpr double kFileEvery_s = 1;
 
 /// "9 s", "12 min", "3.4 h"
@@ -31,7 +31,7 @@ std::string duration_text(double s) {
   return s < 6000 ? format("%.0f min", s / 60) : format("%.1f h", s / 3600);
 }
 
-/// What does not fit would wrap, and the next line would not cover it.
+/// The longest text of a line: a longer one would wrap, and the next line would not overwrite it.
 std::size_t width_of(std::FILE* terminal) {
   winsize size{};
   return ioctl(fileno(terminal), TIOCGWINSZ, &size) == 0 && size.ws_col > 1 ? size.ws_col - 1u : 79u;
@@ -65,7 +65,7 @@ void sleep_until(double steady_s) {
 
 void TimeLeft::add(double now_s, double done) {
   constexpr double kWindow_s = 20, kApart_s = 0.1;
-  if (done < done_) points_.clear();  // work that begins anew
+  if (done < done_) points_.clear();  // the work begins anew
   done_ = done;
   if (!points_.empty() && (done <= points_.back().done || now_s < points_.back().at_s + kApart_s)) return;
   points_.push_back({now_s, done});
@@ -101,7 +101,7 @@ void ProgressLine::show(double done, const std::string& more) {
   left_.add(now_s, done);
   const bool shows = now_s - shown_s_ >= every_s_, files = now_s - filed_s_ >= kFileEvery_s;
   if (!shows && !files) return;
-  std::string text = what_ + format(" %.0f %%", std::floor(100 * done + 1e-9));  // 100 % is for what is done
+  std::string text = what_ + format(" %.0f %%", std::floor(100 * done + 1e-9));  // floor: 100 % means done
   if (const auto left_s = left_.seconds(now_s)) text += ", " + duration_text(*left_s) + " left";
   if (!more.empty()) text += ", " + more;
   if (files) {

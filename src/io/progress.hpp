@@ -1,4 +1,4 @@
-// What long work tells the person who waits, and how it is asked to stop.
+// Progress display of long work, and the request to stop it.
 #pragma once
 
 #include <cstdio>
@@ -13,16 +13,16 @@ namespace flappy::io {
 /// From now on the first Ctrl-C (or SIGTERM) makes interrupted() true, the second ends the program.
 void stop_on_interrupt();
 bool interrupted();
-/// As if none had come: for a process that goes on.
+/// Resets interrupted(), for a process that goes on.
 void forget_interrupt();
 
-/// How long work that goes on as it did lately will take: (1 - done) / rate, the rate that of the last 20 s, or of the last
+/// Estimates the remaining time as (1 - done) / rate. The rate is that of the last 20 s, or of the last
 /// three advances where those took longer.
 class TimeLeft {
  public:
-  /// `done`: 0 to 1, at a time that does not go back. Where `done` goes back, what was before says nothing any more.
+  /// `done`: 0 to 1; `now_s` must not decrease. A smaller `done` than before starts the estimate anew.
   void add(double now_s, double done);
-  /// Nothing before three advances.
+  /// Returns nothing before three advances.
   std::optional<double> seconds(double now_s) const;
 
  private:
@@ -33,27 +33,26 @@ class TimeLeft {
   double done_ = 0;
 };
 
-/// Seconds since some moment, on a clock that nobody sets.
+/// Seconds of a monotonic clock with an arbitrary origin.
 double steady_seconds();
-/// On that clock; returns at once where it has passed, and early upon an interrupt.
+/// Sleeps until a time of steady_seconds(); returns early upon an interrupt.
 void sleep_until(double steady_s);
 
-/// "flown 43 %, 12 s left": one line on a terminal that is written over at most 5 times a second; elsewhere a line of its
-/// own at most every `plain_every_s`, none with infinity.
+/// Shows "flown 43 %, 12 s left": on a terminal one line that is overwritten at most 5 times a second; elsewhere a new
+/// line at most every `plain_every_s` (infinity: none).
 class ProgressLine {
  public:
   explicit ProgressLine(std::string what, double plain_every_s = 10, std::FILE* stream = stderr,
                         std::function<double()> clock_s = steady_seconds);
-  /// Clears the line.
   ~ProgressLine();
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
 
   /// Whether show() would write now.
   bool due() const;
-  /// `done`: 0 to 1. `more` is written behind the time left.
+  /// `done`: 0 to 1. `more` is appended after the time left.
   void show(double done, const std::string& more = "");
-  /// Call it before anything else is printed on stdout.
+  /// Clears the line; call it before printing anything else on stdout.
   void clear();
 
  private:
@@ -68,11 +67,11 @@ class ProgressLine {
   bool visible_ = false;
 };
 
-/// Clears the line that is visible, if any is.
+/// Clears the progress line that is visible, if any.
 void clear_progress();
-/// From now on every line also stands in `file`, at most once a second: {"share": 0.43, "message": "flown 43 %, 12 s left"}.
+/// Progress lines made from now on are also written to `file`, at most once a second: {"share": 0.43, "message": "flown 43 %, 12 s left"}.
 void write_progress(const std::filesystem::path& file);
-/// Lines that are made from now on stay silent: another process speaks for this one.
+/// Progress lines made from now on show nothing, because another process shows the progress.
 void silence_progress();
 
 }  // namespace flappy::io

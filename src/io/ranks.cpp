@@ -28,14 +28,14 @@ int number(const char* name, int low, int high) {
   return value;
 }
 
-/// The variables of one launcher; `local`: ranks on a machine.
+/// The environment variables of one launcher; `local`: number of ranks on this machine.
 struct Launcher {
   const char *rank, *size, *local;
 };
 constexpr Launcher kLaunchers[] = {
     {"RANK", "WORLD_SIZE", "LOCAL_WORLD_SIZE"},
     {"OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_LOCAL_SIZE"},
-    // SLURM_NTASKS is there in a batch script, too, which is one process
+    // not SLURM_NTASKS, which is also set in a batch script, where there is only one process
     {"SLURM_PROCID", "SLURM_STEP_NUM_TASKS", "SLURM_STEP_TASKS_PER_NODE"},
 };
 
@@ -61,7 +61,7 @@ Rank this_rank() {
     r.rank = number(l.rank, 0, r.size - 1);
     if (r.size == 1) return r;
     const auto local = variable(l.local);
-    // Slurm lists "2(x3),1": ranks on each machine; one number means that all are as this one
+    // Slurm's form "2(x3),1" lists the ranks on each machine; we take the first number for this machine
     r.local_size = local ? std::max(1, std::atoi(local->c_str())) : 1;
     const auto address = variable("MASTER_ADDR");
     if (address) r.address = *address;
@@ -120,7 +120,7 @@ std::unique_ptr<Ranks> meet(const Rank& rank, bool allow_network, const std::str
         "MASTER_ADDR=" + rank.address +
         ": is not this machine alone, and the rendezvous listens on every interface, to anybody; accepted: "
         "127.0.0.1, or --allow-network");
-  // LibTorch's own words on what we say in one line
+  // silence LibTorch's messages about failures that we report in one line
   setenv("GLOG_minloglevel", "4", 0);
   setenv("TORCH_CPP_LOG_LEVEL", "FATAL", 0);
   static const auto* const functions =

@@ -31,7 +31,7 @@ std::string contents(std::FILE* file) {
 
 Finished run(const std::vector<std::string>& command, std::string_view input) {
   const auto fail = [](int error) { throw std::system_error(error, std::generic_category()); };
-  // files without a name rather than pipes: nobody waits for anybody
+  // unnamed files instead of pipes, which could block both sides
   std::array<File, 3> streams = {File(std::tmpfile(), std::fclose), File(std::tmpfile(), std::fclose),
                                  File(std::tmpfile(), std::fclose)};
   for (const auto& stream : streams)

@@ -1,4 +1,4 @@
-// Another program as a function from text to text.
+// Runs another program as a function from text to text.
 #pragma once
 
 #include <string>
@@ -8,15 +8,15 @@
 namespace flappy::io {
 
 struct Finished {
-  int exit_code;  ///< -1: it did not end by itself
+  int exit_code;  ///< -1: a signal ended it
   std::string out, err;
-  double peak_bytes;  ///< of memory
+  double peak_bytes;  ///< peak memory
 };
-/// Runs a program (found along PATH, no shell) with `input` on its stdin. std::system_error where it cannot be run.
+/// Runs a program (found along PATH, no shell) with `input` on its stdin. Throws std::system_error where it cannot be started.
 Finished run(const std::vector<std::string>& command, std::string_view input = {});
 
-/// The same, for its stdout. `result` is what it
-/// is to make; InputError "result: is not written: ..." when the program is missing or fails.
+/// Runs a program as run() does and returns its stdout. Throws InputError "result: is not written: ..." where the program is missing
+/// or fails; `result` names what the output is for.
 std::string run_program(const std::vector<std::string>& command, std::string_view input, const std::string& result);
 
 }  // namespace flappy::io

@@ -1,4 +1,4 @@
-// Formats of files are numbered. What this program does not read is refused with what reads it.
+// File formats have schema numbers. A file of another schema is refused, with the version of flappy that reads it.
 #pragma once
 
 #include <cstdint>
@@ -9,17 +9,17 @@
 
 namespace flappy::io {
 
-/// Of a schema that is not the one that is read: "2 is read by a newer flappy than this one". `commit`: of the program that
-/// wrote the file, where the file says so.
+/// Describes a schema that this program does not read: "2 is read by a newer flappy than this one". `commit`: the commit of the program
+/// that wrote the file, or empty.
 std::string other_schema(std::int64_t given, std::int64_t read, const std::string& commit = "");
 
-/// "; flappy at commit X wrote it, and reads it", or nothing where this program is of that commit or it is not known.
+/// "; flappy at commit X wrote it, and reads it"; empty where this program is of that commit or the commit is unknown.
 std::string writer_reads(const std::string& commit);
 
-/// The commit that run.json of a run folder names; empty where it names none.
+/// The commit in run.json of a run folder; empty where there is none.
 std::string commit_of_run(const std::filesystem::path& folder);
 
-/// read(), whose refusals end with the commit that wrote the run.
+/// Calls read() and appends the commit that wrote the run to any InputError.
 template <class Read>
 auto read_of_run(const std::filesystem::path& folder, Read read) {
   try {

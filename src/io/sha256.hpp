@@ -1,4 +1,4 @@
-// Which bytes a file held.
+// SHA-256 hashes, which record the contents of a file.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ namespace flappy::io {
 /// SHA-256 as 64 lower-case hexadecimal digits.
 std::string sha256(std::string_view bytes);
 
-/// The same of bytes that come in pieces.
+/// SHA-256 of bytes that come in pieces.
 class Sha256 {
  public:
   Sha256();

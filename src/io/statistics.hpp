@@ -1,4 +1,4 @@
-// Statistics of samples, and tails of distributions. Samples may hold infinities but not NaN; a figure of an empty sample is
+// Statistics of samples, and tails of distributions. Samples may hold infinities but not NaN; a statistic of an empty sample is
 // NaN.
 #pragma once
 
@@ -8,7 +8,7 @@
 
 namespace flappy::io {
 
-/// The 97.5 % quantile of the normal distribution: what 95 % intervals reach to either side, in standard deviations.
+/// The 97.5 % quantile of the standard normal distribution: half the width of a 95 % interval, in standard deviations.
 inline constexpr double kNormal975 = 1.959963984540054;
 
 struct Interval {
@@ -18,24 +18,23 @@ struct Interval {
 double mean(std::span<const double> sample);
 
 /// Linear interpolation of order statistics x_1 <= ... <= x_n (type 7 of Hyndman and Fan, Am. Stat. 50, 1996):
-/// x_k + (h - k) (x_k+1 - x_k) with h = 1 + (n - 1) share and k = floor(h). This is the one convention of all that is reported.
+/// x_k + (h - k) (x_k+1 - x_k) with h = 1 + (n - 1) share and k = floor(h). All reported quantiles use this convention.
 double quantile(std::vector<double> sample, double share);
-/// quantile() of 0.5.
 double median(std::vector<double> sample);
 
-/// x_k+1: `k` values of the sample come before it.
+/// x_k+1, the value with `k` values of the sorted sample before it.
 double order_statistic(std::vector<double> sample, std::size_t k);
-/// The larger of the two middle values where their number is even: a value of the sample, where a mean of two would be none.
+/// The median, or the larger of the two middle values of an even number, so that it is always a value of the sample.
 double upper_median(std::vector<double> sample);
 
-/// 95 % interval of the probability of what happened `successes` times out of `count` (Wilson, J. Am. Stat. Assoc. 22, 1927).
+/// 95 % interval of a probability after `successes` in `count` trials (Wilson, J. Am. Stat. Assoc. 22, 1927).
 Interval wilson_interval(std::size_t successes, std::size_t count);
 
-/// P(|T| > |t|) of Student's t.
+/// P(|T| > |t|) for Student's t.
 double t_tail(double t, double freedom);
-/// P(F > f) of the F distribution.
+/// P(F > f) for the F distribution.
 double f_tail(double f, double above, double below);
-/// P(X > x) of chi squared, and the x with P(X < x) = share.
+/// P(X > x) for chi squared; chi2_quantile is the x with P(X < x) = share.
 double chi2_tail(double x, double freedom);
 double chi2_quantile(double share, double freedom);
 

@@ -1,4 +1,4 @@
-// A place for what is compiled on the spot.
+// A temporary folder, for code that is compiled at run time.
 #pragma once
 
 #include <unistd.h>
@@ -13,7 +13,7 @@
 
 namespace flappy::io {
 
-/// Gone with its contents. io::InputError where it cannot be made.
+/// Removes the folder and its contents when it ends. Throws io::InputError where it cannot be made.
 class TemporaryFolder {
  public:
   TemporaryFolder() {

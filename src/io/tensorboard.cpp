@@ -31,7 +31,7 @@ std::string frame(std::string_view data) {
   return length + masked_crc(length) + std::string(data) + masked_crc(data);
 }
 
-// Protobuf: a key is the field's number and how its value is written.
+// Protobuf: a key consists of the field's number and the encoding of its value.
 
 std::string varint(std::uint64_t value) {
   std::string text;

@@ -1,4 +1,4 @@
-// Event files as TensorBoard reads them: TFRecord frames, each with an Event in protobuf.
+// TensorBoard's event files: TFRecord frames, each with an Event in protobuf.
 //   frame: length (8 bytes), its masked CRC-32C, data, its masked CRC-32C; little endian
 //   Event: wall_time = 1 (double), step = 2 (int64), file_version = 3 (string), summary = 5
 //   Summary: value = 1, repeated: tag = 1 (string), simple_value = 2 (float)
@@ -19,11 +19,11 @@ std::uint32_t crc32c(std::string_view bytes);
 /// The frame that begins an event file.
 std::string event_file_start(double wall_s);
 
-/// The frame of one event with a scalar for each tag; values that are not finite are left out. Wall time since 1970.
+/// The frame of one event with a scalar for each tag; leaves out values that are not finite. `wall_s` is Unix time.
 std::string scalar_event(double wall_s, std::int64_t step, const std::vector<std::string>& tags,
                          std::span<const double> values);
 
-/// Bytes of the whole frame that `bytes` begins with; 0 when it is not all there.
+/// The size of the frame at the beginning of `bytes`; 0 where the frame is incomplete.
 std::size_t event_size(std::string_view bytes);
 
 }  // namespace flappy::io

@@ -1,4 +1,4 @@
-// Text for people.
+// Formatting of text for people.
 #pragma once
 
 #include <string>
@@ -6,13 +6,13 @@
 
 namespace flappy::io {
 
-/// As printf, of any length.
+/// printf to a string of any length.
 [[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...);
 
-/// The text with control characters, and bytes that are no UTF-8, as \xNN: what strangers' files hold may be shown, and written as JSON.
+/// Replaces control characters and bytes that are not UTF-8 by \xNN, so that contents of foreign files can be shown and written as JSON.
 std::string printable(std::string_view text);
 
-/// The same of at most `limit` bytes, with "..." where it was cut.
+/// printable() of at most `limit` bytes, with "..." where the text was cut.
 std::string shortened(std::string_view text, std::size_t limit = 60);
 
 }  // namespace flappy::io

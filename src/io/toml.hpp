@@ -1,5 +1,5 @@
-// toml++ 3.3, for the files of this room alone. It calls unreachable, and asserts against, what some texts reach; there
-// its code is right without (its issues 190 and 295). Replacing these macros takes its header-only form: include it
+// toml++ 3.3, for the files of this folder only. For some texts it reaches code that it marks as unreachable or asserts not to reach, and that
+// would work without the marks (its issues 190 and 295). Replacing these macros requires its header-only form. Include it
 // through this file only, so that every file sees the same code.
 #pragma once
 
@@ -19,7 +19,7 @@
 
 namespace flappy::io {
 
-/// A whole document as text, which reads back to the same table.
+/// A whole document as text, which reads back as the same table.
 std::string toml_text(const toml::table& table);
 
 }  // namespace flappy::io

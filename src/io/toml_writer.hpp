@@ -1,4 +1,4 @@
-// TOML as text.
+// Writes TOML.
 #pragma once
 
 #include <string>
@@ -9,13 +9,13 @@ namespace flappy::io {
 /// A string in double quotes, escaped; UTF-8 stays as it is.
 std::string toml_string(std::string_view text);
 
-/// A floating-point number in the shortest digits that read back to the same double.
+/// A floating-point number with the shortest digits that read back as the same double.
 std::string toml_number(double value);
 
-/// Whether a key needs no quotes.
+/// Whether a key can be written without quotes.
 bool is_bare(std::string_view key);
 
-/// The dotted path of a key below `path`, quoted where it must be.
+/// The dotted path of a key below `path`, quoted where necessary.
 std::string toml_path(const std::string& path, std::string_view key);
 
 }  // namespace flappy::io

@@ -36,7 +36,7 @@ std::string_view text_of(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-/// The whole number that the text is; empty when it is anything else.
+/// The text as a whole number; empty if it is not one.
 std::optional<std::uint64_t> number(std::string_view text) {
   std::uint64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -44,7 +44,7 @@ std::optional<std::uint64_t> number(std::string_view text) {
   return value;
 }
 
-/// The update of checkpoint_000012000.flappy.
+/// The update in a checkpoint's file name, as 12000 in checkpoint_000012000.flappy; empty for other files.
 std::optional<std::uint64_t> update_of(const std::filesystem::path& path) {
   const std::string name = path.filename().string();
   if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix) || name.size() < kPrefix.size() + kSuffix.size())
@@ -94,7 +94,7 @@ Checkpoint::Checkpoint(std::filesystem::path path) : path_(std::move(path)), fil
   const auto refuse = [&](const std::string& what) { throw io::InputError(path_.string() + ": " + what); };
   const auto refuse_system = [&](int error) { refuse("cannot be read: " + std::generic_category().message(error)); };
   std::error_code error;
-  const auto status = std::filesystem::status(path_, error);  // opening a pipe would wait
+  const auto status = std::filesystem::status(path_, error);  // checked first, because opening a pipe would block
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) refuse("is not a regular file");
   file_.reset(std::fopen(path_.c_str(), "rbe"));
   if (!file_) refuse_system(errno);
@@ -214,7 +214,7 @@ std::vector<std::filesystem::path> checkpoints_in(const std::filesystem::path& r
 void keep_newest(const std::filesystem::path& run, std::size_t count) {
   const auto paths = checkpoints_in(run);
   for (std::size_t i = count; i < paths.size(); ++i) {
-    std::error_code ignored;  // a file that cannot be removed stays
+    std::error_code ignored;  // a file that cannot be removed is kept
     std::filesystem::remove(paths[i], ignored);
   }
 }

@@ -1,11 +1,11 @@
-// Checkpoints of a training run: named sections of bytes in one file that is either whole and right, or refused.
+// Checkpoints of a training run: named sections of bytes in one file, which is refused unless it is complete and undamaged.
 //
 //     flappy checkpoint 1\n
-//     the bytes of the sections, one after the other
-//     a list in JSON: header, name, size and SHA-256 of each section
+//     the bytes of the sections in order
+//     a list in JSON: header, and name, size and SHA-256 of each section
 //     size of that list (20 digits), its SHA-256 (64 digits), "\nflappy end\n"
 //
-// Numbers are stored as the processor has them (x86-64: little endian).
+// Numbers are stored in the processor's byte order (x86-64: little endian).
 #pragma once
 
 #include <concepts>
@@ -24,18 +24,19 @@
 
 namespace flappy::learn {
 
-/// What a checkpoint is of. A resumed run wants its own configuration; the rest is for people.
+/// Origin of a checkpoint. A run can be resumed only if config_sha256 is that of its configuration; the rest is
+/// information.
 struct CheckpointHeader {
   std::uint64_t update = 0;
-  std::string config_sha256;    ///< of the resolved configuration
-  std::string processor;        ///< the type, as /proc/cpuinfo names it
-  std::string instruction_set;  ///< of the kernels
-  std::string commit;           ///< of the program
-  double wall_s = 0;            ///< of training until then
+  std::string config_sha256;    ///< SHA-256 of the resolved configuration
+  std::string processor;        ///< type of the processor, as in /proc/cpuinfo
+  std::string instruction_set;  ///< instruction set of the kernels
+  std::string commit;           ///< commit of the program
+  double wall_s = 0;            ///< wall-clock time of the training so far
 };
 
-/// Bytes that are all value: a struct with padding would give other bytes in every run. A padding-free struct of
-/// floats goes in through std::as_bytes.
+/// Types without padding, because the values of padding bytes differ between runs. Store a padding-free struct of
+/// floats through std::as_bytes.
 template <class T>
 concept Plain = std::is_arithmetic_v<T> || std::is_enum_v<T> ||
     (std::is_trivially_copyable_v<T>&& std::has_unique_object_representations_v<T>);
@@ -44,19 +45,20 @@ template <class V>
 concept PlainRange = std::ranges::contiguous_range<V> && std::ranges::sized_range<V> &&
     Plain<std::ranges::range_value_t<V>> && !std::is_array_v<std::remove_cvref_t<V>>;
 
-/// Where a section stands in its file.
+/// Position of a section in its file, in bytes.
 struct CheckpointSection {
   std::string name, sha256;
   std::uint64_t offset = 0, size = 0;
 };
 
-/// Writes one checkpoint. It appears under its name on commit(); without it nothing is left, and whatever had the name
-/// stays as it was. InputError when the disk does not take it.
+/// Writes one checkpoint. The file appears under its name on commit(); without commit() no file is left, and an older
+/// file of that name stays. Throws io::InputError if writing fails.
 class CheckpointWriter {
  public:
   CheckpointWriter(const std::filesystem::path& path, CheckpointHeader header);
 
-  /// Stores a number, a vector, span, array or string of numbers under a name of its own; written at once, not copied.
+  /// Stores a number, or a vector, span, array or string of numbers, under a unique name. Writes at once and keeps no
+  /// copy.
   template <class V>
   requires PlainRange<V> || Plain<V>
   void put(std::string_view name, const V& value) {
@@ -66,7 +68,7 @@ class CheckpointWriter {
   }
   void put_bytes(std::string_view name, std::span<const std::byte> bytes);
 
-  /// On the disk, power failure or not, when it returns: the payload's SHA-256, see Checkpoint. Call it once, last.
+  /// Finishes the file and syncs it to the disk. Returns Checkpoint::payload_sha256(). Call it once, last.
   std::string commit();
 
  private:
@@ -76,20 +78,21 @@ class CheckpointWriter {
   std::vector<CheckpointSection> sections_;
 };
 
-/// A checkpoint that has been read through once and found whole.
+/// A checkpoint for reading; the constructor has checked the whole file.
 class Checkpoint {
  public:
-  /// InputError that names the file and what is wrong with it: no checkpoint, another schema, cut short, damaged.
+  /// Throws io::InputError, with file and reason, if the file is no checkpoint, of another schema, truncated or
+  /// damaged.
   explicit Checkpoint(std::filesystem::path path);
 
   const std::filesystem::path& path() const { return path_; }
   const CheckpointHeader& header() const { return header_; }
-  /// SHA-256 over names, sizes and contents of the sections in order of names: equal for equal states of training,
-  /// whatever the header.
+  /// SHA-256 over names, sizes and contents of the sections in order of names, without the header: equal for equal
+  /// states of training.
   const std::string& payload_sha256() const { return payload_sha256_; }
   bool has(std::string_view name) const;
 
-  /// Fills what put() stored. InputError when there is no such section, or one of another size.
+  /// Reads what put() stored. Throws io::InputError if the section is missing or has another size.
   template <class V>
   requires PlainRange<V> || Plain<std::remove_cvref_t<V>>
   void get(std::string_view name, V&& value) const {
@@ -98,7 +101,7 @@ class Checkpoint {
     else get_bytes(name, std::as_writable_bytes(std::span(&value, 1)));
   }
   void get_bytes(std::string_view name, std::span<std::byte> bytes) const;
-  /// A section of any size.
+  /// A whole section as text. Throws io::InputError if it is missing.
   std::string text(std::string_view name) const;
 
  private:
@@ -111,17 +114,17 @@ class Checkpoint {
   std::vector<CheckpointSection> sections_;
 };
 
-/// checkpoint_000012000.flappy
+/// File name of a checkpoint, as checkpoint_000012000.flappy.
 std::string checkpoint_name(std::uint64_t update);
 
-/// The checkpoints of a run folder by their names, newest first. InputError when the folder cannot be read.
+/// Checkpoints of a run folder, found by their names, newest first. Throws io::InputError if the folder cannot be read.
 std::vector<std::filesystem::path> checkpoints_in(const std::filesystem::path& run);
 
-/// Removes all but the `count` newest.
+/// Removes all but the `count` newest checkpoints.
 void keep_newest(const std::filesystem::path& run, std::size_t count);
 
-/// The newest checkpoint of a run folder. InputError when there is none, or when it is damaged: then the message
-/// says which earlier one is good and how to go on from it. Nothing is skipped silently.
+/// The newest checkpoint of a run folder. Throws io::InputError if there is none, or if it is damaged; the message then
+/// names an earlier good checkpoint and how to resume from it. A damaged checkpoint is never skipped silently.
 Checkpoint newest_checkpoint(const std::filesystem::path& run);
 
 }  // namespace flappy::learn

@@ -45,7 +45,8 @@ Collector::Collector(const TrainConfig& config, io::Ranks* ranks)
   for (std::size_t i = 0; i < fleet_.size(); ++i) start(i);
 }
 
-/// The next episode of a flapper: from a snapshot sampled for it, or with a vehicle of its own.
+/// Starts the next episode of a flapper: from a random snapshot of pool_, or with the episode's vehicle if there is no
+/// pool.
 void Collector::start(std::size_t i) {
   Pending& p = pending_[i];
   ++p.episode;
@@ -74,7 +75,7 @@ void Collector::run(std::size_t k) {
   seconds_[item] += std::chrono::duration<double>(std::chrono::steady_clock::now() - from).count();
 }
 
-/// What the last action of a flapper led to.
+/// Records the result of a flapper's last action; emits transitions and starts the next episode where due.
 void Collector::gather(std::size_t i, std::size_t item) {
   Pending& p = pending_[i];
   const float reward = static_cast<float>(config_.reward_scale) * fleet_.action_reward(i);
@@ -85,7 +86,7 @@ void Collector::gather(std::size_t i, std::size_t item) {
     rewards_[i * kept_ + p.count] = reward;
     ++p.count;
   } else {
-    rewards_[i * kept_ + p.count - 1] += reward;  // the last action is the one that is paid
+    rewards_[i * kept_ + p.count - 1] += reward;  // after the hand-back, rewards go to the last action
   }
 
   float next[flight::kMaxHistory * flight::kMaxObservation];
@@ -110,8 +111,8 @@ void Collector::gather(std::size_t i, std::size_t item) {
   std::copy_n(next, inputs_, observation(i, p.count));
 }
 
-/// Tells of the oldest of the n actions that are pending: its n-step return sum over k < n of discount^k r_k, and what the value
-/// of the observation now is weighed by, discount^n.
+/// Emits the transition of the oldest of n pending actions: its n-step return, the sum over k < n of discount^k r_k,
+/// and the weight discount^n of the value of the present observation, 0 if the episode terminated.
 void Collector::emit(std::size_t i, std::size_t item, const float* next, bool terminated) {
   Pending& p = pending_[i];
   const auto discount = static_cast<float>(config_.discount);
@@ -162,7 +163,7 @@ void Collector::share() {
   if (ranks_ == nullptr) return;
   for (const std::span<std::byte> bytes : fleet_.memory())
     ranks_->share(bytes.data(), fleet_.blocks(), bytes.size() / fleet_.blocks());
-  // of flappers, the last block may have fewer
+  // lists by flapper: the last block may have fewer flappers, so shares are computed from flappers
   const auto of_flappers = [&](auto& list) {
     const std::size_t each = list.size() / fleet_.size() * sizeof list[0],
                       first = fleet_.flappers(first_item_).first * each;

@@ -1,6 +1,6 @@
-// Episodes of many flappers, and the transitions that they leave for the critics. One step is one action of every flapper;
-// its blocks may be flown on any thread, beside a learner. What a step adds reaches the replay memory only in end().
-// Of several ranks, each flies its share of the blocks; what they add reaches the memories of all.
+// Flies episodes of many flappers and collects their transitions for the learner. One step is one action of every flapper. Its blocks
+// may be flown on any thread, while a learner works. Transitions of a step enter the replay memory only in end(). With several
+// ranks, each flies its share of the blocks, and every rank's memory gets the transitions of all.
 #pragma once
 
 #include "flight/fleet.hpp"
@@ -10,42 +10,43 @@
 
 namespace flappy::learn {
 
-/// Sums over the episodes that ended since they were last taken.
+/// Sums over the episodes that ended since the last take_sums(): count, returns, and counts of captures, hand-backs and
+/// terminations.
 struct EpisodeSums {
   double episodes = 0, returns = 0, captured = 0, handed_back = 0, terminated = 0;
 };
 
 class Collector {
  public:
-  /// Settles the vehicles of training where the task starts settled.
+  /// If the task starts settled, flies the training vehicles to settled hover first.
   explicit Collector(const TrainConfig& config, io::Ranks* ranks = nullptr);
 
-  /// begin() plans a step in which `actor` acts, run() takes one of items() blocks through it, end() closes it.
+  /// Plans a step in which `actor` acts. Then call run(k) for each k below items(), on any threads, and end().
   void begin(const std::shared_ptr<const policy::Actor>& actor);
   std::size_t items() const { return last_item_ - first_item_; }
   void run(std::size_t k);
-  /// Whether any rank `wants_end`.
+  /// Closes the step and adds its transitions to `replay`. Returns whether `wants_end` is true on any rank.
   bool end(Replay& replay, bool wants_end = false);
 
-  /// Hands all ranks what the others' flappers are and did: before sums are taken and before save().
+  /// Exchanges the states and records of flappers between ranks. Call it before take_sums() and save().
   void share();
 
-  /// Sums in the order of flappers; then they start from nothing again.
+  /// Returns the sums, added in the order of flappers, and resets them.
   EpisodeSums take_sums();
-  std::uint64_t episodes() const;   ///< since the beginning
-  std::uint64_t env_steps() const;  ///< control periods of all flappers
-  double seconds() const;           ///< of processor time in run(), all threads
+  std::uint64_t episodes() const;   ///< episodes ended since the beginning of the run
+  std::uint64_t env_steps() const;  ///< control periods, summed over flappers
+  double seconds() const;           ///< time spent in run(), summed over threads
   std::size_t vehicles() const { return pool_.size(); }
 
   void save(CheckpointWriter& to);
   void restore(const Checkpoint& from);
 
  private:
-  /// What a flapper has done in its episode and not yet told.
+  /// Actions of a flapper that are not yet emitted as transitions, and its sums.
   struct Pending {
-    std::uint32_t count = 0;  // actions, at most `return_steps`
+    std::uint32_t count = 0;  // pending actions, at most `return_steps`
     std::uint32_t episode = 0;
-    std::uint64_t episodes = 0, waits = 0;  // 1: handed back, and paid until the task's reward ends
+    std::uint64_t episodes = 0, waits = 0;  // waits: 1: handed back, and rewards count until until_s of the task
     EpisodeSums sums;
     double episode_return = 0;
   };
@@ -58,15 +59,15 @@ class Collector {
   io::Ranks* ranks_;
   rollout::FlyConfig fly_;
   flight::Fleet<float> fleet_;
-  std::size_t first_item_ = 0, last_item_ = 0;  // blocks that are flown here
+  std::size_t first_item_ = 0, last_item_ = 0;  // blocks that this rank flies
   std::vector<flight::Snapshot<float>> pool_;
   std::size_t inputs_, outputs_, kept_;
   std::uint32_t paid_ticks_;
-  std::vector<Pending> pending_;            // of each flapper
-  std::vector<float> observations_;         // [flapper][kept_][inputs_]: before each action that is pending
+  std::vector<Pending> pending_;            // [flapper]
+  std::vector<float> observations_;         // [flapper][kept_][inputs_]: observation before each pending action
   std::vector<float> actions_, rewards_;    // [flapper][kept_][outputs_], [flapper][kept_]
-  std::vector<std::vector<float>> staged_;  // of each block: transitions, row after row as Replay has them
-  std::vector<double> seconds_;             // of each block
+  std::vector<std::vector<float>> staged_;  // [block]: transitions of this step, in rows of Replay's layout
+  std::vector<double> seconds_;             // [block]: time spent in run()
 };
 
 }  // namespace flappy::learn

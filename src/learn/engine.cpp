@@ -25,7 +25,7 @@ void check_numbers(std::span<const float> numbers, std::size_t count) {
 class LanesEngine : public LearnerEngine {
  public:
   explicit LanesEngine(const LearnerOptions& options) : learner_(options) {}
-  void update(const Replay& replay, double actor_rate, double critic_rate, const Companion& beside) override {
+  void update(const Replay& replay, double actor_rate, double critic_rate, const ParallelWork& beside) override {
     learner_.update(replay, actor_rate, critic_rate, beside);
   }
   const UpdateMetrics& metrics() const override { return learner_.metrics(); }
@@ -50,7 +50,8 @@ class LanesEngine : public LearnerEngine {
 
 constexpr const char* kPlugin = "torch_learner";
 
-/// Samples and noise are those of the lanes; the update is one item of a loop, in which its thread works alone.
+/// Engine on LibTorch, with the same samples and noise as the lanes. The update is one item of a parallel loop: one
+/// thread does it, and the others do the work `beside`.
 class TorchEngine : public LearnerEngine {
  public:
   explicit TorchEngine(const LearnerOptions& o)
@@ -72,7 +73,7 @@ class TorchEngine : public LearnerEngine {
     learner_->set(TorchLearner::Kind::targets, weights);
   }
 
-  void update(const Replay& replay, double actor_rate, double critic_rate, const Companion& beside) override {
+  void update(const Replay& replay, double actor_rate, double critic_rate, const ParallelWork& beside) override {
     const TransitionShape &have = replay.shape(), &want = o_.shape;
     if (replay.size() == 0 || have.observation != want.observation || have.action != want.action)
       throw std::invalid_argument("a replay memory that is empty or of another shape");
@@ -150,7 +151,7 @@ class TorchEngine : public LearnerEngine {
   }
 
  private:
-  /// Sums gradients and metrics over all ranks, in their order.
+  /// Sums gradients and metrics over all ranks, in the order of ranks.
   void exchange(UpdateMetrics& metrics) {
     const std::size_t count = learner_->count(), numbers = count + 3;
     std::vector<float> mine(numbers), all(numbers * static_cast<std::size_t>(o_.ranks->size()));
@@ -168,7 +169,7 @@ class TorchEngine : public LearnerEngine {
                                                   TorchLearner::Kind::first_moments,
                                                   TorchLearner::Kind::second_moments};
 
-  /// Appends the first weights of a network to `to`: those that the lanes have. Its widths.
+  /// Appends the initial weights of a network to `to`, the same as those of the lanes. Returns its widths.
   std::vector<int> start(int network, int inputs, const std::vector<int>& hidden, int outputs,
                          std::vector<double>& to) const {
     std::vector<int> widths = {inputs};
@@ -195,7 +196,7 @@ class TorchEngine : public LearnerEngine {
     return all;
   }
 
-  /// Standard normals of the lanes, [batch][actions].
+  /// Draws the standard normals that the lanes use, [batch][actions].
   void draw_noise() {
     if (noise_.empty()) return;
     constexpr int kWide = 4;
@@ -217,7 +218,7 @@ class TorchEngine : public LearnerEngine {
   LearnerOptions o_;
   std::vector<std::uint32_t> rows_;
   std::vector<float> noise_;
-  std::size_t actor_at_ = 0;  // of the weights, where its own begin
+  std::size_t actor_at_ = 0;  // index of the actor's first weight
   policy::Actor blank_;
   std::unique_ptr<TorchLearner> learner_;
   LearnerCounters counters_;

@@ -39,8 +39,9 @@ double interquartile_mean(std::vector<double> values) {
 }
 
 io::Interval bootstrap_interval(std::span<const double> values) {
-  // the standard fixes the numbers of this generator, but not how its distributions use them
-  std::mt19937_64 generator(1);  // NOLINT(bugprone-random-generator-seed,cert-msc51-cpp): the same interval every time
+  // no std::uniform_int_distribution: the C++ standard fixes the generator's numbers, but not the algorithms of
+  // distributions
+  std::mt19937_64 generator(1);  // NOLINT(bugprone-random-generator-seed,cert-msc51-cpp): to be reproducible
   std::vector<double> resample(values.size()), means(kResamples);
   for (double& each : means) {
     for (double& value : resample) value = values[(generator() >> 32) * values.size() >> 32];

@@ -1,4 +1,4 @@
-// The learning curve of one configuration over several seeds: interquartile mean with its bootstrap interval
+// Learning curve of one configuration over several seeds: interquartile mean with its bootstrap interval
 // (Agarwal et al., Deep reinforcement learning at the edge of the statistical precipice, NeurIPS 2021).
 #pragma once
 
@@ -16,7 +16,7 @@ namespace flappy::learn {
 struct CurvePoint {
   std::uint64_t update = 0;
   double wall_s = 0;
-  double score = 0;  ///< success rate, return, ...
+  double score = 0;  ///< value of the chosen column, as success rate or return
 };
 
 struct SeedCurve {
@@ -24,21 +24,22 @@ struct SeedCurve {
   std::vector<CurvePoint> points;
 };
 
-/// The evaluations of a run folder: its records in which the column `score` is there, with the column `wall_s` of
-/// timing.jsonl. InputError as read_metrics().
+/// The evaluations of a run folder: its records that have a value in column `score`, with `wall_s` of timing.jsonl.
+/// Throws io::InputError as read_metrics() does.
 SeedCurve read_seed_curve(const std::filesystem::path& run, std::uint64_t seed, const std::string& score);
 
-/// Mean of what is left when a quarter (rounded down) is cut off at each end; at least one value.
+/// Mean of the values without the lowest and the highest quarter (rounded down). Needs at least one value.
 double interquartile_mean(std::vector<double> values);
 
-/// 95 % percentile interval of the interquartile mean over 10,000 resamples of the values; the same bytes everywhere.
+/// 95 % percentile interval of the interquartile mean over 10,000 resamples of the values; the same bits on every
+/// machine.
 io::Interval bootstrap_interval(std::span<const double> values);
 
 struct CurveRow {
   std::uint64_t update = 0;
   double median_wall_s = 0, mean = 0, iqm = 0;
   io::Interval interval;
-  std::vector<double> scores;  ///< one for each seed, in the order given
+  std::vector<double> scores;  ///< [seed], in the order of LearningCurve::seeds
 };
 
 struct LearningCurve {
@@ -46,14 +47,14 @@ struct LearningCurve {
   std::vector<CurveRow> rows;
 };
 
-/// InputError unless there are runs, all evaluated at the same updates, with finite scores.
+/// Throws io::InputError unless there is a run, and all runs have finite scores at the same updates.
 LearningCurve learning_curve(std::span<const SeedCurve> runs);
 
-/// update,median_wall_s,mean,iqm,low,high,seed_N,...
+/// Writes columns update, median_wall_s, mean, iqm, low, high, and seed_N for each seed.
 void write_curve_csv(const std::filesystem::path& path, const LearningCurve& curve);
 
-/// Draws interval, interquartile mean and seeds with gnuplot; the same bytes from the same gnuplot.
-/// InputError when gnuplot is missing or fails, or the file cannot be written.
+/// Draws interval, interquartile mean and seeds with gnuplot. The same version of gnuplot gives the same bytes.
+/// Throws io::InputError if gnuplot is missing or fails, or if the file cannot be written.
 void write_curve_svg(const std::filesystem::path& path, const LearningCurve& curve, const std::string& score);
 
 }  // namespace flappy::learn

@@ -19,7 +19,7 @@ constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
 double now_s() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
 
-/// Shortest digits, but whole numbers whole: 1000000, not 1e+06.
+/// Shortest digits of a value, but whole numbers without exponent: 1000000, not 1e+06. `missing` if it is not finite.
 std::string digits(double value, const char* missing) {
   if (!std::isfinite(value)) return missing;
   constexpr double kAllWhole = 0x1p53;
@@ -41,10 +41,11 @@ std::string csv_header(const std::vector<std::string>& names) {
   return line + "\n";
 }
 
-/// Bytes of the text's first line with its end; 0 when there is no whole line.
+/// Length in bytes of the text's first line with its line end; 0 if there is no complete line.
 std::size_t line_size(std::string_view text) { return text.find('\n') + 1; }
 
-/// Bytes of the first `pieces` pieces of a file, of which all but `headers` are records.
+/// Length in bytes of the first headers + records pieces of a file. `piece_size` gives the length of a text's first
+/// piece.
 std::uint64_t kept_bytes(const std::filesystem::path& file, std::size_t (*piece_size)(std::string_view),
                          std::uint64_t records, std::uint64_t headers) {
   const std::string text = io::read_text(file);
@@ -61,7 +62,7 @@ std::uint64_t kept_bytes(const std::filesystem::path& file, std::size_t (*piece_
 
 constexpr std::array kFiles = {"metrics.jsonl", "metrics.csv", "timing.jsonl", "events.out.tfevents.flappy"};
 
-/// All files are looked at before the first is cut.
+/// Lengths to which the files are cut for a resumed run. All are checked before the first is cut.
 std::array<std::uint64_t, 4> all_kept_bytes(const std::filesystem::path& run, const MetricsColumns& columns,
                                             std::uint64_t records) {
   if (records == 0) return {};
@@ -107,7 +108,7 @@ void Metrics::record(std::span<const double> metrics, std::span<const double> ti
   csv_.write(row);
   timing_.write(json_line(names, values));
 
-  // the step is the axis of TensorBoard's charts, not one of them
+  // the step is the axis of TensorBoard's charts, not a chart
   names.erase(names.begin());
   values.erase(values.begin());
   names.insert(names.begin(), columns_.metrics.begin() + 1, columns_.metrics.end());

@@ -1,7 +1,7 @@
-// What a training run writes down as it goes, in its folder:
-//   metrics.jsonl, metrics.csv    one record per report, the same figures in both; inside the determinism contract
-//   timing.jsonl                  wall-clock figures of the same reports
-//   events.out.tfevents.flappy    all of them for TensorBoard
+// Records of a training run, in its folder:
+//   metrics.jsonl, metrics.csv    one record per report, the same values in both; the same bytes for any number of threads and resumptions
+//   timing.jsonl                  wall-clock times of the same reports
+//   events.out.tfevents.flappy    all values, for TensorBoard
 #pragma once
 
 #include <array>
@@ -15,24 +15,26 @@
 
 namespace flappy::learn {
 
-/// Fixed for a run. The first column is the step (update) that places a record in TensorBoard and in timing.jsonl.
-/// Figures that only some reports have, as those of an evaluation, are columns that the others leave empty.
+/// Names of columns, fixed for a run. The first column is the step (update), by which TensorBoard and timing.jsonl
+/// order records. Values that only some reports have, as those of an evaluation, are columns that are empty in the
+/// others.
 struct MetricsColumns {
   std::vector<std::string> metrics, timing;
 };
 
-/// Whatever cannot be written is an InputError that names the file.
+/// Writer of the records. All functions throw io::InputError, with the file's name, if a file cannot be written.
 class Metrics {
  public:
-  /// Starts the files anew, or goes on after the first `records` records, as sync() counted them for a checkpoint;
-  /// what was written after them is cut off. InputError when a file holds fewer, or the columns are others.
+  /// Starts new files, or continues after the first `records` records, the count of sync() at a checkpoint; later
+  /// records are cut off. Throws io::InputError if a file holds fewer records or has other columns.
   Metrics(const std::filesystem::path& run, const MetricsColumns& columns, std::uint64_t records = 0);
 
-  /// One value for each column; NaN and infinity stand for "not available" (null, an empty cell, no event).
-  /// On the way to the disk when it returns: a killed program loses nothing.
+  /// Appends a record, one value for each column. NaN and infinity mean "not available" (null, an empty cell, no
+  /// event). The record is handed to the operating system before it returns, so a killed program loses nothing.
   void record(std::span<const double> metrics, std::span<const double> timing);
 
-  /// Brings all records onto the disk and counts them. Call it for each checkpoint, before the checkpoint's commit().
+  /// Syncs all records to the disk and returns their number. Call it for each checkpoint, before
+  /// CheckpointWriter::commit().
   std::uint64_t sync();
 
  private:
@@ -44,17 +46,17 @@ class Metrics {
   io::AppendFile jsonl_, csv_, timing_, events_;
 };
 
-/// The records of a run, one vector for each column; NaN where not available.
+/// The records of a run; NaN where a value is not available.
 struct MetricsTable {
-  std::string file;  ///< for messages
+  std::string file;  ///< file name, for error messages
   std::vector<std::string> names;
-  std::vector<std::vector<double>> columns;
+  std::vector<std::vector<double>> columns;  ///< [column][record]
 
-  /// InputError when there is no such column.
+  /// Throws io::InputError if there is no such column.
   const std::vector<double>& column(const std::string& name) const;
 };
 
-/// Reads metrics.jsonl or timing.jsonl. InputError with file and line.
+/// Reads metrics.jsonl or timing.jsonl. Throws io::InputError with file and line.
 MetricsTable read_metrics(const std::filesystem::path& file);
 
 }  // namespace flappy::learn

@@ -18,7 +18,7 @@ using Json = nlohmann::ordered_json;
   throw io::InputError(path.string() + ": " + what + "; accepted: " + accepted);
 }
 
-/// Calls `read` with the file's content; what it lacks is one line.
+/// Calls `read` with the file's JSON. Turns JSON errors into an io::InputError of one line.
 template <class Read>
 void read_json(const fs::path& path, const Read& read) {
   try {
@@ -42,7 +42,7 @@ FinishedRun read_finished_run(const fs::path& folder) {
     run.info.task = json.at("task").get<std::string>();
     run.info.config_sha256 = json.at("config_sha256").get<std::string>();
     run.info.commit = json.at("commit").get<std::string>();
-    // both are written into C
+    // both are written into exported C code, so other characters could break it
     if (!std::ranges::all_of(run.info.config_sha256 + run.info.commit,
                              [](unsigned char c) { return std::isalnum(c) || c == '-'; }))
       refuse(start, "has letters in its hashes that no hash has", "the file as flappy-train left it");

@@ -1,4 +1,4 @@
-// A finished training run, as it lies on disk.
+// Reading of a finished training run from its folder.
 #pragma once
 
 #include <filesystem>
@@ -10,11 +10,11 @@ namespace flappy::learn {
 
 struct FinishedRun {
   policy::RunInfo info;
-  rollout::FlyConfig fly;  ///< with the run's best actor
+  rollout::FlyConfig fly;  ///< resolved configuration, with the run's best actor
 };
 
-/// io::InputError, one line, where `folder` is no run, the run has not come to its end, or one of its files was changed,
-/// damaged or belongs to another run.
+/// Throws io::InputError, one line, if `folder` is not a run, the run is not finished, or one of its files is changed,
+/// damaged or from another run.
 FinishedRun read_finished_run(const std::filesystem::path& folder);
 
 }  // namespace flappy::learn

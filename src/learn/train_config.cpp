@@ -13,7 +13,7 @@ namespace {
 
 using Overrides = std::vector<std::string>;
 
-/// What a training configuration says itself; overrides of other keys go to what it flies.
+/// Keys of the training configuration itself; overrides of other keys apply to the configuration of its flights.
 const Overrides kOwn = {"schema",  "fly",    "seed",  "threads",  "observation", "networks",
                         "collect", "reward", "learn", "evaluate", "checkpoint",  "dds"};
 
@@ -87,12 +87,12 @@ class Reader {
       if (scales && scales->has(part)) given = scales->numbers(part, signals.size(), io::positive(1e6));
       for (std::size_t i = 0; i < signals.size(); ++i) {
         l.input.mean.push_back((signals[i].low + signals[i].high) / 2);
-        const double range = signals[i].high - signals[i].low;  // 0 of an action that may not change
+        const double range = signals[i].high - signals[i].low;  // 0 for an action element that may not change
         l.input.scale.push_back(!given.empty() ? given[i] : range > 0 ? 2 / range : 1);
       }
     }
     for (std::vector<double>* list : {&l.input.mean, &l.input.scale}) {
-      const std::vector<double> now = *list;  // and as it was at each of the last actions
+      const std::vector<double> now = *list;  // repeated for each earlier observation of the history
       for (std::uint32_t ago = 1; ago < c_.fly.fleet.task.history; ++ago)
         list->insert(list->end(), now.begin(), now.end());
     }
@@ -124,7 +124,7 @@ class Reader {
     l.weight_decay = t.number_or("weight_decay", 0, {0, 1});
     l.gradient_clip = t.number_or("gradient_clip", 0, {0, 1e6});
     l.device = t.choice_or("device", "cpu", {"cpu", "cuda"});
-    if (!on_libtorch) {  // which has what the lanes have not
+    if (!on_libtorch) {  // options that the lanes do not implement
       const auto needs = [](const io::Table& of, const char* key, bool used, const char* accepted) {
         if (used)
           of.fail(key, "is what the lanes do not learn", std::string(accepted) + ", or learn.engine = \"libtorch\"");
@@ -158,7 +158,7 @@ class Reader {
     l.noise_clip = t.number("target_noise_clip", {0, 10});
     l.huber = t.number_or("huber", 0, {0, 1e6});
     c_.replay = static_cast<std::size_t>(t.integer("replay", 1024, 100'000'000));
-    const std::size_t most = c_.flappers * c_.return_steps;  // that a step may add
+    const std::size_t most = c_.flappers * c_.return_steps;  // most transitions that a step may add
     if (c_.replay < most)
       t.fail("replay", "is less than one step adds", "at least " + std::to_string(most) + " transitions");
     if (c_.replay < l.batch)

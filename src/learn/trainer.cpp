@@ -51,13 +51,13 @@ class Trainer {
       if (options_.from) forget_after(updates());
       metrics_.emplace(folder, kColumns, records_);
     }
-    if (options_.init && !options_.from) {  // nothing that is worse becomes the best
+    if (options_.init && !options_.from) {  // evaluate the initial policy, so that no worse one becomes the best
       const auto from = Clock::now();
       judge();
       evaluation_s_ += seconds_since(from);
     }
     publish();
-    if (!options_.from) save();  // from now on it can be resumed, whenever it is killed
+    if (!options_.from) save();  // from now on the run can be resumed if it is killed
     if (writes() && !fs::exists(folder / "run.json")) write_start();
     start_ = last_ = mark();
     bool going = true;
@@ -68,14 +68,14 @@ class Trainer {
       if (passed(config_.checkpoint_every) && updates() < config_.updates) save();
       going = !options_.keep_going || options_.keep_going(progress(evaluates));
       wants_end_ = !going;
-      if (ranks_ != nullptr) going = !ends;  // all at the same step
+      if (ranks_ != nullptr) going = !ends;  // all ranks stop at the same step
     }
     if (saved_step_ != steps_) save();
     return summarise();
   }
 
  private:
-  /// Where a stretch of training began; seconds are those of steps, of this process.
+  /// Start of a period over which rates are measured; seconds: time that this process has spent in steps.
   struct Mark {
     double seconds;
     std::uint64_t updates, env_steps;
@@ -89,7 +89,7 @@ class Trainer {
   }
 
   std::uint64_t updates() const { return learner_.counters().updates; }
-  /// Whether the last step reached a multiple of `every`, or the end.
+  /// Whether the last step did updates and reached a multiple of `every`, or the end.
   bool passed(std::uint64_t every) const {
     return updates() > 0 && (updates() % every == 0 || updates() == config_.updates) && learnt_;
   }
@@ -119,7 +119,7 @@ class Trainer {
     }
   }
 
-  /// std::invalid_argument where the learner has other numbers.
+  /// Loads the learner's numbers. Throws std::invalid_argument if the learner has other numbers.
   void load_learner(const Checkpoint& from) {
     std::vector<float> numbers = learner_.save();
     from.get("numbers", numbers);
@@ -132,7 +132,8 @@ class Trainer {
     return options;
   }
   bool writes() const { return io::writes(ranks_); }
-  /// One action of every flapper, and meanwhile the updates of this step. False: a rank wants it to be the last.
+  /// One action of every flapper and, in parallel, the updates of this step. False: a rank wants this step to be the
+  /// last.
   bool step() {
     const auto from = Clock::now();
     io::together(config_.threads, [&] { fly_and_learn(); });
@@ -179,7 +180,7 @@ class Trainer {
             std::max(0.0, static_cast<double>(config_.threads) * (learning_s_ + warming_s_) - simulation) / all};
   }
 
-  /// Flies the policy, and keeps it if it is the best so far.
+  /// Evaluates the present policy, and keeps it if it is the best so far.
   rollout::Summary judge() {
     policy_ = averaged();
     const rollout::Evaluation e =
@@ -228,14 +229,14 @@ class Trainer {
     last_ = mark();
   }
 
-  /// The policy: the actor averaged over steps, in the precision that it flies in.
+  /// The policy: the actor's moving average over steps, rounded to float, the precision in which it flies.
   policy::Actor averaged() const {
     policy::Actor policy = *actor_;
     std::ranges::transform(average_, policy.weights.begin(), [](double w) { return static_cast<float>(w); });
     return policy;
   }
 
-  /// Policies where others find them.
+  /// Writes best.json and last.json.
   void publish() {
     if (policy_.widths.empty()) policy_ = averaged();
     if (best_.widths.empty()) best_ = policy_;
@@ -328,7 +329,8 @@ class Trainer {
     payload_sha256_ = from.payload_sha256();
   }
 
-  /// Checkpoints of a future that is flown anew, newest first, so that a kill leaves a run that can go on.
+  /// Removes checkpoints after `update`, because those updates are done again. Newest first, so that the run can be
+  /// resumed if it is killed meanwhile.
   void forget_after(std::uint64_t update) const {
     for (const fs::path& path : checkpoints_in(options_.folder)) {
       if (path.filename() <= checkpoint_name(update)) break;
@@ -370,7 +372,7 @@ class Trainer {
 
   const TrainConfig& config_;
   const TrainOptions& options_;
-  const policy::Actor names_;  // of the task, its inputs and outputs
+  const policy::Actor names_;  // holds only the names of task, inputs and outputs
   io::Ranks* const ranks_;
   std::unique_ptr<LearnerEngine> engine_;
   LearnerEngine& learner_;
@@ -380,18 +382,18 @@ class Trainer {
   bool wants_end_ = false;
   std::optional<Metrics> metrics_;
 
-  bool learnt_ = false;  // in the last step
+  bool learnt_ = false;  // whether the last step did updates
   std::uint64_t steps_ = 0, records_ = 0, saved_step_ = ~std::uint64_t{0};
   double losses_ = 0, values_ = 0, actor_values_ = 0, return_mean_ = std::numeric_limits<double>::quiet_NaN();
   std::uint64_t samples_ = 0, actor_samples_ = 0;
   double success_ = -1, best_success_ = -1;
   std::uint64_t best_update_ = 0;
-  std::shared_ptr<const policy::Actor> actor_;  // that flies
-  std::vector<double> average_;                 // its weights, over steps
-  policy::Actor policy_, best_;                 // of the last evaluation, and of the best one
+  std::shared_ptr<const policy::Actor> actor_;  // actor that flies in collection
+  std::vector<double> average_;                 // moving average of its weights over steps
+  policy::Actor policy_, best_;                 // policies of the last and of the best evaluation
   std::string payload_sha256_;
 
-  Mark start_{}, last_{};  // of this process, and of the last evaluation
+  Mark start_{}, last_{};  // at the start of this process, and at the last evaluation
   double wall_before_s_ = 0, evaluation_s_ = 0, learning_s_ = 0, warming_s_ = 0;
 };
 
@@ -484,7 +486,7 @@ TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
 TrainCosts costs_of(const TrainConfig& config) {
   const TransitionLayout layout(config.learner.shape);
   const std::size_t replay = config.replay * layout.row * sizeof(float);
-  constexpr std::size_t kFlapper = 2500, kRest = 10'000'000;  // bytes, rounded up: of a flapper; of records
+  constexpr std::size_t kFlapper = 2500, kRest = 10'000'000;  // bytes, rounded up: for a flapper; for records
   const LearnerOptions& l = config.learner;
   const auto weights = [&](int inputs, std::vector<int> widths, int outputs) {
     widths.insert(widths.begin(), inputs);
@@ -498,7 +500,7 @@ TrainCosts costs_of(const TrainConfig& config) {
   const std::size_t history = inputs * sizeof(float), pending = (config.return_steps + 1) * history;
   const std::size_t own = config.flappers * (kFlapper + history + pending);
   const std::size_t others = (1024 + config.vehicles + config.evaluate_vehicles) * (kFlapper + history);
-  constexpr std::size_t kParts = 16 + 4 + 4;  // of gradients at most; weights, targets, moments; the actor, as text
+  constexpr std::size_t kParts = 16 + 4 + 4;  // gradients at most; weights, targets, moments; text of the actor
   return {replay + own + others + kParts * numbers + kRest, (config.keep + 1) * (replay + own + 8 * numbers + kRest)};
 }
 

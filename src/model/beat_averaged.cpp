@@ -16,10 +16,10 @@ constexpr const char* kMixKeys[] = {"amplitude", "difference", "bias", "split_cy
 constexpr const char* kRoles[] = {"flapping", "stroke_plane", "other"};
 constexpr const char* kAccepted =
     "sums and products of numbers, coefficients, actuators and motion, as \"k * left * v_x\"";
-constexpr int kMostPower = 4;
+constexpr int kMaxPower = 4;
 constexpr double kLargest = 1e6, kLongestLag_s = 2, kFarthest_m = 1;
 
-/// A factor, and the variables it multiplies.
+/// A factor, and the variables that it multiplies.
 struct Monomial {
   double factor = 1;
   std::vector<std::size_t> variables;
@@ -86,8 +86,8 @@ class Reader {
     next();
     int n = 0;
     const auto end = std::from_chars(text_.data() + at_, text_.data() + text_.size(), n);
-    if (end.ec != std::errc() || n < 1 || n > kMostPower)
-      fail("\"^\" is not followed by a power", "whole powers from 1 to " + std::to_string(kMostPower));
+    if (end.ec != std::errc() || n < 1 || n > kMaxPower)
+      fail("\"^\" is not followed by a power", "whole powers from 1 to " + std::to_string(kMaxPower));
     at_ = static_cast<std::size_t>(end.ptr - text_.data());
     Sum all = base;
     for (int i = 1; i < n; ++i) all = times(all, base);
@@ -136,7 +136,7 @@ class Reader {
   const BeatAveraged& vehicle_;
 };
 
-/// A name that an expression can use, and that nothing else has.
+/// Refuses a name that an expression cannot use, or that is already taken.
 void check_name(const io::Table& table, const std::string& name, const BeatAveraged& v) {
   const bool word =
       !name.empty() && !std::isdigit(static_cast<unsigned char>(name.front())) &&
@@ -159,7 +159,7 @@ std::optional<ExpressionFault> expression_fault(std::string_view text, const Bea
   return std::nullopt;
 }
 
-MeanWrench::MeanWrench(const BeatAveraged& vehicle) {
+BeatAveragedWrench::BeatAveragedWrench(const BeatAveraged& vehicle) {
   for (const BeatAveraged::Wrench& w : vehicle.wrenches) {
     const double at[3] = {w.at_m.x, w.at_m.y, w.at_m.z};
     for (std::size_t k = 0; k < w.terms.size(); ++k) {
@@ -173,7 +173,7 @@ MeanWrench::MeanWrench(const BeatAveraged& vehicle) {
       for (const Monomial& m : sum) {
         products_.push_back({k, m.factor, m.variables});
         if (k >= 3) continue;
-        // its moment about the origin: at x force
+        // moment of this force about the origin: at x force
         const std::size_t next = (k + 1) % 3, last = (k + 2) % 3;
         if (at[last] != 0) products_.push_back({3 + next, m.factor * at[last], m.variables});
         if (at[next] != 0) products_.push_back({3 + last, -m.factor * at[next], m.variables});
@@ -183,12 +183,12 @@ MeanWrench::MeanWrench(const BeatAveraged& vehicle) {
   has_moments_ = std::ranges::any_of(products_, [](const Product& p) { return p.component >= 3; });
 }
 
-MeanWrench::MeanWrench(std::vector<Product> products)
+BeatAveragedWrench::BeatAveragedWrench(std::vector<Product> products)
     : products_(std::move(products)),
       has_moments_(std::ranges::any_of(products_, [](const Product& p) { return p.component >= 3; })) {}
 
-MeanLoad MeanWrench::at(std::span<const double> variables) const {
-  MeanLoad load;
+BeatAveragedLoad BeatAveragedWrench::at(std::span<const double> variables) const {
+  BeatAveragedLoad load;
   for (const Product& p : products_) {
     double value = p.factor;
     for (const std::size_t v : p.variables) value *= variables[v];
@@ -233,9 +233,9 @@ BeatAveraged read_beat_averaged(const io::Table& root, bool predicted) {
     a.lag_s = t.number_or("lag_s", 0, {0, kLongestLag_s});
     v.actuators.push_back(std::move(a));
   });
-  if ((v.actuators.empty() && !predicted) || v.actuators.size() > kMostActuators)
+  if ((v.actuators.empty() && !predicted) || v.actuators.size() > kMaxActuators)
     root.fail("actuator", v.actuators.empty() ? "there is none" : "there are too many",
-              "1 to " + std::to_string(kMostActuators) + " tables [actuator.NAME]");
+              "1 to " + std::to_string(kMaxActuators) + " tables [actuator.NAME]");
   if (const auto coefficients = root.optional_table("coefficients"))
     for (const std::string& name : coefficients->keys()) {
       check_name(*coefficients, name, v);

@@ -39,7 +39,7 @@ const RigidBody& body_of(const Vehicle& v, ContactPoint::Body on) {
   return v.torso;
 }
 
-/// Of a body that flies alone, about its centre of mass: velocity, then angular velocity.
+/// Mass matrix of a body that flies alone, about its centre of mass: velocity, then angular velocity.
 Matrix6 mass_of(const RigidBody& b) {
   const InertiaTensor& i = b.inertia_kg_m2;
   Matrix6 m = Matrix6::Zero();
@@ -48,15 +48,15 @@ Matrix6 mass_of(const RigidBody& b) {
   return m;
 }
 
-/// Velocity of a point from those.
+/// Velocity of a point from the velocity and angular velocity of its body.
 Jacobian point_of(const RigidBody& b, const Triple& position_m) {
   Jacobian j;
   j << Eigen::Matrix3d::Identity(), -across(vec(position_m) - vec(b.com_m));
   return j;
 }
 
-/// w, or more where directions are mixed: the largest sum of a row's sizes is at least the largest eigenvalue (Gershgorin). In
-/// plain sums and products, whose bits no processor changes.
+/// An upper bound of w: the largest row sum of absolute values is at least the largest eigenvalue (Gershgorin). It uses
+/// plain sums and products, whose bits are the same on every processor.
 double largest_inverse_mass(const RigidBody& b, const Triple& position_m) {
   const InertiaTensor& i = b.inertia_kg_m2;
   const auto inertia = inverse(Sym3<double>{i.xx, i.yy, i.zz, i.xy, i.yz, i.xz});

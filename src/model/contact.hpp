@@ -1,31 +1,31 @@
-// Contact of a point with a surface: a compliant normal force with Hunt and Crossley's damping, friction of one bristle, and the
+// Contact of a point with a surface: a compliant normal force with Hunt and Crossley's damping, friction by one bristle, and the
 // distance of a point to simple solids.
 //
-// With d the depth of the point below the surface, n its normal, u = d' the speed at which it sinks:
+// With d the depth of the point below the surface, n the surface's normal, u = d' the speed at which the point sinks:
 //   F_n = k d max(0, 1 + a u)            a = 3/2 c                                          [1]
 //   F_t = -(k_t s + c_t v_t)             |F_t| <= mu F_n                                    [2]
-// s: what the bristle is stretched along the surface, from where it is anchored; an anchor that is pulled harder than mu F_n
-// follows. It does not creep: at rest s is whatever holds the load. k_t = 0.8 k, of bodies with Poisson's ratio 1/3 [3];
-// c_t = 2 sqrt(k_t / w), critical for the mass 1/w below. The exponent of d is 1, of a pad of constant area: of point and
-// plane alone, without other forces, a ball that falls with u leaves with e u where
+// s: stretch of the bristle along the surface, measured from its anchor. An anchor that is pulled harder than mu F_n follows the point. The
+// bristle does not creep: at rest its stretch holds the load. k_t = 0.8 k, for bodies with Poisson's ratio 1/3 [3]; c_t = 2 sqrt(k_t / w), critical
+// for the mass 1/w below. The exponent of d is 1, as for a pad of constant area. With point and plane alone and no other forces, a ball that
+// lands with the speed u leaves with e u, where
 //   a u (1 + e) = ln((1 + a u)/(1 - a e u))         e = 1 - c u + O((c u)^2)
 // for any k, mass and exponent: u du/(1 + a u) = -(k/m) d dd, integrated from d = 0 to d = 0.
-// F_n >= 0: nothing sticks, but for points that grasp: one that meets a pole, which there is something to close around of, more
-// slowly than its limit is held in all three directions by its bristle, whatever pulls, until a reset.
+// F_n >= 0, so nothing sticks, except points that grasp: a point that meets a pole (a cylinder) more slowly than its limit is held in all three
+// directions by its bristle, however hard it is pulled, until a reset.
 //
-// Time step h, leapfrog: positions are half a step ahead of rates. Springs are explicit, damping is implicit: u at the middle
-// is u - h w F/2 with what force alone does to it, and so for v_t,
+// Time step h, leapfrog: positions are half a step ahead of rates. Springs are explicit, damping is implicit. u in the middle of the step is
+// u - h w F/2, where only the contact force F changes it; the same for v_t:
 //   F_n = k d max(0, 1 + a u)/(1 + h w k d a/2)     F_t = -(k_t s + c_t v_t)/(1 + h w c_t/2)
-// which is first order in h where other forces act and never takes more than a speed has. w, 1/kg, is at least the
-// inverse mass that the point has in any direction while its body flies alone: hinges only add to its mass. An explicit spring is stable for
-// h^2 omega^2 < 4; omega^2 is at most the largest eigenvalue of M^-1 sum k J^T J of one body with all its points, for the
-// kinetic energy of a vehicle is the sum of those of its bodies (Rayleigh). contact_fault() accepts h^2 omega^2 <= 1.
+// This is first order in h if other forces act, and damping never reverses a speed. w, 1/kg, is at least the inverse mass that the point has in any
+// direction while its body flies alone: hinges only add to that mass. An explicit spring is stable for h^2 omega^2 < 4; omega^2 is at most the
+// largest eigenvalue of M^-1 sum k J^T J of one body with all its points, because the kinetic energy of a vehicle is the sum of those of its
+// bodies (Rayleigh). contact_fault() accepts h^2 omega^2 <= 1.
 //
 // [1] Hunt, Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42(2), 440-445, 1975.
 // [2] Cundall, Strack, A discrete numerical model for granular assemblies, Geotechnique 29(1), 47-65, 1979.
 // [3] Mindlin, Compliance of elastic bodies in contact, J. Appl. Mech. 16, 259-268, 1949: k_t/k = 2 (1 - nu)/(2 - nu).
-// Assumes points, whose friction resists no spin, rigid solids, and depths well below their thickness. Where surfaces meet
-// each presses by itself; the bristle stands on the one in which the point is deepest.
+// Assumes points, whose friction resists no spin, rigid solids, and depths well below the thickness of the solids. Where several surfaces meet, each
+// presses independently; the bristle acts on the surface in which the point is deepest.
 #pragma once
 
 #include <optional>
@@ -37,17 +37,17 @@
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
-/// Distance of a point to the surface of a solid, below 0 inside it, and the surface's outward normal there.
+/// Distance of a point to the surface of a solid, negative inside it, and the outward normal of the surface there.
 template <class T>
 struct Gap {
   T distance_m;
   Vec3<T> normal;
 };
 
-/// Below it a direction is not known, m.
+/// Length below which a vector has no defined direction, m.
 inline constexpr double kNoLength_m = 1e-12;
 
-/// Of a point `p` from the centre of a sphere.
+/// Gap between a point and a sphere; `p`: the point relative to the sphere's centre.
 template <class T>
 FLAPPY_INLINE Gap<T> gap_to_sphere(const Vec3<T>& p, const T& radius_m) {
   const T length = sqrt(dot(p, p));
@@ -56,8 +56,8 @@ FLAPPY_INLINE Gap<T> gap_to_sphere(const Vec3<T>& p, const T& radius_m) {
   return {length - radius_m, where(apart, scale * p, Vec3<T>{T(0), T(0), T(1)})};
 }
 
-/// Of a point `p` in the frame of a box: beyond its faces the nearest point of face, edge or corner counts, within it the
-/// nearest face.
+/// Gap between a point and a box; `p`: in the frame of the box. Outside, the nearest point of a face, edge or corner
+/// counts; inside, the nearest face.
 template <class T>
 FLAPPY_INLINE Gap<T> gap_to_box(const Vec3<T>& p, const Vec3<T>& half_m) {
   const T zero(0), one(1);
@@ -72,7 +72,7 @@ FLAPPY_INLINE Gap<T> gap_to_box(const Vec3<T>& p, const Vec3<T>& half_m) {
   return {where(outside, length, nearest), {along(n.x, p.x), along(n.y, p.y), along(n.z, p.z)}};
 }
 
-/// Of a point `p` in the frame of a cylinder about z.
+/// Gap between a point and a cylinder about z; `p`: in the frame of the cylinder.
 template <class T>
 FLAPPY_INLINE Gap<T> gap_to_cylinder(const Vec3<T>& p, const T& radius_m, const T& half_length_m) {
   const T zero(0), one(1);
@@ -89,7 +89,7 @@ FLAPPY_INLINE Gap<T> gap_to_cylinder(const Vec3<T>& p, const T& radius_m, const 
   return {where(outside, length, nearest), {nr * x, nr * y, where(p.z < zero, T(-nz), nz)}};
 }
 
-/// A point of contact as the step sees it.
+/// Constants of a point of contact in a step.
 template <class T>
 struct ContactConstants {
   Vec3<T> position_m;                      // in the frame of its body
@@ -99,20 +99,20 @@ struct ContactConstants {
   T grasp_m_s;
 };
 
-/// What it remembers.
+/// State of the bristle of a point of contact.
 template <class T>
 struct Bristle {
-  Vec3<T> anchor_m;  // in W, of a point that touches
+  Vec3<T> anchor_m;  // in W, while the point touches
   T state;           // 0: apart, 1: touches, 2: grasps
 };
 
-/// What presses on a point: the sum of all normal forces, in W, and the surface in which it is deepest.
+/// Pressure on a point: the sum of all normal forces, in W, and the surface in which the point is deepest.
 template <class T>
 struct Pressed {
   Vec3<T> force_N;
   T depth_m, normal_N;
   Vec3<T> normal;
-  T pole;  // 1 where that surface is one's that can be grasped, 0 elsewhere
+  T pole;  // 1 if that surface belongs to a pole, which can be grasped; 0 otherwise
 };
 
 template <class T>
@@ -121,7 +121,7 @@ FLAPPY_INLINE Pressed<T> not_pressed() {
   return {{zero, zero, zero}, zero, zero, {zero, zero, T(1)}, zero};
 }
 
-/// Adds what a surface does to a point that moves with `v`, in W. True where it touches.
+/// Adds the normal force of a surface on a point with velocity `v` in W. True in lanes where they touch.
 template <class T>
 FLAPPY_INLINE auto press(const ContactConstants<T>& q, const Gap<T>& gap, bool pole, const Vec3<T>& v, const T& step_s,
                          Pressed<T>& pressed) {
@@ -138,7 +138,7 @@ FLAPPY_INLINE auto press(const ContactConstants<T>& q, const Gap<T>& gap, bool p
   return touches;
 }
 
-/// The force on a point at `p` that moves with `v`, in W, friction and grasp included; its bristle follows.
+/// Force on a point at `p` with velocity `v`, both in W, including friction and grasp. Updates its bristle.
 template <class T>
 FLAPPY_INLINE Vec3<T> contact_force(const ContactConstants<T>& q, const Pressed<T>& pressed, const Vec3<T>& p,
                                     const Vec3<T>& v, const T& step_s, Bristle<T>& bristle) {
@@ -168,15 +168,15 @@ FLAPPY_INLINE Vec3<T> contact_force(const ContactConstants<T>& q, const Pressed<
 
 }  // namespace FLAPPY_ISA
 
-inline constexpr std::size_t kMostContactPoints = 16;
+inline constexpr std::size_t kMaxContactPoints = 16;
 
-/// Constants of a vehicle's points of contact, in their order.
+/// Constants of the points of contact of a vehicle, in their order.
 std::vector<ContactConstants<double>> contact_constants(const Vehicle& vehicle);
 
-/// The largest h^2 omega^2 that is accepted of a vehicle; explicit springs are stable below 4.
+/// Largest h^2 omega^2 that contact_fault() accepts by default; explicit springs are stable below 4.
 inline constexpr double kStiffestContact = 1;
 
-/// The first body whose points are too stiff for steps of `step_s`, by its stiffest point, if any.
+/// The first body whose points are too stiff for steps of `step_s`, reported by its stiffest point, if any.
 std::optional<PhysicalFault> contact_fault(const Vehicle& vehicle, double step_s, double limit = kStiffestContact);
 
 }  // namespace flappy::model

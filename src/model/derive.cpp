@@ -18,8 +18,8 @@ Sym3<double> outer(double mass, const Vec3<double>& r) {
 
 Vec3<double> first_moment(const RigidBody& b) { return b.mass_kg * vec(b.com_m); }
 
-/// Second moment of mass (integral of r r^T) about the frame's origin, from the inertia I about the centre of
-/// mass: P = tr(I)/2 1 - I + m c c^T.
+/// Second moment of mass (integral of r r^T) about the frame's origin, from the inertia I about the centre of mass:
+/// P = tr(I)/2 1 - I + m c c^T.
 Sym3<double> second_moment(const RigidBody& b) {
   const InertiaTensor& i = b.inertia_kg_m2;
   const double half = (i.xx + i.yy + i.zz) / 2;
@@ -29,7 +29,7 @@ Sym3<double> second_moment(const RigidBody& b) {
 
 namespace {
 
-/// S of motor.hpp, and the second moment of mass of a disc about z with that inertia.
+/// S of motor.hpp; and the second moment of mass of a disc about z whose inertia is `inertia`.
 double rotor_spin(const Motor& m) { return m.rotor_spin_sense * m.gear_ratio * m.rotor_inertia_kg_m2; }
 Sym3<double> disc(double inertia) { return {inertia / 2, inertia / 2, 0, 0, 0, 0}; }
 
@@ -77,13 +77,13 @@ SideParameters<double> derive_side(const Side& s, double air_density, double ste
   return p;
 }
 
-/// Means over the span of c^3 and c^3 x, c the chord per mean chord and x = r/R, which a planform does not state. The chord is
-/// the quadratic of its moments r00, r11, r22, its projection on Legendre's polynomials P_k(2x - 1), integrated by Gauss's rule
-/// with five points, exact for these powers. What the quadratic misses of the stated means of c^2, c^2 x and c^4, between
-/// which c^3 lies, goes half to each:
+/// Means over the span of c^3 and c^3 x, with c the chord per mean chord and x = r/R, which a planform does not state.
+/// The chord is approximated by the quadratic of its moments r00, r11, r22, its projection on Legendre's polynomials
+/// P_k(2x - 1), and integrated by Gauss's rule with five points, exact for these powers. The error of the quadratic in
+/// the stated means of c^2, c^2 x and c^4, between which c^3 lies, is corrected half and half:
 ///   <c^3> sqrt(z_cp0/<c^2> z_rd/<c^4>)      <c^3 x> z_cp1/<c^2 x> sqrt(z_rd/<c^4> <c^2>/z_cp0)
-/// Exact for chords that are linear or quadratic; 0.1 % off for the shipped wings, 0.4 % for an ellipse, 2 % (of c^3 x) for
-/// shipped wings that lost 15 % at the tip.
+/// Exact for chords that are linear or quadratic; 0.1 % off for the shipped wings, 0.4 % for an ellipse, 2 % (of c^3 x)
+/// for shipped wings that lost 15 % at the tip.
 struct ChordCubed {
   double mean = 0, with_span = 0;
 };
@@ -107,7 +107,7 @@ ChordCubed chord_cubed(const Planform& w) {
   return cubed;
 }
 
-SideFigures<double> side_figures(const Side& s, double air_density) {
+SideConstants<double> side_constants(const Side& s, double air_density) {
   const Motor& m = s.motor;
   const Planform& w = s.planform;
   const double K = m.torque_constant_Nm_A * m.gear_ratio, R = w.wing_length_m, c = w.mean_chord_m;
@@ -137,7 +137,7 @@ SideParameters<double> derive_planform(const Planform& planform, double air_dens
 
 Vehicle built(Vehicle v) {
   const auto given = v.effects;
-  for (const EffectEntry& e : catalogue_of(v)) {
+  for (const CatalogueEffect& e : catalogue_of(v)) {
     const auto own = given.find(e.info.id);
     if (e.change == nullptr || own == given.end()) continue;
     const std::vector<double> values = e.values(own->second);
@@ -146,10 +146,10 @@ Vehicle built(Vehicle v) {
   return v;
 }
 
-Sides<SideFigures<double>> effect_figures(const Vehicle& vehicle) {
+Sides<SideConstants<double>> effect_constants(const Vehicle& vehicle) {
   if (vehicle.beat_averaged || vehicle.jointed) return {};
   const Vehicle v = built(vehicle);
-  return {side_figures(v.left, v.air_density_kg_m3), side_figures(v.right, v.air_density_kg_m3)};
+  return {side_constants(v.left, v.air_density_kg_m3), side_constants(v.right, v.air_density_kg_m3)};
 }
 
 double total_mass_kg(const Vehicle& vehicle) {
@@ -160,7 +160,7 @@ double total_mass_kg(const Vehicle& vehicle) {
 Parameters<double> derive(const Vehicle& vehicle, double step_s) {
   const Vehicle v = built(vehicle);
   Parameters<double> p{};
-  if (v.jointed) {  // what moves the bodies stands in JointedParameters
+  if (v.jointed) {  // the step of articulated wings takes its masses from JointedParameters
     if (v.jointed->left.strips.empty()) p.left = derive_planform(v.left.planform, v.air_density_kg_m3);
     if (v.jointed->right.strips.empty()) p.right = derive_planform(v.right.planform, v.air_density_kg_m3);
   } else if (!v.beat_averaged) {
@@ -168,7 +168,7 @@ Parameters<double> derive(const Vehicle& vehicle, double step_s) {
     p.right = derive_side(v.right, v.air_density_kg_m3, step_s);
   }
   p.inverse_mass_1_kg = 1 / (v.torso.mass_kg + wing_mass(v.left) + wing_mass(v.right));
-  if (!v.jointed) {  // so that the velocity of its state is that of its origin
+  if (!v.jointed) {  // zero moments of articulated wings make the velocity in State that of the origin
     p.fixed_moment_kg_m =
         first_moment(v.torso) + (wing_mass(v.left) * p.left.shoulder_m + wing_mass(v.right) * p.right.shoulder_m);
     p.fixed_second_kg_m2 =

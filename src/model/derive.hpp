@@ -1,4 +1,4 @@
-// From a vehicle's published figures to the constants of the step.
+// Constants of the step from the published parameters of a vehicle.
 #pragma once
 
 #include "flappy/vehicle.hpp"
@@ -9,23 +9,23 @@ namespace flappy::model {
 /// Constants of one flapper in double precision. `step_s`: physics step, s.
 Parameters<double> derive(const Vehicle& vehicle, double step_s);
 
-/// Single-point blade element of a planform: what SideParameters has of it, all else 0.
+/// The members of SideParameters that describe the planform as a single-point blade element; all others are 0.
 SideParameters<double> derive_planform(const Planform& planform, double air_density_kg_m3);
 
 /// A body's first and second moment of mass about its frame's origin, kg m and kg m^2.
 Vec3<double> first_moment(const RigidBody& body);
 Sym3<double> second_moment(const RigidBody& body);
 
-/// The vehicle with those of its effects that are part of it.
+/// The vehicle after its effects of Stage::body have changed it.
 Vehicle built(Vehicle vehicle);
 
-/// What effects need to know besides.
-Sides<SideFigures<double>> effect_figures(const Vehicle& vehicle);
+/// Constants of both sides that effects need in addition to Parameters; 0 for beat-averaged robots and articulated
+/// wings.
+Sides<SideConstants<double>> effect_constants(const Vehicle& vehicle);
 
-/// Beats a second at which it flies, about.
+/// Beat frequency: of the driver, of the gait, or the nominal one.
 double beats_Hz(const Vehicle& vehicle);
 
-/// Mass of the whole vehicle, kg.
 double total_mass_kg(const Vehicle& vehicle);
 
 }  // namespace flappy::model

@@ -13,7 +13,7 @@ JointParameters<double> joint(const Jointed::Angle& a) {
           a.upper_rad, a.stop_stiffness_Nm_rad, a.stop_damping_Nm_s};
 }
 
-/// Strips along the span; y is `side` times the span.
+/// Constants of one side; y of a strip is `side` times its distance along the span.
 JointedSide<double> jointed_side(const Side& s, const Jointed::Wing& w, double air_density, double side) {
   JointedSide<double> p{};
   p.shoulder_m = {s.shoulder_m.x, s.shoulder_m.y, s.shoulder_m.z};

@@ -1,4 +1,4 @@
-// From a vehicle with four angles a wing to the constants of its step.
+// Constants of the step from the parameters of a vehicle with articulated wings.
 #pragma once
 
 #include "flappy/vehicle.hpp"
@@ -7,7 +7,7 @@
 
 namespace flappy::model {
 
-/// In double precision; `side`: +1 left, -1 right.
+/// `side`: +1 left, -1 right. Strips and series belong to strip_aerodynamics.hpp.
 JointedParameters<double> derive_jointed(const Vehicle& vehicle);
 std::vector<Strip<double>> derive_strips(const Jointed::Wing& wing, double air_density_kg_m3, double side);
 SeriesOfForce<double> derive_series(const Jointed::Wing& wing);

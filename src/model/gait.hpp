@@ -1,15 +1,15 @@
-// A driven angle: a Fourier series in the phase of the beat, modulated by inputs, with the rate and acceleration that belong to it.
+// A driven angle: a Fourier series in the phase of the beat, modulated by inputs, with its rate and acceleration.
 //
-// Phase. The clock t counts beats, t' = f. Timing d makes the first half of a beat faster and the second slower, or the other way round:
+// Phase. The clock t counts beats, t' = f. Timing d > 0 makes the first half of a beat faster and the second slower, d < 0 the opposite:
 //   p = t + d (1 - cos 2 pi t)/(2 pi)     p' = f (1 + d sin 2 pi t) + d' (1 - cos 2 pi t)/(2 pi)
 //   p'' = f' (1 + d sin 2 pi t) + 2 pi f^2 d cos 2 pi t + 2 f d' sin 2 pi t + d'' (1 - cos 2 pi t)/(2 pi)
 // Angle. With O = 2 pi p', the harmonics g(p) = sum a_k cos(2 pi k p) + b_k sin(2 pi k p), factor s and offset o:
 //   g' = O dg    g'' = O^2 ddg + O' dg      q = o + s g     q' = o' + s' g + s g'     q'' = o'' + s'' g + 2 s' g' + s g''
 //   dg = sum k (b_k cos - a_k sin)          ddg = -sum k^2 (a_k cos + b_k sin)
-// so f, d, s and o need two derivatives. They are linear in the inputs u, which follow what is asked for, U, by a critically damped filter of second
-// order with the time constant T, whose derivatives are known:
+// so f, d, s and o need two derivatives. They are linear in the inputs u, which follow the commanded U by a critically damped second-order filter
+// with the time constant T, whose derivatives are known:
 //   u'' = (U - u)/T^2 - 2 u'/T            e = u - U:  e(h) = ((1 + h/T) e + h u') E   u'(h) = ((1 - h/T) u' - h/T^2 e) E   E = exp(-h/T)
-// exact while U is held. cos and sin of the multiples follow by the addition theorem.
+// exact while U is constant. cos and sin of the multiples follow from the addition theorem.
 #pragma once
 
 #include <numbers>
@@ -19,7 +19,7 @@
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
-/// Something with its first two derivatives by time.
+/// A quantity with its first two derivatives by time.
 template <class T>
 struct Moving {
   T value, rate, acceleration;
@@ -35,7 +35,7 @@ FLAPPY_INLINE Moving<T> add_scaled(const Moving<T>& a, const T& s, const Moving<
   return {a.value + s * b.value, a.rate + s * b.rate, a.acceleration + s * b.acceleration};
 }
 
-/// A filter of second order over one time: what e and u' become of e and u', and 1/T^2, 2/T.
+/// A second-order filter over a fixed time: the coefficients that advance e and u', and 1/T^2, 2/T.
 template <class T>
 struct InputFilter {
   T e_of_e, e_of_rate, rate_of_e, rate_of_rate, stiffness_1_s2, damping_1_s;
@@ -58,7 +58,7 @@ FLAPPY_INLINE Moving<T> moving(const InputFilter<T>& f, const T& wanted, const T
   return {u, rate, f.stiffness_1_s2 * T(wanted - u) - f.damping_1_s * rate};
 }
 
-/// Where in its beat a side is: sine and cosine of 2 pi p, and 2 pi p', 2 pi p''.
+/// Phase of the beat on one side: sine and cosine of 2 pi p, and 2 pi p', 2 pi p''.
 template <class T>
 struct BeatPhase {
   SinCos<T> turn;
@@ -72,13 +72,15 @@ FLAPPY_INLINE SinCos<T> turn_of(const T& x) {
   return sin_cos_pi(T(near + near));
 }
 
-/// `clock`: t, beats; `clock_turn`: of 2 pi t. `frequency`: f with its derivatives, of which the second is not looked at.
+/// Phase without timing. `clock_turn`: sine and cosine of 2 pi t. `frequency`: f with its derivatives, of which the
+/// second is not used.
 template <class T>
 FLAPPY_INLINE BeatPhase<T> untimed_phase(const SinCos<T>& clock_turn, const Moving<T>& frequency) {
   const T full(2 * std::numbers::pi);
   return {clock_turn, full * frequency.value, full * frequency.rate};
 }
 
+/// Phase with timing d. `clock`: t, beats.
 template <class T>
 FLAPPY_INLINE BeatPhase<T> timed_phase(const T& clock, const SinCos<T>& clock_turn, const Moving<T>& frequency,
                                        const Moving<T>& timing) {
@@ -91,7 +93,7 @@ FLAPPY_INLINE BeatPhase<T> timed_phase(const T& clock, const SinCos<T>& clock_tu
   return {turn_of(T(clock + d * bulge)), full * rate, full * acceleration};
 }
 
-/// The harmonics g and how they change. `cosine(k)`, `sine(k)`: a and b of harmonic k + 1.
+/// The harmonics g with their derivatives by time. `cosine(k)`, `sine(k)`: a and b of harmonic k + 1.
 template <class T>
 FLAPPY_INLINE Moving<T> harmonics(const BeatPhase<T>& phase, std::size_t count, const auto& cosine, const auto& sine) {
   SinCos<T> at = phase.turn;
@@ -108,7 +110,7 @@ FLAPPY_INLINE Moving<T> harmonics(const BeatPhase<T>& phase, std::size_t count, 
   return {g, w * dg, T(w * w) * ddg + phase.acceleration_rad_s2 * dg};
 }
 
-/// The angle: offset + scale x harmonics.
+/// The angle: offset + scale x harmonics, with its derivatives.
 template <class T>
 FLAPPY_INLINE Moving<T> modulated(const Moving<T>& g, const Moving<T>& scale, const Moving<T>& offset) {
   return {offset.value + scale.value * g.value, offset.rate + T(scale.rate * g.value + scale.value * g.rate),

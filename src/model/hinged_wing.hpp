@@ -1,12 +1,12 @@
-// One wing and its leading edge, hinged at a shoulder: where they are, their inertia seen from the vehicle, and
-// the inertial forces of their motion relative to it.
+// One wing and its leading edge, hinged at a shoulder: their pose, their inertia seen from the vehicle, and the inertial forces of their motion
+// relative to it.
 //
 // In the leading edge's frame L (B turned by beta about z), about the shoulder. h: first moment of mass, P: second
 // moment (integral of r r^T; inertia J = tr P - P); index w: the wing, turned by theta about y; none: wing and edge.
-// Body rate w; relative rates W_edge = (0, 0, b), W_wing = (0, t, b) with b = beta', t = theta'. At zero beta'', theta''
-// a point accelerates, relative to the frozen vehicle, by
+// Body rate w; relative rates W_edge = (0, 0, b), W_wing = (0, t, b) with b = beta', t = theta'. If beta'' = theta'' = 0, the
+// acceleration of a point relative to the frozen vehicle is
 //   2 w x (W x r) + W x (W x r) + W' x r          W'_edge = 0,  W'_wing = (-b t, 0, 0)
-// whose moments are
+// and its moments are
 //   integral r x (2 w x (W x r)) = 2 (P w) x W    integral r x (W x (W x r)) = (P W) x W    J W'
 // Exact; summed over the two bodies they give `relative_force` and `relative_moment`.
 #pragma once
@@ -17,7 +17,7 @@
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
-/// How the hinges of one side turn: psi', theta', and theta'^2, which in a step is a mean of squares.
+/// Hinge rates of one side: psi', theta', and theta'^2, which within a step is a mean of squares.
 template <class T>
 struct HingeRates {
   T stroke_rad_s, rotation_rad_s, rotation2_rad2_s2;
@@ -27,28 +27,29 @@ FLAPPY_INLINE HingeRates<T> hinge_rates(const SideState<T>& q) {
   return {q.stroke_rate_rad_s, q.rotation_rate_rad_s, q.rotation_rate_rad_s * q.rotation_rate_rad_s};
 }
 
-/// Where a wing is and how it moves relative to B.
+/// Pose of a wing, and its motion relative to B.
 template <class T>
 struct WingPose {
   SinCos<T> beta, theta;
   T beta_rate, theta_rate, theta_rate2;
   Vec3<T> body_rate_L;
   Vec3<T> wing_moment_L, moment_L;  // h_w, h
-  Vec3<T> moment, momentum;         // h and the momentum of the relative motion, in B
+  Vec3<T> moment, momentum;         // h, and the momentum of the relative motion, in B
 };
 
-/// What it opposes to acceleration, and what its motion asks for at none.
+/// Inertia of a wing with its leading edge, and the inertial loads of its relative motion while the hinges do not
+/// accelerate.
 template <class T>
 struct WingInertia {
   Sym3<T> second;                      // P, in B
-  Vec3<T> rotation_column;             // d momentum / d theta', in B; that of beta' is (-h_y, h_x, 0)
+  Vec3<T> rotation_column;             // d momentum / d theta', in B; d momentum / d beta' is (-h_y, h_x, 0)
   Vec3<T> stroke_spin, rotation_spin;  // d angular momentum about the shoulder / d beta', d theta', in B
   T stroke_inertia, rotation_inertia, cross_inertia;
   Vec3<T> relative_force_L, relative_moment_L;  // Coriolis and centripetal, without the frozen part
   T stroke_bias, rotation_bias;                 // hinge torques, with the frozen part about the shoulder
 };
 
-/// First moment of a wing and its leading edge about the shoulder, in B: what the centre of mass needs.
+/// First moment of a wing and its leading edge about the shoulder, in B, for the centre of mass.
 template <int side, class T>
 FLAPPY_INLINE Vec3<T> moment_about_shoulder(const SideParameters<T>& p, const SideState<T>& q) {
   const SinCos<T> beta = sin_cos(T(T(side) * q.stroke_rad)), theta = sin_cos(q.rotation_rad);

@@ -12,11 +12,12 @@ namespace flappy::model {
 namespace {
 
 constexpr const char* kModes[] = {"fixed", "driven", "free"};
-constexpr double kMost = 100;  // of what 1 of an input adds
+constexpr double kMax = 100;  // largest change per unit of an input
 constexpr double kShortestLag_s = 1e-5, kLongestLag_s = 1;
 constexpr double kLargestCoefficient = 20;
 constexpr double kFarthest_m = 1;
-/// Points of a beat on which an angle is looked at; between them one of 16 harmonics is off by (pi 16 / 512)^2 / 2, half a percent of it.
+/// Points of a beat at which an angle is evaluated; between them the 16th harmonic is off by at most
+/// (pi 16 / 512)^2 / 2, half a percent of it.
 constexpr int kPoints = 512;
 constexpr double kFullTurn_rad = 2 * std::numbers::pi;
 
@@ -29,8 +30,8 @@ Jointed::Angle read_angle(const io::Table& side, const std::string& name) {
   const auto series = [&](const char* key) {
     std::vector<double> list =
         t.has(key) ? t.numbers(key, {-kFullTurn_rad * 60, kFullTurn_rad * 60}) : std::vector<double>{};
-    if (list.size() > kMostHarmonics)
-      t.fail(key, std::to_string(list.size()) + " harmonics", "at most " + std::to_string(kMostHarmonics));
+    if (list.size() > kMaxHarmonics)
+      t.fail(key, std::to_string(list.size()) + " harmonics", "at most " + std::to_string(kMaxHarmonics));
     for (const double x : list)
       if (std::abs(x) > kFullTurn_rad)
         t.fail(key, io::toml_number(x) + " rad is more than a turn; are these degrees?", "amplitudes in rad");
@@ -50,22 +51,22 @@ Jointed::Wing read_wing(const io::Table& side) {
   for (std::size_t k = 0; k < kAngles.size(); ++k) w.angles[k] = read_angle(side, kAngles[k]);
   const auto t = side.optional_table("aerodynamics");
   if (!t) return w;
-  if (side.has("planform")) side.fail("planform", "beside strips says nothing", "[planform] or [aerodynamics]");
+  if (side.has("planform")) side.fail("planform", "has no use where strips are given", "[planform] or [aerodynamics]");
   for (const std::vector<double>& row : t->rows("strips_m", 4, {-kFarthest_m, kFarthest_m})) {
     if (!(row[0] > 0 && row[1] > 0 && row[2] > 0))
       t->fail("strips_m", "span, width or chord of a strip is not above 0", "[span, width, chord, leading edge]");
     w.strips.push_back({row[0], row[1], row[2], row[3]});
   }
-  if (w.strips.empty() || w.strips.size() > kMostStrips)
-    t->fail("strips_m", std::to_string(w.strips.size()) + " strips", "1 to " + std::to_string(kMostStrips));
+  if (w.strips.empty() || w.strips.size() > kMaxStrips)
+    t->fail("strips_m", std::to_string(w.strips.size()) + " strips", "1 to " + std::to_string(kMaxStrips));
   w.rotational_lift = t->number_or("rotational_lift", 0, {0, 5});
   w.added_mass = t->number_or("added_mass", 0, {0, 5});
   w.rotational_damping_coefficient = t->number_or("rotational_damping_coefficient", 0, {0, 100});
   const auto series = [&](const char* key, std::vector<double>& list) {
     if (!t->has(key)) return;
     list = t->numbers(key, {-kLargestCoefficient, kLargestCoefficient});
-    if (list.empty() || list.size() > kMostTerms)
-      t->fail(key, std::to_string(list.size()) + " terms", "1 to " + std::to_string(kMostTerms));
+    if (list.empty() || list.size() > kMaxTerms)
+      t->fail(key, std::to_string(list.size()) + " terms", "1 to " + std::to_string(kMaxTerms));
   };
   series("normal_sin", w.normal_sin);
   series("tangential_cos", w.tangential_cos);
@@ -74,7 +75,7 @@ Jointed::Wing read_wing(const io::Table& side) {
 
 Jointed::Input read_modulation(const std::string& name, const io::Table& t) {
   Jointed::Input input{read_input(name, t)};
-  const io::Range any{-kMost, kMost};
+  const io::Range any{-kMax, kMax};
   input.lag_s = t.number("lag_s", {kShortestLag_s, kLongestLag_s});
   input.frequency = t.number_or("frequency", 0, any);
   input.timing = t.number_or("timing", 0, any);
@@ -90,17 +91,17 @@ Jointed::Input read_modulation(const std::string& name, const io::Table& t) {
   return input;
 }
 
-/// How far an input may be from 0.
+/// Largest absolute value of an input.
 double reach(const Jointed::Input& i) { return std::max(std::abs(i.low), std::abs(i.high)); }
 
-/// What all inputs together may add.
+/// Largest change that all inputs together may cause.
 double most(const Jointed& v, const auto& part) {
   double sum = 0;
   for (const Jointed::Input& i : v.inputs) sum += reach(i) * part(i);
   return sum;
 }
 
-/// How far the harmonics of an angle go.
+/// Largest absolute value of an angle's harmonics.
 double largest_swing(const Jointed::Angle& a) {
   double largest = 0;
   for (int i = 0; i < kPoints; ++i) {
@@ -122,10 +123,10 @@ Jointed read_jointed(const io::Table& root) {
   Jointed v;
   if (const auto inputs = root.optional_table("input"))
     for (const std::string& name : inputs->keys()) v.inputs.push_back(read_modulation(name, inputs->table(name)));
-  if (v.inputs.size() > kMostInputs) root.fail("input", "there are too many", "at most " + std::to_string(kMostInputs));
+  if (v.inputs.size() > kMaxInputs) root.fail("input", "there are too many", "at most " + std::to_string(kMaxInputs));
   v.left = read_wing(root.table("left"));
   if (is_symmetric(root)) {
-    if (root.has("right")) root.fail("right", "is beside symmetric = true", "no such table, or symmetric = false");
+    if (root.has("right")) root.fail("right", "is given with symmetric = true", "no such table, or symmetric = false");
     v.right = v.left;
   } else {
     v.right = read_wing(root.table("right"));

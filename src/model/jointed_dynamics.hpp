@@ -1,24 +1,25 @@
-// Exact dynamics of a torso and two sides of four angles each, of which any may be fixed, driven or free.
+// Exact dynamics of a torso with articulated wings: two sides of four angles, any of which may be fixed, driven or free.
 //
-// Coordinates. A side's leading edge has the frame E, from B by R_y(-Phi) R_z(s psi) R_x(s phi), its wing R_y(theta) from E, all about the
-// shoulder at r_s: as published (Fei et al. 2019), but for the sign of Phi on the right, so that a vehicle in a mirror has the same numbers. With the axes e_j of the four angles and w_0 the body rate,
+// Coordinates. The leading edge of a side has the frame E, from B by R_y(-Phi) R_z(s psi) R_x(s phi); its wing is R_y(theta) from E, all about the
+// shoulder at r_s: as published (Fei et al. 2019), except the sign of Phi on the right, so that a mirrored vehicle has the same numbers. With the
+// axes e_j of the four angles and w_0 the body rate,
 //   w_j = w_(j-1) + e_j q_j'        a_j = a_(j-1) + e_j q_j'' + w_(j-1) x e_j q_j'         E: j = 3, wing: j = 4
-// Newton and Euler about the shoulder, h the first and P the second moment of mass of a body, A the acceleration of the shoulder less gravity:
+// Newton and Euler about the shoulder, with h the first and P the second moment of mass of a body, A the acceleration of the shoulder less gravity:
 //   force = m A + a x h + w x (w x h)            moment = h x A + (tr P - P) a - w x (P w)
-// and the air that the wing carries along adds Sym3 K on (v_x' , w_y', w_z') of the wing's axes (strip_aerodynamics.hpp), gravity left out.
+// The air that the wing carries adds Sym3 K on (v_x' , w_y', w_z') in the wing's axes (strip_aerodynamics.hpp), without gravity.
 //
-// Unknowns. Accelerations a_0 of the torso's origin and w_0' (both in B), and q'' of the free angles alone. What is linear in them makes a symmetric
-// mass matrix; all else, the prescribed q'' of driven angles among it, goes to the right-hand side, so the body feels its reaction (Kane's method
-// [1] in the form of the composite body [2]). The matrix is factored as L D L^T without pivoting, which a positive definite one does not need.
-// Then inverse dynamics, the same equations with all accelerations known, give the torque about every axis: of a driven one, less what a parallel
-// spring and damper give, that is the muscle's. Its power is that times q'.
+// Unknowns. Accelerations a_0 of the torso's origin and w_0' (both in B), and q'' of the free angles only. The terms that are linear in them form
+// a symmetric mass matrix; all other terms, including the prescribed q'' of driven angles, form the right-hand side, so the body feels the reaction
+// of the gait (Kane's method [1] in the form of the composite body [2]). The matrix is factored as L D L^T without pivoting, which a positive
+// definite matrix does not need. Then inverse dynamics, the same equations with all accelerations known, give the torque about every axis. The
+// torque of a driven axis, less that of a parallel spring and damper, is the muscle's; its power is that torque times q'.
 //
-// In a step h, angles lead rates by half of it (sim/jointed_step.cpp). Springs and stops of free angles act at q + h^2/4 q'', the weighted mean of the
-// angles of three steps, dampers at the mean of old and new rate: of second order, and stable however stiff (Newmark's method [3] with beta = 1/4); both
-// add to the mass matrix.
+// In a step h, angles lead rates by h/2 (sim/jointed_step.cpp). Springs and stops of free angles act at q + h^2/4 q'', the weighted mean of the
+// angles of three steps, dampers at the mean of old and new rate: of second order, and stable for any stiffness (Newmark's method [3] with
+// beta = 1/4). Both add to the mass matrix.
 // [1] Kane, Levinson, Dynamics: Theory and Applications, 1985. [2] Featherstone, Rigid Body Dynamics Algorithms, 2008.
 // [3] Newmark, A method of computation for structural dynamics, J. Eng. Mech. Div. 85, 1959.
-// Assumes rigid bodies and a gait that muscles follow whatever it takes.
+// Assumes rigid bodies, and muscles that follow the gait with whatever torque it needs.
 #pragma once
 
 #include "model/gait.hpp"
@@ -31,7 +32,7 @@ inline namespace FLAPPY_ISA {
 inline constexpr int kJoints = 4;
 enum JointAxis : int { kPlane, kStroke, kDeviation, kRotation };
 
-/// One angle: its mean, or where it is fixed; what pulls it otherwise.
+/// One angle: its mean or fixed value, and the spring, damper and stops that act on it.
 template <class T>
 struct JointParameters {
   T mean_rad, stiffness_Nm_rad, rest_rad, damping_Nm_s;
@@ -41,14 +42,14 @@ struct JointParameters {
 template <class T>
 struct JointedSide {
   Vec3<T> shoulder_m;        // in B
-  T mass_kg;                 // of both bodies
+  T mass_kg;                 // leading edge and wing
   Vec3<T> edge_moment_kg_m;  // first and second moment about the shoulder, in E
   Sym3<T> edge_second_kg_m2;
   Vec3<T> wing_moment_kg_m;  // in the wing's frame
   Sym3<T> wing_second_kg_m2;
   Sym3<T> added;  // K: kg, kg m^2, kg m^2, kg m, kg m^2, kg m
   T rotational_damping_Nm_s2;
-  T pitching_force_N_s2, pitching_force_moment_Nm_s2;  // of strips: the force of that damping, and about z
+  T pitching_force_N_s2, pitching_force_moment_Nm_s2;  // strips: force of that damping, and its moment about z
   JointParameters<T> joints[kJoints];
 };
 
@@ -61,13 +62,13 @@ struct JointedParameters {
   JointedSide<T> left, right;
 };
 
-/// Where a side is, how it moves, and what it would accelerate by if no unknown did; in E.
+/// Pose and motion of a side, and its accelerations while all unknowns are 0; in E.
 template <class T>
 struct JointedPose {
   SinCos<T> plane, beta, lift, theta;
   Vec3<T> axis[kJoints];
   Vec3<T> edge_rate, wing_rate;                  // relative to inertial space
-  Vec3<T> edge_acceleration, wing_acceleration;  // w' and q'' of free angles left out
+  Vec3<T> edge_acceleration, wing_acceleration;  // without w' and the q'' of free angles
   Vec3<T> wing_moment;                           // first moment of the wing
   Sym3<T> wing_second;
   T rate[kJoints];
@@ -85,7 +86,7 @@ struct JointedPose {
   FLAPPY_INLINE Vec3<T> from_wing(const Vec3<T>& v) const { return rotate_y(theta.sin, theta.cos, v); }
 };
 
-/// `q`: of each angle; accelerations of free ones are 0.
+/// `q`: the four angles; the accelerations of free ones are 0.
 template <int side, class T>
 FLAPPY_INLINE JointedPose<T> place_side(const JointedSide<T>& p, const Moving<T> (&q)[kJoints],
                                         const Vec3<T>& body_rate) {
@@ -113,20 +114,21 @@ FLAPPY_INLINE JointedPose<T> place_side(const JointedSide<T>& p, const Moving<T>
   return g;
 }
 
-/// Inertia times a vector, of a second moment.
+/// The inertia tensor of a second moment P, tr P - P, times a vector.
 template <class T>
 FLAPPY_INLINE Vec3<T> inertia_times(const Sym3<T>& second, const Vec3<T>& a) {
   const T trace = T(second.xx + second.yy) + second.zz;
   return trace * a - second * a;
 }
 
-/// What a motion takes of one side, at its shoulder in E.
+/// Force and moments that a motion of one side requires, at its shoulder, in E.
 template <class T>
 struct SideWrench {
   Vec3<T> force, edge_moment, wing_moment;
 };
 
-/// `felt`: acceleration of the shoulder less gravity; `moves`: with it; `air_speed`: the shoulder's velocity in the air; all in E.
+/// `felt`: acceleration of the shoulder less gravity; `moves`: including gravity; `air_speed`: velocity of the shoulder
+/// in the air; all in E.
 template <class T>
 FLAPPY_INLINE SideWrench<T> inertial_wrench(const JointedSide<T>& p, const JointedPose<T>& g, const Vec3<T>& felt,
                                             const Vec3<T>& moves, const Vec3<T>& air_speed,
@@ -154,22 +156,22 @@ FLAPPY_INLINE SideWrench<T> inertial_wrench(const JointedSide<T>& p, const Joint
 }
 
 /// A symmetric system of up to 14 unknowns: a_0, w_0', then free angles.
-inline constexpr int kBodyUnknowns = 6, kMostUnknowns = kBodyUnknowns + 2 * kJoints;
+inline constexpr int kBodyUnknowns = 6, kMaxUnknowns = kBodyUnknowns + 2 * kJoints;
 
 template <class T>
 struct JointedSystem {
-  T matrix[kMostUnknowns][kMostUnknowns];  // lower triangle
-  T right[kMostUnknowns];
+  T matrix[kMaxUnknowns][kMaxUnknowns];  // lower triangle
+  T right[kMaxUnknowns];
 };
 
-/// Solves in place: `right` becomes the unknowns. `fixed`: the size where it is known beforehand, or 0.
+/// Solves in place: `right` becomes the unknowns. `fixed`: the size if it is known at compile time, else 0.
 template <int fixed, class T>
 FLAPPY_INLINE void solve(JointedSystem<T>& s, int any_size) {
   const int size = fixed > 0 ? fixed : any_size;
-  T inverse[kMostUnknowns];
+  T inverse[kMaxUnknowns];
 #pragma GCC unroll 6
   for (int j = 0; j < size; ++j) {
-    T scaled[kMostUnknowns];  // row j of L D
+    T scaled[kMaxUnknowns];  // row j of L D
     T d = s.matrix[j][j], x = s.right[j];
 #pragma GCC unroll 6
     for (int k = 0; k < j; ++k) {
@@ -197,13 +199,13 @@ FLAPPY_INLINE void solve(JointedSystem<T>& s, int any_size) {
   }
 }
 
-/// Which unknown each angle of a side is; none below 0.
+/// Index of the unknown of each angle of a side; -1: the angle is not free.
 struct FreeJoints {
   int unknown[kJoints] = {-1, -1, -1, -1};
   bool operator==(const FreeJoints&) const = default;
 };
 
-/// The torso alone: what gravity does and its motion takes.
+/// Starts the right-hand side with the torso: gravity and its inertial loads. Clears the rows of free angles.
 template <class T>
 FLAPPY_INLINE void begin_system(const JointedParameters<T>& p, const Vec3<T>& w, const Vec3<T>& gravity_B, int size,
                                 JointedSystem<T>& s) {
@@ -234,7 +236,7 @@ FLAPPY_INLINE void put_body(const T& mass, const Vec3<T>& h, const Sym3<T>& P, J
   m[4][3] = J.xy, m[5][3] = J.xz, m[5][4] = J.yz;
 }
 
-/// Adds to the body's block what the air that a wing carries opposes to it.
+/// Adds the inertia of the air that a wing carries to the body's block.
 template <class T>
 FLAPPY_INLINE void add_carried_air(const JointedSide<T>& p, const JointedPose<T>& g, JointedSystem<T>& s) {
   const T zero(0), one(1);
@@ -249,7 +251,8 @@ FLAPPY_INLINE void add_carried_air(const JointedSide<T>& p, const JointedPose<T>
   }
 }
 
-/// What unit acceleration of an angle takes, at the shoulder in E, of the whole side and of its wing.
+/// Force and moments that a unit acceleration of an angle requires, at the shoulder in E: of the whole side, and of its
+/// wing.
 template <class T>
 struct JointColumn {
   Vec3<T> force, moment, wing_moment;
@@ -275,7 +278,7 @@ FLAPPY_INLINE JointColumn<T> joint_column(const JointedSide<T>& p, const Jointed
   return c;
 }
 
-/// What a free angle is pulled by, and what implicit damping and stops add to its inertia.
+/// Torque on a free angle, and the inertia that stands for implicit springs, dampers and stops.
 template <class T>
 struct JointPull {
   T torque_Nm, inertia_kg_m2;
@@ -293,8 +296,8 @@ FLAPPY_INLINE JointPull<T> pull_of(const JointParameters<T>& j, const T& angle, 
           half * T(damping + half * T(j.stiffness_Nm_rad + stop))};
 }
 
-/// Adds one side: its inertia, what its motion takes, and what the air does, `force` and `moment` at the shoulder in E.
-/// `pulls`: of free angles.
+/// Adds one side: its inertia, the loads that its motion requires, and the air's `force` and `moment` at the shoulder
+/// in E. `pulls`: for free angles.
 template <class T>
 FLAPPY_INLINE void add_side(const JointedSide<T>& p, const JointedPose<T>& g, const SideWrench<T>& taken,
                             const Vec3<T>& force, const Vec3<T>& moment, const JointPull<T> (&pulls)[kJoints],
@@ -321,22 +324,22 @@ FLAPPY_INLINE void add_side(const JointedSide<T>& p, const JointedPose<T>& g, co
   }
 }
 
-/// What acts on one side: air at the shoulder in E, the shoulder's velocity in the air in E, pulls of free angles.
+/// Loads on one side: air at the shoulder in E, the shoulder's velocity in the air in E, pulls of free angles.
 template <class T>
 struct JointedLoad {
   Vec3<T> force_N, moment_Nm, air_speed_m_s;
   JointPull<T> pulls[kJoints];
 };
 
-/// What a vehicle does now.
+/// Accelerations and torques of a vehicle at one instant.
 template <class T>
 struct JointedMotion {
   Vec3<T> acceleration_m_s2, angular_acceleration_rad_s2;  // of the origin; in B
   Sides<T[kJoints]> joint_rad_s2;                          // as prescribed, or solved for
-  Sides<T[kJoints]> torque_Nm;                             // about each axis, that holds it to this motion
+  Sides<T[kJoints]> torque_Nm;                             // about each axis: the torque that this motion requires
 };
 
-/// `held`: lanes whose torso does not move. `carries_air`: whether some wing has added mass.
+/// `held`: lanes whose torso does not move. `carries_air`: whether any wing has added mass.
 template <class T, class Held>
 FLAPPY_INLINE JointedMotion<T> accelerate(const JointedParameters<T>& p, const Sides<JointedPose<T>>& pose,
                                           const Sides<Moving<T>[kJoints]>& q, const Sides<JointedLoad<T>>& load,

@@ -1,4 +1,4 @@
-// Three-vectors, symmetric tensors and quaternions over a scalar type; no more than the physics needs.
+// Three-vectors, symmetric tensors and quaternions over a scalar type, restricted to what the physics needs.
 #pragma once
 
 #include "model/scalar.hpp"
@@ -15,7 +15,7 @@ struct Vec3 {
   friend FLAPPY_INLINE Vec3 operator*(const T& s, const Vec3& a) { return {s * a.x, s * a.y, s * a.z}; }
 };
 
-/// The vector (-h_y, h_x, 0): z x h. It is never formed; its products are written out.
+/// The vector z x h = (-h_y, h_x, 0), which is never formed; its products are written out.
 template <class T>
 struct AcrossZ {
   const Vec3<T>& h;
@@ -70,7 +70,8 @@ struct Sym3 {
   }
 };
 
-/// An inverse as adjugate / determinant, not yet multiplied out: what follows need not wait for the division.
+/// An inverse as adjugate and 1 / determinant, not multiplied out, so that later products need not wait for the
+/// division.
 template <class M, class T>
 struct Inverse {
   M adjugate;
@@ -100,13 +101,13 @@ template <class T>
 FLAPPY_INLINE Vec3<T> rotate_z(const T& s, const T& c, const T& x, const T& z) {
   return {c * x, s * x, z};
 }
-/// Rotates it back: by the transpose.
+/// Rotates a vector back, by the transpose.
 template <class T>
 FLAPPY_INLINE Vec3<T> rotate_back_z(const T& s, const T& c, const Vec3<T>& v) {
   return {c * v.x + s * v.y, c * v.y - s * v.x, v.z};
 }
 
-/// The same about x and y.
+/// Rotations of a vector about x and y.
 template <class T>
 FLAPPY_INLINE Vec3<T> rotate_x(const T& s, const T& c, const Vec3<T>& v) {
   return {v.x, c * v.y - s * v.z, s * v.y + c * v.z};
@@ -183,8 +184,8 @@ FLAPPY_INLINE Matrix3<T> rotation_matrix(const Quaternion<T>& q) {
           {q.x * z2 - wy, q.y * z2 + wx, T(1) - (xx + yy)}};
 }
 
-/// Attitude after a rotation by the small rotation vector 2 e given in body axes: q (1, e), brought back to unit
-/// length by one Newton step, exact to |e|^4 and free of drift.
+/// Attitude after a rotation by the small rotation vector 2 e in body axes: q (1, e), brought back to unit length by
+/// one Newton step, exact to |e|^4 and free of drift.
 template <class T>
 FLAPPY_INLINE Quaternion<T> rotated(const Quaternion<T>& q, const Vec3<T>& e) {
   const Quaternion<T> r{q.w - (q.x * e.x + (q.y * e.y + q.z * e.z)), q.x + (q.w * e.x + (q.y * e.z - q.z * e.y)),

@@ -1,4 +1,4 @@
-// Our own elementary functions: libm's change with the processor, these give the same bits everywhere.
+// Elementary functions that give the same bits on every processor, which those of libm do not.
 // Minimax polynomials; the stated errors are those of the polynomial, before rounding.
 #pragma once
 
@@ -16,7 +16,7 @@ FLAPPY_INLINE T polynomial(T x, double c0, C... higher) {
   else return polynomial(x, higher...) * x + T(c0);
 }
 
-/// Angles that sin_cos accepts: every joint of a vehicle stays within.
+/// Largest angle that sin_cos() accepts; every joint of a vehicle stays within it.
 inline constexpr double kLargestAngle_rad = 1.75;
 
 template <class T>
@@ -46,8 +46,8 @@ FLAPPY_INLINE SinCos<T> sin_cos(T x) {
   }
 }
 
-/// exp(-y) = 2^-k (1 - r + r^2 e) with a whole k and |r| < 0.35. Relative error of the polynomials: 4e-9 in float, 4e-18
-/// in double.
+/// exp(-y) = 2^-k (1 - r + r^2 e) with a whole k and |r| < 0.35. Relative error of the polynomials: 4e-9 in float,
+/// 4e-18 in double.
 template <class T>
 struct ExpParts {
   T k, r, e;
@@ -73,15 +73,15 @@ FLAPPY_INLINE ExpParts<T> exp_parts(T y) {
                        2.7631276775699542e-7, -2.5117896702802308e-8)};
 }
 
-/// exp(-x) for x >= 0; 0 where it would be subnormal.
+/// exp(-x) for x >= 0; 0 if the result would be subnormal.
 template <class T>
 FLAPPY_INLINE T exp_negative(T x) {
   const auto [k, r, e] = exp_parts(min(x, T(kLargestDecay<T>)));
   return where(x > T(kLargestDecay<T>), T(0), T(T(T(r * r) * e + (T(1) - r)) * half_to(k)));
 }
 
-/// exp(x); 0 below -87 (double: -708), where it would be subnormal, and no more than exp(88) (double: exp(709)), which is
-/// finite.
+/// exp(x); 0 below -87 (double: -708), where the result would be subnormal, and at most exp(88) (double: exp(709)),
+/// which is finite.
 template <class T>
 FLAPPY_INLINE T exp(T x) {
   constexpr double kLargest = sizeof(Element<T>) == 4 ? 88 : 709;
@@ -89,7 +89,7 @@ FLAPPY_INLINE T exp(T x) {
   return where(x < T(-kLargestDecay<T>), T(0), T(T(T(r * r) * e + (T(1) - r)) * half_to(k)));
 }
 
-/// Hyperbolic tangent, from exp(-2 |x|) - 1, which keeps its digits where x is small.
+/// Hyperbolic tangent, from exp(-2 |x|) - 1, which keeps its digits for small x.
 template <class T>
 FLAPPY_INLINE T tanh(T x) {
   const auto [k, r, e] = exp_parts(min(T(kLargestDecay<T>), T(T(2) * abs(x))));
@@ -98,8 +98,8 @@ FLAPPY_INLINE T tanh(T x) {
   return copysign(T(below_one / (T(2) + below_one)), x);
 }
 
-/// Natural logarithm of a positive normal number. Relative error below 2.4e-7 in float, 4.5e-16 in double; of the
-/// polynomials: 9e-10 and 3e-17.
+/// Natural logarithm of a positive normal number. Relative error below 2.4e-7 in float, 4.5e-16 in double; relative
+/// error of the polynomials 9e-10 and 3e-17.
 template <class T>
 FLAPPY_INLINE T log(T x) {
   const T whole = mantissa(x), k = exponent(x);
@@ -120,7 +120,7 @@ FLAPPY_INLINE T atan2(T y, T x) {
   constexpr double kTanHalfOctant = 0.41421356237309505;
   const T a = abs(x), b = abs(y);
   const T low = min(b, a), high = max(a, b);
-  const auto upper = low > T(high * T(kTanHalfOctant));  // then by tan(angle - pi / 4), halved lest the sum overflows
+  const auto upper = low > T(high * T(kTanHalfOctant));  // then by tan(angle - pi / 4), halved against overflow
   const T over = where(upper, T(T(0.5) * T(low - high)), low);
   const T under = where(upper, T(T(0.5) * low + T(T(0.5) * high)), high);
   const T t = over / where(under == T(0), T(1), under), u = t * t;
@@ -137,8 +137,7 @@ FLAPPY_INLINE T atan2(T y, T x) {
   return copysign(where(x < T(0), T(T(std::numbers::pi) - quadrant), quadrant), y);
 }
 
-/// Arc sine; arguments outside [-1, 1] count as the nearer end. Relative error of the polynomials: 6e-9 in float, 2e-17 in
-/// double.
+/// Arc sine; arguments outside [-1, 1] are clamped. Relative error of the polynomials: 6e-9 in float, 2e-17 in double.
 template <class T>
 FLAPPY_INLINE T asin(T x) {
   const T a = min(T(1), abs(x));
@@ -176,7 +175,7 @@ FLAPPY_INLINE SinCos<T> sin_cos_pi(T x) {
 template <class T>
 FLAPPY_INLINE SinCos<T> sin_cos_wide(T x) {
   const T q = T(x * T(2 / std::numbers::pi) + T(kToWhole<T>)) - T(kToWhole<T>);
-  T r;  // x - q pi / 2, of which each part but the last is exact times q
+  T r;  // x - q pi / 2; all parts of pi / 2 but the last are exact when multiplied by q
   if constexpr (sizeof(Element<T>) == 4)
     r = ((x - q * T(1.5703125)) - q * T(0.0004837512969970703)) - q * T(7.549789954891882e-08);
   else r = (x - q * T(1.5707963267959713)) + q * T(1.0746346554971943e-12);

@@ -1,11 +1,11 @@
-// Brushed motor, gear and stroke spring of one wing. Gear N, efficiency eta; friction f, damping b, inertia J motor-side:
+// Brushed motor, gear and stroke spring of one wing. Gear N, efficiency eta; friction f, damping b, inertia J on the motor's side:
 //   tau = N eta (K i - J N psi'' - b N psi' - f sgn psi')      i = (V - K N psi')/R, also when driven back
 // so about the stroke axis: torque per volt N eta K/R, damping eta N^2 (K^2/R + b), friction eta N f, inertia eta N^2 J.
-// The rotor's spin N psi', of sense s and parallel to the stroke's axis, is in the body's momentum, too: S beta' about z with
-// S = s N J, as much as a disc of inertia S that turns with the leading edge has. So derive() hangs such a disc on the leading
-// edge, takes it from the body and S from the stroke's inertia: nothing else changes, and the coupling S w_z' beta'' between
-// yaw and stroke is exact. The gear's efficiency is left out of it, or momentum would be lost.
-// Spring: -k (psi - psi_0), a k for each direction. Winding inductance is neglected.
+// The rotor's spin N psi', of sense s and parallel to the stroke's axis, adds S beta' about z to the body's momentum, with S = s N J: as much as a
+// disc of inertia S that turns with the leading edge. Therefore derive() adds such a disc to the leading edge, and subtracts it from the body and S
+// from the stroke's inertia. Nothing else changes, and the coupling S w_z' beta'' between yaw and stroke is exact. The gear's efficiency is left out
+// of it, because momentum would be lost otherwise.
+// Spring: -k (psi - psi_0), with a separate k for each direction. Winding inductance is neglected.
 #pragma once
 
 #include "model/flapper.hpp"
@@ -19,7 +19,7 @@ FLAPPY_INLINE T spring_torque(const SideParameters<T>& p, const T& stroke_rad) {
   return -T(where(x > T(0), p.spring_positive_Nm_rad, p.spring_negative_Nm_rad) * x);
 }
 
-/// Torque about psi, dry friction and rotor inertia excluded: they belong to the solve.
+/// Torque about psi, without dry friction and rotor inertia, which the solver of the step adds.
 template <class T>
 FLAPPY_INLINE T drive_torque(const SideParameters<T>& p, const SideState<T>& q, const T& voltage_V) {
   return p.stroke_torque_per_V_Nm * voltage_V +

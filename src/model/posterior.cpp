@@ -10,10 +10,11 @@ namespace {
 
 using Rows = std::vector<std::vector<double>>;
 
-/// Of a correlation: what rounding may leave of nothing, in a file of shortest digits or in a product of matrices.
+/// Share of a correlation that rounding may leave instead of 0, in a file of shortest digits or in a product of
+/// matrices.
 constexpr double kRounding = 1e-9;
 
-/// Whether a is what b is, but for rounding, beside the size that they could have.
+/// Whether a equals b up to rounding, relative to their possible `size`.
 bool same(double a, double b, double size) { return std::abs(a - b) <= kRounding * size; }
 
 std::string numbers(const std::vector<double>& values) {
@@ -82,7 +83,7 @@ std::optional<Rows> lower_factor(const Posterior& posterior) {
     if (!(c[i][i] >= 0)) return std::nullopt;
     sd[i] = std::sqrt(c[i][i]);
   }
-  // Cholesky's, of the correlations, so that units do not matter.
+  // Cholesky's factorisation of the correlations, so that units do not matter
   Rows lower(n, std::vector<double>(n, 0));
   for (std::size_t i = 0; i < n; ++i)
     for (std::size_t j = 0; j <= i; ++j) {
@@ -96,7 +97,7 @@ std::optional<Rows> lower_factor(const Posterior& posterior) {
       } else if (lower[j][j] > 0) {
         lower[i][j] = left / lower[j][j];
       } else if (std::abs(left) > std::sqrt(kRounding)) {
-        return std::nullopt;  // with nothing of its own, it cannot move another
+        return std::nullopt;  // its variance is fully explained, so it cannot correlate with another
       }
     }
   for (std::size_t i = 0; i < n; ++i)
@@ -121,7 +122,7 @@ Posterior posterior_of(const std::function<Vehicle(const std::vector<double>&)>&
     std::vector<double> up = mean, down = mean;
     up[k] += step, down[k] -= step;
     const std::vector<double> above = values(up), below = values(down);
-    // A value at the end of its range moves to one side only.
+    // a value at the end of its range moves to one side only
     for (std::size_t i = 0; i < best.size(); ++i) {
       const double rise = above[i] - best[i], fall = best[i] - below[i];
       slopes[i][k] = (std::abs(rise) >= std::abs(fall) ? rise : fall) / step;

@@ -1,4 +1,4 @@
-// The posterior of a vehicle: as a table of its file, as what draws are made of, and made from what a fit found.
+// The posterior of a vehicle: its table in the vehicle file, its factor for random draws, and its construction from a fit.
 #pragma once
 
 #include <functional>
@@ -11,19 +11,21 @@
 
 namespace flappy::model {
 
-/// The table [posterior] of a file of this vehicle. io::InputError for a path that the vehicle does not have, has twice, or that
-/// no flapper can have of its own; a mean out of its range; sizes that do not fit; and what is no covariance.
+/// Reads the table [posterior] of the file of `vehicle`. Throws io::InputError for a path that the vehicle does not
+/// have, that is given twice, or that is the same for a whole batch; for a mean out of its range; for sizes that do not
+/// match; and for a covariance that is not symmetric and positive semidefinite.
 Posterior read_posterior(const io::Table& table, const Vehicle& vehicle);
 
-/// The text that reads back the same.
+/// Text that reads back as the same posterior.
 std::string posterior_text(const Posterior& posterior);
 
-/// Lower triangle L, rows of it, with covariance = L L^T; nothing where the covariance is not positive semidefinite. A
-/// parameter that those before it settle has nothing in its own column.
+/// Lower triangle L by rows, with covariance = L L^T; nullopt if the covariance is not positive semidefinite. The
+/// column of a parameter that earlier parameters determine is 0.
 std::optional<std::vector<std::vector<double>>> lower_factor(const Posterior& posterior);
 
-/// The posterior of all parameters that move with the coordinates of a fit, their mean and covariance given: the best vehicle's
-/// figures as means, and to first order, one standard deviation to the side that moves more, how they vary.
+/// The posterior of all parameters that depend on the coordinates of a fit, from the mean and covariance of the
+/// coordinates. Means are the parameters of the best vehicle. The covariance is to first order: each slope is a
+/// difference over one standard deviation, to the side on which the parameter moves more.
 Posterior posterior_of(const std::function<Vehicle(const std::vector<double>& coordinates)>& vehicle_of,
                        const std::vector<double>& mean, const std::vector<std::vector<double>>& covariance);
 

@@ -1,6 +1,6 @@
-// The vocabulary that physics is written in, for plain float and double; lanes.hpp has the same words for
-// many flappers at once. FLAPPY_ISA names the instruction set a file is compiled for, so that one program can
-// hold the same templates for several of them without the linker merging their code.
+// Functions in which the physics is written, for plain float and double; lanes.hpp has the same functions for many flappers at once. FLAPPY_ISA
+// names the instruction set for which a file is compiled, so that one program can contain the same templates for several instruction sets without
+// the linker merging their code.
 #pragma once
 
 #include <bit>
@@ -18,7 +18,7 @@ inline namespace FLAPPY_ISA {
 FLAPPY_INLINE float where(bool condition, float yes, float no) { return condition ? yes : no; }
 FLAPPY_INLINE double where(bool condition, double yes, double no) { return condition ? yes : no; }
 FLAPPY_INLINE bool any(bool condition) { return condition; }
-/// any(), where the compiler is to favour the other way.
+/// any(), with a hint to the compiler that it is usually false.
 template <class M>
 FLAPPY_INLINE bool rarely(const M& mask) {
   return __builtin_expect(any(mask), 0);
@@ -36,8 +36,8 @@ FLAPPY_INLINE double abs(double a) { return __builtin_fabs(a); }
 FLAPPY_INLINE float copysign(float magnitude, float sign) { return __builtin_copysignf(magnitude, sign); }
 FLAPPY_INLINE double copysign(double magnitude, double sign) { return __builtin_copysign(magnitude, sign); }
 
-// The words below read and write the bits of numbers. Adding 1.5 x 2^23 (in double 2^52) puts a whole number into the
-// lowest bits, without a conversion, which not every instruction set has.
+// The functions below read and write the bits of numbers. Adding 1.5 x 2^23 (in double 1.5 x 2^52) puts a whole number
+// into the lowest bits, without a conversion, which not every instruction set has.
 
 /// 2^-k for a whole number k within the normal range.
 FLAPPY_INLINE float half_to(float k) { return std::bit_cast<float>(std::bit_cast<std::uint32_t>(12583039 - k) << 23); }
@@ -72,7 +72,7 @@ struct ElementOf {
 template <class T>
 using Element = typename ElementOf<T>::type;
 
-/// Adding it rounds to a whole number, ties to even, up to 2^22 in float and 2^51 in double.
+/// Adding this constant rounds to a whole number, ties to even, up to 2^22 in float and 2^51 in double.
 template <class T>
 inline constexpr double kToWhole = sizeof(Element<T>) == 4 ? 0x1.8p23 : 0x1.8p52;
 template <class T>

@@ -12,7 +12,7 @@
 namespace flappy::model {
 namespace {
 
-constexpr double kLongest_m = 1.0;  // no part of a vehicle is farther from its frame than this
+constexpr double kLongest_m = 1.0;  // largest distance of a part of a vehicle from its frame
 
 class Lister {
  public:
@@ -103,7 +103,7 @@ class Lister {
     add(path + ".shoulder_m", s.shoulder_m);
     const std::size_t edge = list_.size();
     add(path + ".leading_edge", s.leading_edge);
-    for (std::size_t k = edge; k < list_.size(); ++k) list_[k].optional = true;  // none, or all that it needs
+    for (std::size_t k = edge; k < list_.size(); ++k) list_[k].optional = true;  // a file gives none or all of them
     add(path + ".wing", s.wing);
     for (std::size_t k = 0; k < kAngles.size(); ++k) add(path + "." + kAngles[k], w.angles[k]);
     if (w.strips.empty()) add(path + ".planform", s.planform);
@@ -140,10 +140,12 @@ class Lister {
   std::vector<Parameter>& list_;
 };
 
-/// The largest principal moment may exceed the sum of the other two, which it equals for a flat plate, by this share of it: files round.
+/// Share by which rounding in files may raise the largest principal moment above the sum of the other two, which it
+/// equals for a flat plate.
 constexpr double kRounding = 1e-4;
 
-/// Why no rigid body has this inertia; empty where one has. The principal moments of a body are positive, and none exceeds the sum of the other two.
+/// Why no rigid body has this inertia; empty if it is possible. The principal moments of a body are positive, and none
+/// exceeds the sum of the other two.
 std::string impossible(const InertiaTensor& i) {
   Eigen::Matrix3d m;
   m << i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz;
@@ -154,7 +156,7 @@ std::string impossible(const InertiaTensor& i) {
   return io::format("its largest principal moment exceeds the sum of the other two by %.3g %% of it", 100 * excess);
 }
 
-/// A body that a file leaves out.
+/// Whether a file leaves this body out.
 bool absent(const RigidBody& b) {
   const InertiaTensor& i = b.inertia_kg_m2;
   const Triple& c = b.com_m;
@@ -169,7 +171,7 @@ std::vector<Parameter> parameters(Vehicle& v) {
   Lister l(list);
   l.add("air.density_kg_m3", v.air_density_kg_m3, 0, 100);
   const auto add_effects = [&] {
-    for (const EffectEntry& e : catalogue_of(v))
+    for (const CatalogueEffect& e : catalogue_of(v))
       if (const auto own = v.effects.find(e.info.id); own != v.effects.end())
         for (const EffectParameter& p : e.parameters)
           if (const auto value = own->second.find(p.name); value != own->second.end())

@@ -1,26 +1,26 @@
 // Exact dynamics of the five bodies: torso, two leading edges, two wings.
 //
-// Coordinates: momentum through the velocity of the whole vehicle's centre of mass C, body rate w, and the hinge
-// rates q' = (beta_l', beta_r', theta_l', theta_r'). About C the translation decouples exactly:
+// Coordinates: the velocity of the whole vehicle's centre of mass C (its momentum / mass), body rate w, and the hinge rates
+// q' = (beta_l', beta_r', theta_l', theta_r'). About C the translation decouples exactly:
 //   M dv_C/dt = F + M g
 //   | I    G | | w'  |   | t |     I: inertia about C
 //   | G^T  H | | q'' | = | r |     G: angular momentum about C per unit hinge rate
-//                                  H: hinge inertias, rotor included, less what the motion of C takes, e_i . e_j / M
-// e_i: momentum per unit hinge rate; t: external less relative inertial moment, less w x I w. A hinge also feels its
-// shoulder's acceleration A = (F - F_rel)/M + w x (w x d), d from C to the shoulder. Elimination goes body, strokes,
-// rotations; the rotations come last so that a wing landing on its stop is one 2x2 solve.
+//                                  H: hinge inertias, rotor included, less the share of the motion of C, e_i . e_j / M
+// e_i: momentum per unit hinge rate; t: external less relative inertial moment, less w x I w. A hinge also feels the acceleration of its shoulder,
+// A = (F - F_rel)/M + w x (w x d), d from C to the shoulder. Elimination order: body, strokes, rotations. Rotations come last so that a wing that
+// lands on its stop is one 2x2 solve.
 //
-// Time step h: rates first, then positions with the new rates, a leapfrog in which positions lead by h/2. What depends on
-// rates is taken in the middle of the step, where positions already are (sim/physics_step.hpp): at rates of its start it
-// would be first order in h, whatever the stops do. Linear damping is taken at the mean of old and new rate, M_rd at |old| new
-// (exact for pure quadratic drag). Dry friction is the torque that would stop the hinge within the step, limited to the
-// friction: it sticks, but for what reaches a stroke through its wing's rotation, first order in h.
+// Time step h: rates first, then positions with the new rates, a leapfrog in which positions lead by h/2. Terms that depend on rates are taken in the
+// middle of the step, where positions already are (sim/physics_step.hpp): with the rates at its start, the method would be first order in h even
+// without stops. Linear damping acts at the mean of old and new rate, M_rd at |old| new (exact for pure quadratic drag). Dry friction is the torque
+// that would stop the hinge within the step, limited to the friction, so the hinge sticks. The part that reaches a stroke through the rotation of its
+// wing is first order in h.
 //
-// A landing takes two steps. In the first, a stop prescribes the turn d that lands on it exactly, which leaves d/h = tau u of the
-// rate u; in the second the hinge would be held, and the rest of its momentum goes. Angles lead rates by h/2, so it landed
-// (3/2 - tau) h before the rates at the end of the second step. What pulls a stroke off its stop acts from then on: with a = the
-// acceleration without the stop, it leaves with the rate (3/2 - tau) h a; unless another hinge lands in the same step, whose
-// impulse is not what pulls. No penetration, and the impulse only ever takes energy.
+// A landing takes two steps. In the first, the stop prescribes the turn d that lands on it exactly, which leaves d/h = tau u of the rate u. In the
+// second the hinge would be held, and the rest of its momentum goes. Angles lead rates by h/2, so the landing was (3/2 - tau) h before the rates at
+// the end of the second step, and a torque that pulls the stroke off its stop acts from then on: with a = the acceleration without the stop, the
+// stroke leaves with the rate (3/2 - tau) h a. Exception: another hinge lands in the same step, because its impulse is not such a torque. No
+// penetration, and the impulse never adds energy.
 #pragma once
 
 #include "model/hinged_wing.hpp"
@@ -28,24 +28,24 @@
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
-/// The same thing of both sides.
+/// A quantity of the left and of the right side.
 template <class S>
 struct Sides {
   S left, right;
 };
 
-/// What acts on one side during a step.
+/// Loads on one side during a step.
 template <class T>
 struct SideLoad {
-  T force_x_N, force_z_N;                  // on the wing at the shoulder, in L; none along the span
-  Vec3<T> moment_Nm;                       // the same
+  T force_x_N, force_z_N;                  // on the wing at the shoulder, in L; the force along the span is 0
+  Vec3<T> moment_Nm;                       // on the wing about the shoulder, in L
   T stroke_torque_Nm, rotation_torque_Nm;  // about beta and theta, dry friction and inertia excluded
-  T rotation_stiffening_kg_m2;             // what implicit damping adds to the inertia about theta
+  T rotation_stiffening_kg_m2;             // inertia about theta that stands for implicit damping
 };
 
 template <class T>
 struct BodyLoad {
-  Vec3<T> force_B, moment_B;  // besides the wings; the moment is about the vehicle's centre of mass
+  Vec3<T> force_B, moment_B;  // in addition to the wings; the moment is about the vehicle's centre of mass
 };
 
 /// The whole vehicle about its centre of mass C.
@@ -69,8 +69,7 @@ FLAPPY_INLINE Vec3<T> centre_of_mass(const Parameters<T>& p, const State<T>& x) 
                                                        moment_about_shoulder<-1>(p.right, x.right)));
 }
 
-/// Second moment that an assembly of first moment h, hung at s, adds about the origin besides its own: s h^T
-/// + h s^T.
+/// Second moment that an assembly with first moment h, hung at s, adds about the origin to its own: s h^T + h s^T.
 template <class T>
 FLAPPY_INLINE Sym3<T> hung_at(const Vec3<T>& s, const Vec3<T>& h) {
   const T xx = s.x * h.x, yy = s.y * h.y, zz = s.z * h.z;
@@ -89,8 +88,8 @@ FLAPPY_INLINE Sym3<T> second_moment_about_com(const Parameters<T>& p, const Side
   return placed + (wing.left.second + wing.right.second);
 }
 
-/// Rates of this step and of the one before, stops and friction of one hinge, about beta or theta. Stops as the turns in
-/// one step that just reach them.
+/// Rates of this step and the previous one, stops and friction of one hinge, about beta or theta. A stop is given as
+/// the turn within one step that just reaches it.
 template <class T>
 struct Hinge {
   T rate, before, lowest_turn, highest_turn, friction;
@@ -110,7 +109,7 @@ FLAPPY_INLINE Hinge<T> rotation_hinge(const SideParameters<T>& p, const SideStat
           p.rotation_upper_rad - q.rotation_rad, p.rotation_friction_Nm};
 }
 
-/// Dry friction: the torque that would stop the hinge within the step, no more than the friction.
+/// Dry friction: the torque that would stop the hinge within the step, limited to the friction.
 template <class T>
 FLAPPY_INLINE T dry_friction(const T& inertia, const Hinge<T>& q, const T& torque, const T& per_step) {
   return clamp(T(-(inertia * T(q.rate * per_step) + torque)), T(-q.friction), q.friction);
@@ -131,12 +130,12 @@ FLAPPY_INLINE Inverse<Sym2<T>, T> inverse(const Sym2<T>& m) {
   return {{m.rr, m.ll, -m.lr}, T(1) / T(m.ll * m.rr - m.lr * m.lr)};
 }
 
-/// What the body opposes to forces and moments about C. A body that is held opposes everything.
+/// Inertia of the body against forces and moments about C; infinite for a body that is held.
 template <class T>
 struct BodyInertia {
   T inverse_mass;
   Sym3<T> second_moment;        // of the whole vehicle about C, wings frozen
-  Inverse<Sym3<T>, T> inverse;  // of its inertia
+  Inverse<Sym3<T>, T> inverse;  // of the inertia tensor
 };
 
 template <class T>
@@ -152,7 +151,7 @@ FLAPPY_INLINE BodyInertia<T> body_inertia(const Parameters<T>& p, const State<T>
   return b;
 }
 
-/// What drives the body and the shoulders while the hinges do not accelerate.
+/// Loads on the body, and accelerations of the shoulders while the hinges do not accelerate.
 template <class T>
 struct BodyDrive {
   Vec3<T> force, moment;                  // F, and t about C
@@ -196,8 +195,8 @@ template <class T>
 struct HingeSystem {
   Vec3<T> stroke_l, stroke_r, rotation_l, rotation_r;  // columns of G
   Sym2<T> strokes, rotations;                          // blocks of H - G^T I^-1 G
-  T ll, rr, lr, rl;                                    // and between them: (stroke, rotation)
-  T s_l, s_r, r_l, r_r;                                // what drives strokes and rotations, dry friction excluded
+  T ll, rr, lr, rl;                                    // coupling of strokes and rotations: (stroke, rotation)
+  T s_l, s_r, r_l, r_r;                                // torques on strokes and rotations, without dry friction
 };
 
 template <class T>
@@ -245,14 +244,14 @@ FLAPPY_INLINE HingeSystem<T> eliminate_body(const Parameters<T>& p, const Sides<
   return h;
 }
 
-/// What remains of the rotations after the strokes are eliminated by beta'' = given + K (s - C theta''). K is
-/// the inverse of the strokes' block; a stroke that its stop prescribes has no row in it.
+/// The rotations after the strokes are eliminated by beta'' = given + K (s - C theta''). K is the inverse of the
+/// strokes' block; a stroke whose turn is prescribed by its stop has a zero row in it.
 template <class T>
 struct RotationSystem {
   T z_ll, z_rr, z_lr, z_rl;  // adj(K) C
   Sym2<T> A;
   Inverse<Sym2<T>, T> inverse;       // of A
-  T left_per_right, right_per_left;  // turn that a stop's turn of the other side gives this one: A_lr / A_own
+  T left_per_right, right_per_left;  // turn of this side per turn that a stop takes from the other side: A_lr / A_own
 };
 
 template <class T>
@@ -271,7 +270,7 @@ FLAPPY_INLINE RotationSystem<T> eliminate_strokes(const HingeSystem<T>& h, const
   return e;
 }
 
-/// What a step does to the vehicle.
+/// Motion of the vehicle within a step.
 template <class T>
 struct Motion {
   T stroke_left, stroke_right, rotation_left, rotation_right;  // turns of beta and theta in this step, rad

@@ -14,20 +14,20 @@
 namespace flappy::model {
 namespace {
 
-/// Every effect that such a vehicle may have, for one that there is not.
+/// All effects that such a vehicle may have, for the message about an unknown one.
 std::string known_effects(const std::string& wrong, const Vehicle& vehicle) {
   std::vector<std::string> names;
-  for (const EffectEntry& e : catalogue_of(vehicle)) names.push_back(e.info.id);
+  for (const CatalogueEffect& e : catalogue_of(vehicle)) names.push_back(e.info.id);
   return io::joined(names) + io::did_you_mean(wrong, names);
 }
 
 void read_effects(const io::Table& table, Vehicle& vehicle) {
   for (const std::string& id : table.keys()) {
-    const EffectEntry* effect = find_effect(vehicle, id);
+    const CatalogueEffect* effect = find_effect(vehicle, id);
     if (effect == nullptr && vehicle.jointed && is_effect(id))
       table.fail(id, "acts on wings and motors of another kind of vehicle", "effects of sensors");
     if (effect == nullptr) table.fail(id, "unknown effect", known_effects(id, vehicle));
-    if (effect->mean.drive != nullptr && vehicle.beat_averaged->predicted)
+    if (effect->averaged.drive != nullptr && vehicle.beat_averaged->predicted)
       table.fail(id, "acts between inputs and wings, which predicted forces have in them",
                  "effects that act on the vehicle itself");
     const io::Table entry = table.table(id);
@@ -39,7 +39,7 @@ void read_effects(const io::Table& table, Vehicle& vehicle) {
 const std::vector<std::string> kBodies = {"torso", "left.leading_edge", "left.wing", "right.leading_edge",
                                           "right.wing"};
 
-/// Names of the points and the bodies that they are on; their figures are parameters.
+/// Reads names of points and their bodies; all else of a point is read as parameters.
 void read_contact(const io::Table& table, Vehicle& vehicle) {
   for (const std::string& name : table.keys()) {
     if (!io::is_bare(name)) table.fail(name, "is no name of a point", "letters, digits, underscores and dashes");
@@ -49,9 +49,9 @@ void read_contact(const io::Table& table, Vehicle& vehicle) {
     vehicle.contact.push_back(
         {name, static_cast<ContactPoint::Body>(std::ranges::find(kBodies, on) - kBodies.begin()), {}});
   }
-  if (vehicle.contact.empty() || vehicle.contact.size() > kMostContactPoints)
+  if (vehicle.contact.empty() || vehicle.contact.size() > kMaxContactPoints)
     table.fail("", vehicle.contact.empty() ? "has no point" : "has too many points",
-               "1 to " + std::to_string(kMostContactPoints) + " tables [contact.NAME]");
+               "1 to " + std::to_string(kMaxContactPoints) + " tables [contact.NAME]");
 }
 
 const std::string kMultibody = "multibody", kBeatAveraged = "beat_averaged", kPredicted = "predicted",
@@ -110,7 +110,7 @@ Vehicle read_vehicle(const std::filesystem::path& path, const std::vector<std::s
   Vehicle vehicle = read_any_vehicle(path, overrides);
   if (vehicle.beat_averaged)
     io::Config::load(path).root().fail(
-        "model", "a robot that is known by the beat has no wings",
+        "model", "a beat-averaged vehicle has no wings",
         "a vehicle of wings and motors; flappy-fly, flappy-train and flappy-gap diagnose take both");
   if (vehicle.jointed)
     io::Config::load(path).root().fail("model", "wings whose angles are driven have no motors",
@@ -140,7 +140,7 @@ std::string vehicle_text(const Vehicle& vehicle) {
     if ((!p.optional || *p.value != 0) && !p.path.starts_with("coefficients."))
       text += p.path + " = " + io::toml_number(*p.value) + "\n";
   for (const auto& [id, values] : vehicle.effects)
-    if (values.empty()) text += "effects." + id + " = {}\n";  // in force at its typical size
+    if (values.empty()) text += "effects." + id + " = {}\n";  // in force at its typical magnitude
   if (vehicle.posterior) text += posterior_text(*vehicle.posterior);
   return text;
 }

@@ -1,6 +1,6 @@
 // Wing-beat signal with split cycle (Doman, Oppenheimer, Sigthorsson 2010; here as Fei et al. 2019). Within a beat of fraction t in [0, 1):
 //   V = A cos(pi t / s) + V_0              for t < s
-//   V = A cos(pi (t - 1) / (1 - s)) + V_0  after
+//   V = A cos(pi (t - 1) / (1 - s)) + V_0  for t >= s
 //   left:  A = V_amp + V_d, s = 0.5 - d_sigma      right: A = V_amp - V_d, s = 0.5 + d_sigma
 #pragma once
 
@@ -16,13 +16,13 @@ struct WingBeat {
   T amplitude_V, difference_V, bias_V, split_cycle;
 };
 
-/// Fraction of the beat in [-1/2, 1/2) of a phase counter that is 2^32 times it.
+/// Fraction of the beat in [-1/2, 1/2) from a phase counter, which is 2^32 times the fraction.
 template <class T>
 FLAPPY_INLINE T beat_fraction(std::uint32_t phase) {
   return static_cast<T>(static_cast<std::int32_t>(phase)) * static_cast<T>(0x1p-32);
 }
 
-/// Voltage of one motor. `fraction` of the beat in [-1/2, 1/2), where -x stands for 1 - x; inputs already
+/// Voltage of one motor. `fraction`: of the beat, in [-1/2, 1/2), where -x stands for 1 - x. The inputs are already
 /// clipped.
 template <int side, class T>
 FLAPPY_INLINE T wing_beat_voltage(const WingBeat<T>& u, const T& fraction, const T& limit_V) {

@@ -1,4 +1,4 @@
-// What hidden layers may do to the sums of their inputs.
+// Activation functions of hidden layers.
 #pragma once
 
 namespace flappy::policy {
@@ -10,7 +10,7 @@ inline constexpr const char* kActivationNames[] = {"relu", "tanh", "elu", "silu"
 
 inline const char* name_of(Activation a) { return kActivationNames[static_cast<int>(a)]; }
 
-/// Added to a layer's variance before it is divided by its root, as torch's LayerNorm.
+/// Added to the variance in layer norm before taking the root, as in torch's LayerNorm.
 inline constexpr double kLayerNormEpsilon = 1e-5;
 
 }  // namespace flappy::policy

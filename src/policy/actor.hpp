@@ -1,5 +1,5 @@
-// A trained actor (multilayer perceptron) for many flappers at once: training, evaluation, diagnosis and flights all
-// evaluate it here. Observation rows in, action rows out.
+// Evaluation of a trained actor (multilayer perceptron) for many flappers at once: rows of observations to rows of actions.
+// Training, evaluation, diagnosis and flights all use it.
 #pragma once
 
 #include <algorithm>
@@ -9,29 +9,30 @@
 
 namespace flappy::policy {
 
-inline constexpr int kMaxActions = 4;       // of the wing beat; two voltages
-inline constexpr int kMaxObservation = 40;  // what a flapper of 2 kB has room for: all parts but four numbers
-inline constexpr int kMaxHistory = 8;       // observations that an actor sees at once
+inline constexpr int kMaxActions = 4;  // four wing-beat inputs; or two voltages
+/// Limited by the 2 kB of a flapper; all parts together would have 44 elements.
+inline constexpr int kMaxObservation = 40;
+inline constexpr int kMaxHistory = 8;  // observations that an actor sees at once
 
 inline constexpr int kMaxLayers = 32, kMaxWidth = 2048;
 
-/// Weights of each layer: for every output its bias, then one weight for each input; with layer norm (Ba et al. 2016, arXiv
-/// 1607.06450), those of a hidden layer are followed by a gain for each output, then a shift for each. Hidden layers share one
-/// activation; the last is tanh, or `linear`: its sums as they are, within [-1, 1].
+/// Weights of a layer: for each output its bias, then one weight for each input. With layer norm (Ba et al. 2016, arXiv
+/// 1607.06450), a hidden layer's weights are followed by a gain for each output, then a shift for each output. Hidden
+/// layers share one activation. The last layer's is tanh, or, if `linear`, a clamp to [-1, 1].
 template <class T>
 struct ActorView {
   int layers = 0;                // 0: no actor
-  int widths[kMaxLayers + 1]{};  // inputs, then outputs of each layer
+  int widths[kMaxLayers + 1]{};  // number of inputs, then number of outputs of each layer
   Activation hidden = Activation::relu;
-  bool layer_norm = false;     // of the sums of hidden layers, before their activation
-  bool linear = false;         // the last layer
-  const T* weights = nullptr;  // of all layers, one after the other
-  const T* mean = nullptr;     // of each input
-  const T* scale = nullptr;    // input = clamp((observation - mean) * scale, +-clip)
+  bool layer_norm = false;     // layer norm before each hidden activation
+  bool linear = false;         // the last layer is clamped, without tanh
+  const T* weights = nullptr;  // weights of all layers in order
+  const T* mean = nullptr;     // [input]
+  const T* scale = nullptr;    // [input]: input = clamp((observation - mean) * scale, +-clip)
   T clip = 0;
 };
 
-/// That of an Actor or a PolicyNetwork, whose numbers stand elsewhere.
+/// View of an Actor or a PolicyNetwork, whose weights, mean and scale are stored elsewhere in type T.
 template <class T, class Shape>
 ActorView<T> view_of(const Shape& shape, const T* weights, const T* mean, const T* scale) {
   ActorView<T> view;
@@ -49,7 +50,7 @@ inline namespace FLAPPY_ISA {
 
 using namespace model;
 
-/// tanh of half of x gives the other exponentials: 1 / (1 + exp(-x)) = (1 + t) / 2, exp(x) - 1 = 2 t / (1 - t).
+/// silu and elu are computed from t = tanh(x / 2): 1 / (1 + exp(-x)) = (1 + t) / 2, exp(x) - 1 = 2 t / (1 - t).
 template <class L>
 FLAPPY_INLINE L silu(const L& x) {
   const L half = x * L(0.5);
@@ -79,7 +80,7 @@ FLAPPY_INLINE void activate(Activation kind, int count, L* x) {
   }
 }
 
-/// Takes out the mean of a layer, divides by its standard deviation, and applies gains and shifts.
+/// Layer norm: subtracts the mean of a layer, divides by its standard deviation, and applies gains and shifts.
 template <class L>
 FLAPPY_INLINE void normalise(const Element<L>* gains, int count, L* x) {
   const L share = L(1) / L(static_cast<Element<L>>(count));
@@ -94,7 +95,7 @@ FLAPPY_INLINE void normalise(const Element<L>* gains, int count, L* x) {
   for (int i = 0; i < count; ++i) x[i] = L(x[i] * scale) * L(gains[i]) + L(gains[count + i]);
 }
 
-/// kOutputs neurons at once, so that an input is fetched once for all of them.
+/// Sums of kOutputs neurons at once, so that each input is loaded once for all of them.
 template <int kOutputs, class L>
 FLAPPY_INLINE void neurons(const Element<L>* weights, int inputs, const L* in, L* out) {
   const std::ptrdiff_t row = inputs + 1;
@@ -105,7 +106,7 @@ FLAPPY_INLINE void neurons(const Element<L>* weights, int inputs, const L* in, L
   for (int o = 0; o < kOutputs; ++o) out[o] = sum[o];
 }
 
-/// `observation`: widths[0] rows; `action`: as many as the last layer has outputs.
+/// Evaluates the actor. `observation`: widths[0] rows; `action`: one row for each output of the last layer.
 template <class L>
 FLAPPY_INLINE void evaluate(const ActorView<Element<L>>& actor, const L* observation, L* action) {
   L values[2][kMaxWidth];
@@ -128,7 +129,7 @@ FLAPPY_INLINE void evaluate(const ActorView<Element<L>>& actor, const L* observa
     }
     if (last && actor.linear)
       for (int k = 0; k < outputs; ++k)
-        out[k] = clamp(out[k], L(-1), L(1));  // NOLINT(clang-analyzer-core.CallAndMessage): neurons() wrote it
+        out[k] = clamp(out[k], L(-1), L(1));  // NOLINT(clang-analyzer-core.CallAndMessage): neurons() has written it
     else activate(last ? Activation::tanh : actor.hidden, outputs, out);
   }
   for (int o = 0; o < actor.widths[actor.layers]; ++o) action[o] = values[actor.layers % 2][o];

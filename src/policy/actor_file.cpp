@@ -34,7 +34,7 @@ Actor read_actor(const std::filesystem::path& path) {
     refuse(path, "is no JSON: " + std::string(e.what()), "an actor file");
   }
   Actor a;
-  // what the library would convert in silence
+  // the JSON library would silently convert other types
   const auto check = [&](const char* key, bool (Json::*is)() const noexcept, const char* accepted) {
     for (const Json& x : json.at(key))
       if (!(x.*is)()) refuse(path, std::string(key) + " has " + x.dump() + " in it", accepted);

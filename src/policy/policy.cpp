@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Behind the header, so that what it defines may be static, inline or a macro.
+/// C code that is compiled after the header. It wraps the header's names, so that they may be static, inline or macros.
 constexpr const char* kWrapper = R"(#if !defined FLAPPY_POLICY_OBS || !defined FLAPPY_POLICY_ACT
 #error FLAPPY_POLICY_OBS or FLAPPY_POLICY_ACT is missing
 #endif
@@ -34,7 +34,7 @@ int flappy_loaded_selftest(void) { return flappy_policy_selftest(); }
 
 bool is_of_name(char c) { return c == '_' || std::isalnum(static_cast<unsigned char>(c)) != 0; }
 
-/// What stands before "_POLICY_OBS" where a header defines it, in small letters.
+/// The prefix of a header's names: the text before "_POLICY_OBS", in lower case; kPrefix if there is none.
 std::string prefix_of(const std::string& header) {
   const std::size_t end = header.find("_POLICY_OBS ");
   std::size_t begin = end == std::string::npos ? 0 : end;
@@ -45,10 +45,10 @@ std::string prefix_of(const std::string& header) {
   return prefix;
 }
 
-/// Compiles; the compiler's complaints, or nothing.
+/// Compiles the header into a library. Returns the compiler's messages, or "" on success.
 std::string compile(const fs::path& header, const fs::path& source, const fs::path& library) {
   try {
-    // what C lets pass with a warning would call another function than the one that is meant
+    // -Werror: with these warnings, C code could call another function than the intended one
     const io::Finished finished = io::run({"cc", "-O2", "-shared", "-fPIC", "-Werror=implicit-function-declaration",
                                            "-Werror=incompatible-pointer-types", "-include", header.string(),
                                            source.string(), "-o", library.string(), "-lm"});
@@ -58,7 +58,7 @@ std::string compile(const fs::path& header, const fs::path& source, const fs::pa
   }
 }
 
-/// What a compiler complains about first.
+/// The first error in a compiler's messages, as one line.
 std::string first_error(const fs::path& header, const std::string& complaints) {
   constexpr std::string_view kMark = "error: ";
   const std::size_t mark = complaints.find(kMark);

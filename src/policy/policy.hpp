@@ -1,4 +1,4 @@
-// Policies from elsewhere: a TorchScript file, or an exported C header compiled on the spot.
+// Policies in files of other formats: TorchScript, or an exported C header that is compiled when it is loaded.
 #pragma once
 
 #include <cstddef>
@@ -9,15 +9,15 @@
 
 namespace flappy::policy {
 
-/// A policy from raw physical observations to what it adds to the controller's output, volts and split cycle in fractions of a
-/// beat, or to the voltages of both motors.
+/// Maps observations in physical units to offsets to the controller's output (V, V, V, split cycle in fractions of a
+/// beat), or to the voltages of both motors.
 class Policy {
  public:
   virtual ~Policy() = default;
 
   int observations() const { return observations_; }
   int actions() const { return actions_; }
-  /// `observation`: float[count][observations()]; `action`: float[count][actions()]. One thread at a time.
+  /// `observation`: float[count][observations()]; `action`: float[count][actions()]. Call it from one thread at a time.
   virtual void act(std::size_t count, const float* observation, float* action) const = 0;
 
  protected:
@@ -27,21 +27,23 @@ class Policy {
   int observations_, actions_;
 };
 
-/// A TorchScript file (.pt) whose forward(float[n][observations]) is float[n][actions], or a C header (.h) that defines
+/// Loads a TorchScript file (.pt) whose forward(float[n][observations]) gives float[n][actions], or a C header (.h)
+/// that defines
 ///   FLAPPY_POLICY_OBS, FLAPPY_POLICY_ACT
 ///   void flappy_policy_step(const float obs[FLAPPY_POLICY_OBS], float action[FLAPPY_POLICY_ACT])
-///   int flappy_policy_selftest(void)    0: passed; it runs first
-/// or the same with another prefix.
-/// io::InputError, one line, where it is neither, has other sizes, does not compile or fails its test.
+///   int flappy_policy_selftest(void)    0: passed; it is run on loading
+/// or these names with another prefix than "flappy". Throws io::InputError, one line, if the file is of neither kind,
+/// has other sizes, does not compile or fails its self-test.
 std::unique_ptr<const Policy> load_policy(const std::filesystem::path& path, int observations, int actions);
 
-/// The prefix of names that flappy-export writes unless it is given another.
+/// Default prefix of the names that flappy-export writes.
 inline constexpr std::string_view kPrefix = "flappy";
 
-/// C text in which names that begin with "flappy_" and "FLAPPY_" begin with `prefix` instead, in small and in capital letters; paths stay as they are.
+/// C text in which the prefix of names that begin with "flappy_" or "FLAPPY_" is replaced by `prefix` in the same case.
+/// Paths are not changed.
 std::string with_prefix(std::string_view text, std::string_view prefix);
 
-/// Whether this build or installation reads and writes TorchScript.
+/// Whether this build or installation has the LibTorch plugin, which reads and writes TorchScript.
 bool reads_torch_script();
 
 }  // namespace flappy::policy

@@ -1,4 +1,4 @@
-// A trained actor as numbers alone, in the order in which they are used. Plain C++17, for what includes LibTorch.
+// A trained actor as plain numbers, in the order in which they are used. In C++17, for files that include LibTorch.
 #pragma once
 
 #include <string>
@@ -10,21 +10,20 @@ namespace flappy::policy {
 
 /// action = middle + half tanh(...(clamp((observation - mean) scale, +-clip)))
 struct PolicyNetwork {
-  std::vector<int> widths;  ///< inputs, then outputs of each layer
+  std::vector<int> widths;  ///< number of inputs, then number of outputs of each layer
   Activation hidden = Activation::relu;
-  bool layer_norm = false;  ///< of the sums of hidden layers, before their activation
-  bool linear = false;      ///< the last layer: its sums as they are, within [-1, 1], in place of their tanh
+  bool layer_norm = false;  ///< layer norm before each hidden activation
+  bool linear = false;      ///< the last layer is clamped to [-1, 1], without tanh
   float clip = 0;
-  std::vector<float> mean, scale;  ///< of each input
-  std::vector<float>
-      weights;  ///< of each layer: for every output its bias, then one weight for each input; gains and shifts
-  std::vector<float> middle, half;  ///< of each output, in its unit
+  std::vector<float> mean, scale;   ///< [input]
+  std::vector<float> weights;       ///< in the order of ActorView (actor.hpp)
+  std::vector<float> middle, half;  ///< [output]: middle and half width of the range, in the unit of the output
 
   int inputs() const { return widths.front(); }
   int outputs() const { return widths.back(); }
 };
 
-/// Observations and what is to be done upon them, a row for each: float[rows][inputs], float[rows][outputs].
+/// Test vectors: observations, float[rows][inputs], and the actions they should give, float[rows][outputs].
 struct PolicyVectors {
   int inputs = 0, outputs = 0;
   std::vector<float> observation, action;

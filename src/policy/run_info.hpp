@@ -1,4 +1,4 @@
-// Where an exported header comes from, as its contract names it.
+// Origin of an exported policy, for its contract.
 #pragma once
 
 #include <string>
@@ -6,9 +6,9 @@
 namespace flappy::policy {
 
 struct RunInfo {
-  std::string config_sha256;  ///< of the resolved configuration
-  std::string commit;         ///< of the program that made the run, without "-dirty"
-  bool dirty = false;         ///< the program was built from more than that commit
+  std::string config_sha256;  ///< SHA-256 of the resolved configuration
+  std::string commit;         ///< commit of the program that made the run, without "-dirty"
+  bool dirty = false;         ///< the program had changes that were not committed
   std::string task;
 };
 

@@ -12,7 +12,7 @@
 namespace flappy::policy {
 namespace {
 
-/// The line of a LibTorch complaint that says why.
+/// The line of a LibTorch error message that gives the reason.
 std::string reason(const std::string& complaint) {
   const std::size_t mark = complaint.rfind("Error: ");
   const std::size_t begin = mark == std::string::npos ? 0 : mark + 7;
@@ -43,7 +43,7 @@ class TorchScript : public Policy {
   }
 
  private:
-  mutable torch::jit::Module module_;  // forward() is not const, but changes nothing
+  mutable torch::jit::Module module_;  // forward() is not const, but does not change the module
 };
 
 std::string write(const PolicyNetwork& n, const std::string& contract) {
@@ -61,7 +61,7 @@ std::string write(const PolicyNetwork& n, const std::string& contract) {
   const float* weights = n.weights.data();
   for (std::size_t layer = 0; layer + 1 < n.widths.size(); ++layer) {
     const std::int64_t inputs = n.widths[layer], outputs = n.widths[layer + 1];
-    // for every output its bias, then one weight for each input
+    // for each output its bias, then one weight for each input
     const torch::Tensor all =
         torch::from_blob(const_cast<float*>(weights), {outputs, inputs + 1}, torch::kFloat).transpose(0, 1);
     weights += outputs * (inputs + 1);
@@ -88,7 +88,7 @@ std::string write(const PolicyNetwork& n, const std::string& contract) {
           << "    return torch.where(refused, torch.zeros_like(action), action)\n";
   module.define(forward.str());
   module.eval();
-  std::ostringstream file;  // a file on disk would hold its own name
+  std::ostringstream file;  // a file written to disk would contain its own name
   module.save(file);
   return file.str();
 }
@@ -98,8 +98,8 @@ std::unique_ptr<const Policy> load(const std::filesystem::path& path, int observ
     throw io::InputError(path.string() + ": " + what + "; accepted: " + accepted);
   };
   std::istringstream file(io::read_text(path));
-  at::set_num_threads(1);                       // more of them wait for each other on so few numbers
-  torch::jit::setGraphExecutorOptimize(false);  // the second call gives the bits of the first
+  at::set_num_threads(1);                       // such small networks are slower on more threads
+  torch::jit::setGraphExecutorOptimize(false);  // all calls give the bits of the first one
   std::unique_ptr<TorchScript> policy;
   try {
     policy = std::make_unique<TorchScript>(torch::jit::load(file), observations, actions);

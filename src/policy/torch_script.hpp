@@ -1,4 +1,4 @@
-// The part of policies that needs LibTorch: a plugin, as LibTorch takes half a second to start, for whoever needs it alone.
+// The part of policies that needs LibTorch. It is a plugin, because LibTorch takes half a second to start.
 #pragma once
 
 #include <filesystem>
@@ -10,18 +10,19 @@
 
 namespace flappy::policy {
 
-/// As load_policy(); io::InputError in a build without LibTorch.
+/// load_policy() for TorchScript files. Throws io::InputError in a build without LibTorch.
 std::unique_ptr<const Policy> load_torch_script(const std::filesystem::path& path, int observations, int actions);
 
-/// The bytes of a TorchScript file: forward(float[n][inputs]) is float[n][outputs], where a row with a NaN in it gives zeros; its
-/// attribute `contract` is a text. The same bytes for the same arguments. std::invalid_argument in a build without LibTorch.
+/// The bytes of a TorchScript file whose forward(float[n][inputs]) gives float[n][outputs]; an observation with a NaN
+/// gives zeros. Its attribute `contract` holds the given text. Equal arguments give equal bytes. Throws
+/// std::invalid_argument without LibTorch.
 std::string torch_script(const PolicyNetwork& network, const std::string& contract);
 
-/// What the plugin does: the two functions above.
+/// The functions of the plugin: load_torch_script() and torch_script().
 struct TorchFunctions {
   std::unique_ptr<const Policy> (*load)(const std::filesystem::path& path, int observations, int actions);
   std::string (*write)(const PolicyNetwork& network, const std::string& contract);
 };
-extern "C" const TorchFunctions flappy_torch_functions;  ///< all that the plugin exports
+extern "C" const TorchFunctions flappy_torch_functions;  ///< the only symbol that the plugin exports
 
 }  // namespace flappy::policy

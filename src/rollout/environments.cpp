@@ -11,12 +11,12 @@
 namespace flappy::rollout {
 namespace {
 
-/// Vehicles that hover before episodes start from them, beyond the one of each environment's first.
+/// Vehicles flown to hover, from which episodes after the first start.
 constexpr std::uint32_t kSettledVehicles = 256;
-/// Beyond the range in which a vehicle flies, by which observations are bounded: only what is lost is ever clamped.
+/// Observations are clamped to this multiple of a flying vehicle's range, so that only a lost vehicle is clamped.
 constexpr double kObservationRoom = 10;
-/// Flappers of a block, at most.
-constexpr std::size_t kMostLanes = 64;
+/// Largest number of flappers in a block.
+constexpr std::size_t kMaxLanes = 64;
 
 FlyConfig checked(FlyConfig config) {
   if (config.excitation.changes())
@@ -88,7 +88,7 @@ class EnvironmentsOf final : public Environments {
     fleet_->begin(static_cast<int>(config_.fleet.task.action_repeat));
     io::parallel_for(fleet_->blocks(), fleet_->options().batch.threads, [&](std::size_t block) {
       const auto [first, last] = fleet_->flappers(block);
-      T clamped[kMostLanes * flight::kMaxActions];
+      T clamped[kMaxLanes * flight::kMaxActions];
       for (std::size_t k = 0; k < (last - first) * actions; ++k)
         clamped[k] = static_cast<T>(std::min(std::max(action[first * actions + k], -1.0F), 1.0F));
       fleet_->set_actions(block, clamped);
@@ -116,17 +116,17 @@ class EnvironmentsOf final : public Environments {
   }
 
  private:
-  /// What an environment has been through.
+  /// Progress of an environment.
   struct Life {
     std::uint32_t episode = 0, steps = 0;
     double episode_return = 0;
-    bool over = false;  ///< its episode is, and the next has not started
+    bool over = false;  ///< the episode has ended, and the next has not started
   };
 
-  /// The fleet of a seed, and what hovers before its episodes.
+  /// Makes the fleet for the seed, and the hovers from which its episodes start.
   void prepare() {
     flight::FleetOptions o = config_.fleet;
-    // threads that share a few blocks wait for each other more than they fly
+    // few blocks on many threads: waiting would take longer than flying
     const auto most = static_cast<std::size_t>(io::thread_count(o.batch.threads));
     o.batch.threads = static_cast<int>(std::clamp<std::size_t>(count() / 64, 1, most));
     fleet_.emplace(count(), config_.vehicle, o);
@@ -142,7 +142,8 @@ class EnvironmentsOf final : public Environments {
     }
   }
 
-  /// Its first episode starts as flappy-fly has it start; the next ones where the task starts settled from one of the others.
+  /// Starts the present episode. Episode 0 starts as in flappy-fly; if the task starts settled, later ones start from a
+  /// random hover of others_.
   void start(std::size_t i) {
     Life& life = lives_[i];
     const flight::Snapshot<T>* hover = nullptr;
@@ -166,7 +167,7 @@ class EnvironmentsOf final : public Environments {
     for (std::size_t k = 0; k < bounds_.size(); ++k) row[k] = bounded(k, seen[k]);
   }
 
-  /// What the last step made of an environment; whether its episode ended in it.
+  /// Writes the results of the last step for an environment, and restarts it if due. Returns whether its episode ended.
   bool gather(std::size_t i, std::size_t lane, const flight::Shown<T>& shown, const Transitions& to) {
     Life& life = lives_[i];
     float* const row = to.observation + i * observed_.size();

@@ -1,7 +1,7 @@
-// A configuration as environments of reinforcement learning: one action of all in, one transition of each out, episode after
-// episode. Environment i, given its actions, depends on the seed, on i and on which episode it is in: not on how many there are, nor
-// on threads. Its sensors keep the time of the last reset of all, so an episode that begins later begins at another moment between
-// two of their samples.
+// A configuration as environments of reinforcement learning: step() takes one action and returns one transition for each environment.
+// Environment i depends only on its actions, on the seed, on i and on its episode number: not on the number of environments or of
+// threads. Sensor clocks run on from the last reset of all environments, so an episode that begins later may begin at another moment
+// between two samples.
 #pragma once
 
 #include <memory>
@@ -12,8 +12,8 @@
 
 namespace flappy::rollout {
 
-/// When an environment whose episode is over starts the next: at the end of the step that ended it, in the step after that, whose
-/// action is not used, or when it is reset.
+/// When an environment whose episode is over starts the next one: at the end of the step that ended it; in the
+/// following step, whose action is ignored; or on reset().
 enum class Autoreset { same_step, next_step, disabled };
 
 struct EnvironmentOptions {
@@ -21,19 +21,20 @@ struct EnvironmentOptions {
   Autoreset autoreset = Autoreset::same_step;
 };
 
-/// Where a step of all environments is written, a row for each.
+/// Where step() writes its results, one row for each environment.
 struct Transitions {
   float* observation;  ///< [count][observations]
-  float* reward;       ///< [count]: of all control periods of the step
-  bool* terminated;    ///< [count]: the task is over: a crash, out of bounds, or handed back and paid
-  bool* truncated;     ///< [count]: its time is over
+  float* reward;       ///< [count]: sum over the control periods of the step
+  /// [count]: ended by a rule of the task (any flight::Ended but time-out), or handed back and past until_s.
+  bool* terminated;
+  bool* truncated;  ///< [count]: ended by time-out
 };
 
-/// What the episode that an environment ended last was; where none has ended, nothing.
+/// Result of the last episode that an environment ended; default values before the first.
 struct EndedEpisode {
   float episode_return = 0, length = 0;  ///< length: steps
-  bool success = false;                  ///< as the task says; where it does not: nothing ended it before its time
-  std::uint32_t causes = 0;              ///< bits of flight::Ended; 0: handed back
+  bool success = false;      ///< as the task defines it; without a definition: ended by time-out or hand-back
+  std::uint32_t causes = 0;  ///< bits of flight::Ended; 0: handed back
 };
 
 class Environments {
@@ -43,22 +44,27 @@ class Environments {
   virtual const FlyConfig& config() const = 0;
   std::size_t count() const { return options_.count; }
   const EnvironmentOptions& options() const { return options_; }
-  /// Names, units and what is accepted: observations are clamped to ten times the range in which a vehicle flies, actions are in
-  /// [-1, 1] and stand for the signals' ranges.
+  /// Observed signals; low and high are the bounds to which observations are clamped: ten times the range of a flying
+  /// vehicle.
   const std::vector<flight::Signal>& observed() const { return observed_; }
+  /// Action signals; low and high are the physical values of actions -1 and 1.
   const std::vector<flight::Signal>& actions() const { return actions_; }
-  double step_s() const { return step_s_; }  ///< of one action
+  double step_s() const { return step_s_; }  ///< duration of one action
 
-  /// Starts all anew, and their sensors: with a seed their episode 0, as flappy-fly flies it, else each its next one.
+  /// Restarts all environments and their sensor clocks: with a seed at episode 0, as flappy-fly flies it; else each at
+  /// its next episode.
   virtual void reset(std::optional<std::uint64_t> seed, float* observation) = 0;
-  /// Starts the next episode of those that are named; writes their rows alone.
+  /// Starts the next episode of the environments in `which`; writes only their rows of `observation`.
   virtual void reset(std::span<const bool> which, float* observation) = 0;
-  /// One action of each, [count][actions()]. Numbers outside [-1, 1] are clamped. How many ended.
+  /// Flies all environments for one action. `action`: [count][actions()], clamped to [-1, 1]. Returns the number of
+  /// episodes that ended.
   virtual std::size_t step(const float* action, const Transitions& to) = 0;
 
-  /// Of those that ended in the last step: bits for each environment, how it went, and its last observation.
+  /// [count]: whether the episode of each environment ended in the last step.
   std::span<const bool> ended() const { return {ended_.get(), count()}; }
+  /// [count]: results of the episodes that ended last.
   std::span<const EndedEpisode> episodes() const { return episodes_; }
+  /// [count][observations]: last observations of the episodes that ended last.
   const float* final_observation() const { return final_observation_.data(); }
 
   virtual flight::Motion truth(std::size_t i) const = 0;
@@ -67,7 +73,7 @@ class Environments {
   virtual sim::FlapperState state(std::size_t i) const = 0;
   virtual double time_s(std::size_t i) const = 0;
   virtual std::uint32_t episode(std::size_t i) const = 0;
-  /// Of how vehicles [first, last) move, as flappy-fly prints it.
+  /// Hash of the motion of vehicles [first, last), as flappy-fly prints it.
   virtual std::uint64_t hash(std::size_t first, std::size_t last) const = 0;
 
  protected:
@@ -81,7 +87,7 @@ class Environments {
   std::vector<float> final_observation_;
 };
 
-/// io::InputError where the configuration has an excitation that changes, which belongs to flights and not to actions.
+/// Throws io::InputError if the configuration has an excitation that changes in time: actions take its place.
 std::unique_ptr<Environments> make_environments(FlyConfig config, const EnvironmentOptions& options);
 
 }  // namespace flappy::rollout

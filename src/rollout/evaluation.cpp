@@ -19,7 +19,8 @@ using flight::Task;
 
 constexpr double kNever_s = 1e9;
 
-/// The controller alone is not handed back to, unless to rest, nor does the flight end by the rules that a policy's does.
+/// Changes a task for a controller without a policy: no held trim, no hand-back unless to rest, no rules that end
+/// flights early.
 void leave_alone(Task& task) {
   auto& k = task.constants;
   k.holds_trim = 0;
@@ -27,7 +28,7 @@ void leave_alone(Task& task) {
   k.limits.faced_by_s = k.limits.arrived_by_s = kNever_s;
 }
 
-/// Flights that are flown together.
+/// A part of the evaluation: flights that are flown together.
 template <class T>
 class Part {
  public:
@@ -48,7 +49,7 @@ class Part {
     flights_.step();
     if (monitors_.empty()) return;
     const double t_s = flights_.t_s();
-    const flight::Target goal = fleet_.target(0);  // of all, as they started together
+    const flight::Target goal = fleet_.target(0);  // the same for all, because they started together
     flights_.each([&](std::size_t i) {
       note(i);
       const double drawn_J = electrical_ ? fleet_.batch().energy_J(i) : std::numeric_limits<double>::quiet_NaN(),
@@ -69,7 +70,7 @@ class Part {
   }
 
  private:
-  /// What the fleet has seen so far; its times are whole ticks, but for their rounding.
+  /// Copies the fleet's records of flight `i`. Its times are rounded to whole ticks, to undo the rounding to type T.
   void note(std::size_t i) {
     const auto whole = [&](double t_s) { return std::round(t_s / fleet_.period_s()) * fleet_.period_s(); };
     Outcome& o = outcomes_[i];
@@ -79,15 +80,15 @@ class Part {
     o.ended = fleet_.ended(i);
   }
 
-  bool electrical_;  // motors draw energy
+  bool electrical_;  // whether energy is modelled: not for beat-averaged vehicles
   Rollout<T> flights_;
   Fleet<T>& fleet_;
   std::vector<Outcome> outcomes_;
   std::vector<OutcomeMonitor> monitors_;
-  std::vector<double> drawn_J_;  // by the motors, until the last tick
+  std::vector<double> drawn_J_;  // energy of each flight up to the last tick
 };
 
-/// The outcomes of all ranks; stopped where one of them was.
+/// Gathers the outcomes of all ranks; `stopped` if any rank stopped.
 void share(io::Ranks& ranks, Evaluation& e) {
   const auto gather = [&](const auto& list) { return ranks.gather(std::as_bytes(std::span(list))); };
   const double own[] = {e.stopped ? 1.0 : 0.0, e.steps};

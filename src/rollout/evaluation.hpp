@@ -1,5 +1,5 @@
-// Flies a policy, or a controller alone, on many randomised vehicles: always the same vehicles, starts and noise for the
-// same configuration and numbers, however many threads and in parts of whatever size.
+// Flies a policy, or a controller alone, on many randomised vehicles. Vehicles, starts and noise depend only on the configuration
+// and the numbers of the flappers, not on the number of threads or the size of the parts.
 #pragma once
 
 #include "io/ranks.hpp"
@@ -8,47 +8,50 @@
 
 namespace flappy::rollout {
 
-/// Numbers of the first flapper in the random streams: no vehicle, start or noise is in two of them.
+/// First flapper number of training, validation and test: they share no vehicle, start or noise.
 inline constexpr std::uint32_t kTrainingFlappers = 0, kValidationFlappers = std::uint32_t{1} << 30,
                                kTestFlappers = std::uint32_t{1} << 31;
 
 struct EvaluationOptions {
   std::size_t count = 1000;
   std::uint32_t first_flapper = kTestFlappers;
-  std::size_t part = 1024;     ///< flights at a time: bounds memory
-  io::Ranks* ranks = nullptr;  ///< fly their shares of the flights; all have the outcomes of all
+  std::size_t part = 1024;     ///< flights that are flown at a time, to bound memory
+  io::Ranks* ranks = nullptr;  ///< each rank flies its share of the flights and gets the outcomes of all
 };
 
-/// Who acts on top of the controller. Where it is neither, the controller flies alone, the goal its set point, without
-/// hand-back and without the two rules that end flights early (faced_by_s, arrived_by_s).
+/// An actor or a policy, which acts on top of the controller. With neither, the controller flies alone to the set
+/// point, without hand-back to the controller and without the two rules that end flights early (faced_by_s,
+/// arrived_by_s).
 struct Agent {
   std::shared_ptr<const policy::Actor> actor;
   const policy::Policy* policy = nullptr;
 };
 
 enum class Detail {
-  success,  ///< only what the fleet itself notes: for validation during training
+  success,  ///< only the results that the fleet records itself; for validation during training
   full
 };
 
 struct Evaluation {
-  std::vector<Outcome> flights;  ///< whole parts only where it was stopped
+  std::vector<Outcome> flights;  ///< if stopped: flights of the parts that were finished
   bool stopped = false;
-  double wall_s = 0, steps = 0;  ///< of physics, hover before the start included where it was flown
+  double wall_s = 0, steps = 0;  ///< wall-clock time, and number of physics steps; both with the hover if it was flown
 };
 
-/// Snapshots of each part's flights, once they have hovered; empty until then, and where flights start otherwise.
+/// [part][flight]: snapshots of settled hover; empty before the hover is flown, and for tasks that do not start
+/// settled.
 template <class T>
 using Hovers = std::vector<std::vector<flight::Snapshot<T>>>;
 
 class Evaluator {
  public:
-  /// Seed, threads and precision are those of `config`, its `actor` is not used. io::InputError where its task says no
-  /// success or takes longer than duration_s.
+  /// Uses seed, threads and precision of `config`, but not its actor. Throws io::InputError if the task defines no
+  /// success, is judged for longer than duration_s, is flown on a stand, or has an excitation.
   Evaluator(FlyConfig config, const EvaluationOptions& options);
 
-  /// Each vehicle starts from its own settled hover, flown once for all calls. `keep_going` is asked with the share that is
-  /// done; false ends the evaluation. std::invalid_argument for an agent that does not fit the task.
+  /// Flies all vehicles. If the task starts settled, each starts from its own hover, which is flown once for all calls.
+  /// `keep_going` gets the share that is done; false ends the evaluation. Throws std::invalid_argument for an agent
+  /// that does not fit the task.
   Evaluation fly(const Agent& agent, Detail detail, const std::function<bool(double done)>& keep_going = {});
 
   const FlyConfig& config() const { return config_; }
@@ -56,11 +59,12 @@ class Evaluator {
  private:
   FlyConfig config_;
   EvaluationOptions options_;
-  Hovers<float> float_hovers_;  // one of the two is used
+  Hovers<float> float_hovers_;  // only the one of config_.precision is used
   Hovers<double> double_hovers_;
 };
 
-/// The same flights on the vehicle as it is, all from the middle of the task's start.
+/// The configuration without randomisation: all flights use the nominal vehicle and the middle of the task's start
+/// range.
 FlyConfig nominal(FlyConfig config);
 
 }  // namespace flappy::rollout

@@ -42,10 +42,10 @@ void FlightScore::add(const flight::Motion& truth, const flight::Target& target,
   const double upright = 1 - 2 * (truth.attitude[1] * truth.attitude[1] + truth.attitude[2] * truth.attitude[2]);
   const bool far = e[3] * e[3] + e[4] * e[4] + e[5] * e[5] > kFarAway_m * kFarAway_m;
   const auto& v = truth.velocity_m_s;
-  const bool held = v[0] == 0 && v[1] == 0 && v[2] == 0;  // exactly, while something supports the body
+  const bool held = v[0] == 0 && v[1] == 0 && v[2] == 0;  // velocity is exactly 0 while something supports the body
   crashed = crashed || (status & (sim::kFrozen | sim::kTouchedGround)) != 0;
   far_away = far_away || far;
-  if (failure == FlightFailure::never_took_off && !held) failure = FlightFailure::drifted_away;  // late, but it did
+  if (failure == FlightFailure::never_took_off && !held) failure = FlightFailure::drifted_away;  // took off late
   if (failure != FlightFailure::none) return;
   if (status & sim::kFrozen) failure = FlightFailure::frozen;
   else if (status & sim::kTouchedGround) failure = FlightFailure::touched_ground;
@@ -58,7 +58,7 @@ void FlightScore::add(const flight::Motion& truth, const flight::Target& target,
 FlightSummary summarise(std::span<const FlightScore> flights) {
   FlightSummary s;
   s.flights = flights.size();
-  std::array<std::vector<std::pair<double, std::size_t>>, kFlightFailures> when;  // and which flight
+  std::array<std::vector<std::pair<double, std::size_t>>, kFlightFailures> when;  // [failure]: time and flight
   std::size_t within = 0, settled_ticks = 0, ticks = 0;
   for (std::size_t i = 0; i < flights.size(); ++i) {
     const FlightScore& f = flights[i];

@@ -19,14 +19,15 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// "0042"; all names of a run are of one length.
+/// Folder name of flight `i`, as "0042"; all names of a run have the same length.
 std::string log_name(std::size_t i, std::size_t count) {
   const std::size_t width = std::max<std::size_t>(4, std::to_string(count - 1).size());
   const std::string digits = std::to_string(i);
   return std::string(width - digits.size(), '0') + digits;
 }
 
-/// Refuses, before anything flies, a folder that cannot be written or where logs of this run would lie beside others.
+/// Checks the log folder before the flights. Throws io::InputError if it cannot be written or holds files of another
+/// run.
 void prepare_log_folder(const fs::path& folder, std::size_t count, const std::string& vehicle) {
   if (std::ranges::count(flightlog::log_file::kAll, vehicle) > 0)
     throw io::InputError("vehicle: " + vehicle + " is also the name of a file of the log; accepted: another name");
@@ -41,7 +42,7 @@ void prepare_log_folder(const fs::path& folder, std::size_t count, const std::st
   std::set<std::string> foreign;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
-    bool belongs = count == 1 && is_log;  // the writer of logs looks closer
+    bool belongs = count == 1 && is_log;  // write_flight_log() checks the files
     const bool number = name.size() < 10 && name.find_first_not_of("0123456789") == std::string::npos;
     if (count > 1 && number) belongs = std::stoul(name) < count && name == log_name(std::stoul(name), count);
     if (!belongs) foreign.insert(name);
@@ -50,7 +51,7 @@ void prepare_log_folder(const fs::path& folder, std::size_t count, const std::st
   if (!foreign.empty()) refuse("holds " + *foreign.begin());
 }
 
-/// Writes the logs of flights, of which `first` is the number of the first; returns how many there are.
+/// Writes the logs of flights, numbered from `first`; returns the number of logs written.
 template <class T>
 std::size_t write_logs(const Rollout<T>& flights, std::size_t first, const FlyOptions& options) {
   const FlyConfig& config = flights.config();
@@ -80,7 +81,7 @@ FlyResult fly_all(const FlyConfig& config, const FlyOptions& options) {
     prepare_log_folder(options.log_folder, options.count, config.vehicle_file_name);
     const double room = options.log_bytes / (Recorder<T>::bytes_per_s(config) * config.duration_s);
     at_a_time = std::clamp<std::size_t>(static_cast<std::size_t>(std::min(room, 1e6)), 1, options.count);
-    if (at_a_time > 16) at_a_time -= at_a_time % 16;  // whole blocks
+    if (at_a_time > 16) at_a_time -= at_a_time % 16;  // fills whole blocks
   }
   const auto start = std::chrono::steady_clock::now();
   Progress progress{options.keep_going,
@@ -95,11 +96,11 @@ FlyResult fly_all(const FlyConfig& config, const FlyOptions& options) {
     const flight::Fleet<T>& fleet = flights.fleet();
     if (recorded) flights.record();
     std::vector<FlightScore> scores(count);
-    std::vector<std::uint32_t> ended(count);  // the bits that came first
+    std::vector<std::uint32_t> ended(count);  // bits of Ended at the tick of the first end
     while (!flights.over() && !result.stopped) {
       flights.step();
       const auto before = std::chrono::steady_clock::now();
-      const flight::Target target = fleet.target(0);  // of all, as they started together
+      const flight::Target target = fleet.target(0);  // the same for all, because they started together
       const bool settled = flights.t_s() >= config.settle_s - 1e-9;
       flights.each([&](std::size_t i) {
         if (!config.welded) scores[i].add(fleet.truth(i), target, fleet.events(i), flights.t_s(), settled);

@@ -1,6 +1,5 @@
-// Flies a configuration many times over and says how well it went. Flights differ by the number of their flapper: noise,
-// gyro bias, start, and the vehicle where it is randomised. What a flight does depends on nothing else, so they may be
-// flown all at once or in parts.
+// Flies a configuration many times and summarises the flights. Noise, gyro bias, start and randomised vehicle of a flight depend
+// only on the number of its flapper, so flights may be flown all at once or in parts.
 #pragma once
 
 #include <functional>
@@ -12,31 +11,32 @@ namespace flappy::rollout {
 
 struct FlyOptions {
   std::size_t count = 1;
-  /// Where logs go: the folder itself is the log of a single flight, else it has one folder each, 0000 and on.
+  /// Folder for logs; empty: no logs. It is itself the log of a single flight; several flights get subfolders 0000,
+  /// 0001, ...
   std::filesystem::path log_folder;
-  /// Where the log of a single flight goes as topics of ROS 2; empty: nowhere.
+  /// File for the log of a single flight as topics of ROS 2; empty: no file.
   std::filesystem::path mcap;
-  /// Memory for logs: flights are flown in parts whose logs need no more, or one by one.
+  /// Memory for logs. It limits the number of flights that are flown at a time, which is at least one.
   double log_bytes = 512e6;
-  /// Asked every control period, with the share that is done; false ends the flights where they are.
+  /// Called every control period with the share that is done; false ends the flights there.
   std::function<bool(double done)> keep_going;
 };
 
 struct FlyResult {
   FlightSummary summary;
   bool stopped = false;
-  double flown_s = 0;                  ///< by each flight; where stopped, by the last ones
-  std::array<std::size_t, 6> ended{};  ///< flights whose task ended by each bit of Ended; they fly on
+  double flown_s = 0;                  ///< duration of each flight; if stopped, of the flights flown last
+  std::array<std::size_t, 6> ended{};  ///< number of flights whose task ended first by each bit of Ended; they fly on
   std::size_t handed_back = 0;
-  std::vector<double> capture_s;  ///< when each flight that captured its goal did so
-  std::size_t successes = 0;      ///< captured it, kept it as the task asks, and did not crash
+  std::vector<double> capture_s;  ///< capture times of the flights that captured their goal
+  std::size_t successes = 0;      ///< flights that captured the goal, kept it as the task demands, and did not crash
   std::size_t logs = 0;
-  bool mcap = false;       ///< whether it was long enough for one
-  std::uint64_t hash = 0;  ///< of how each vehicle moves, at the end, in order
+  bool mcap = false;       ///< whether the mcap file was written: the flight was long enough
+  std::uint64_t hash = 0;  ///< hash of the final motion states of all vehicles, in order
   double wall_s = 0, scoring_s = 0, steps = 0;
 };
 
-/// io::InputError where a log cannot be written.
+/// Throws io::InputError if a log cannot be written.
 FlyResult fly(const FlyConfig& config, const FlyOptions& options);
 
 }  // namespace flappy::rollout

@@ -17,7 +17,7 @@ using Overrides = std::vector<std::string>;
 
 const Overrides kFiles = {"vehicle", "task", "sensors", "controller", "randomisation"};
 
-/// Overrides by whom they are for: an included file, or "" for the configuration itself.
+/// Sorts overrides by the file to which they apply; "": the configuration itself.
 std::map<std::string, Overrides> routed(const Overrides& overrides) {
   std::map<std::string, Overrides> to;
   for (const std::string& text : overrides) {
@@ -31,7 +31,7 @@ std::map<std::string, Overrides> routed(const Overrides& overrides) {
   return to;
 }
 
-/// Runs `read`; a complaint about an override that was passed on names it as its user wrote it.
+/// Runs `read`. In an error message about an override, restores the prefix "name." that routed() removed.
 template <class Read>
 auto for_file(const std::string& name, const Read& read) {
   try {
@@ -104,7 +104,7 @@ LogOptions read_log(const io::Table& root, double control_hz) {
 
 bool whole(double number) { return number > 0.5 && std::abs(number - std::round(number)) < 1e-6; }
 
-/// An actor sees and does what it was trained for.
+/// Reads the actor. Throws io::InputError unless its observation and action are those of the task.
 std::shared_ptr<const policy::Actor> fitting_actor(const io::Table& root, const flight::Task& task) {
   auto actor = std::make_shared<const policy::Actor>(policy::read_actor(root.file("actor")));
   const auto check = [&](const char* does, const std::vector<std::string>& has,
@@ -162,7 +162,7 @@ class Reader {
     c_.welded = t.choice_or("support", "task", {"task", "welded"}) == "welded";
   }
 
-  /// A file that the configuration names, its overrides applied.
+  /// Loads the file that the configuration names under `key`, with its overrides.
   io::Config file(const std::string& key) {
     const std::filesystem::path path = root_.file(key);
     return for_file(key, [&] {
@@ -176,9 +176,9 @@ class Reader {
     const std::filesystem::path vehicle = root_.file("vehicle");
     c_.vehicle = for_file("vehicle", [&] { return model::read_flyable_vehicle(vehicle, to_["vehicle"]); });
     const io::Config vehicle_config = file("vehicle");
-    if (c_.vehicle.beat_averaged && c_.vehicle.beat_averaged->inputs.size() > model::kMostInputs)
+    if (c_.vehicle.beat_averaged && c_.vehicle.beat_averaged->inputs.size() > model::kMaxInputs)
       vehicle_config.root().fail("input", "there are too many to be flown",
-                                 "at most " + std::to_string(model::kMostInputs));
+                                 "at most " + std::to_string(model::kMaxInputs));
     c_.vehicle_file_name = vehicle.filename().string();
     const bool as_filed = to_["vehicle"].empty();
     c_.vehicle_text = as_filed ? io::read_text(vehicle) : vehicle_config.resolved();
@@ -207,7 +207,7 @@ class Reader {
     }
   }
 
-  /// Where a policy sets the motors' voltages, nobody else has a say in them.
+  /// Throws io::InputError if the task's actions are motor voltages and a controller or an excitation is given as well.
   void refuse_inputs() const {
     const std::string sets =
         "but the actions of task " + io::toml_string(c_.fleet.task.name) + " are the motors' voltages";
@@ -220,9 +220,9 @@ class Reader {
     if (c_.excitation.changes()) root_.fail("excitation", "is added to inputs of the wing beat, " + sets, "none");
   }
 
-  /// A robot that is known by the beat has neither motors nor wings.
+  /// Refuses what needs motors or wings, which a beat-averaged robot does not have.
   void refuse_wings() {
-    const std::string but = ", but vehicle " + io::toml_string(c_.vehicle.name) + " is known by the beat";
+    const std::string but = ", but vehicle " + io::toml_string(c_.vehicle.name) + " is beat-averaged";
     const flight::Task& task = c_.fleet.task;
     if (task.sets_voltages())
       root_.fail("task", io::toml_string(task.name) + " sets voltages of motors" + but,
@@ -236,7 +236,7 @@ class Reader {
     c_.fleet.task.input_unit = "1";
   }
 
-  /// Wings whose angles are driven have no motors.
+  /// Refuses what needs motors, which articulated wings do not have.
   void refuse_motors() {
     const std::string but = ", but the wings of vehicle " + io::toml_string(c_.vehicle.name) + " have no motors";
     if (c_.fleet.task.sets_voltages())
@@ -286,7 +286,7 @@ class Reader {
       c_.resolved[key + ".toml"] = config.resolved();
       names.push_back(key + "=" + key + ".toml");
     }
-    // the file of a path goes along
+    // copy the file of the path too
     const io::Table task = files_.at("task").root();
     if (task.has("path.file")) {
       const std::filesystem::path csv = task.file("path.file");

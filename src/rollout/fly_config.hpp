@@ -1,7 +1,7 @@
-// What is flown, as configs/fly/*.toml state it: a vehicle, a task, sensors and a controller, each a file of its own.
+// Configuration of flights, as in configs/fly/*.toml. It names files for vehicle, task, sensors and controller.
 //
 //   schema = 1
-//   vehicle, task, sensors, controller = "file"     relative to the folder of the configuration, as the next
+//   vehicle, task, sensors, controller = "file"     paths, also those below, are relative to the configuration's folder
 //   actor, randomisation = "file"                   optional
 //   precision = "float" | "double"
 //   [flight]          duration_s, seed; first_flapper (0: number of the first flight), settle_s (3), control_hz (500),
@@ -13,9 +13,9 @@
 //   [constant_input]  and [[excitation]]: excitation.hpp
 //   [log.power]       battery_nominal_V, rate_hz, latency_s, voltage_noise_V, current_noise_A
 //   [log.wings]       rate_hz, noise_rad
-//   [dds]             io/dds_config.hpp; no part of what is flown, so `resolved` leaves it out
+//   [dds]             io/dds_config.hpp; it does not change the flights, so `resolved` leaves it out
 //
-// An override "controller.attitude.pitch.p=4" belongs to the file of that name; "controller=other.toml" replaces it.
+// An override "controller.attitude.pitch.p=4" applies to the controller's file; "controller=other.toml" replaces the file.
 #pragma once
 
 #include <map>
@@ -31,7 +31,7 @@
 
 namespace flappy::rollout {
 
-/// What a log has beyond the streams that every log has.
+/// Optional streams of a log.
 struct LogOptions {
   std::optional<flightlog::PowerHeader> power;
   std::optional<flightlog::WingsHeader> wings;
@@ -39,11 +39,11 @@ struct LogOptions {
 
 struct FlyConfig {
   std::string vehicle_file_name;  ///< without folder
-  std::string vehicle_sha256;     ///< of that file; empty where an override made another vehicle of it
-  std::string vehicle_text;       ///< of that file; of the vehicle that overrides made of it
+  std::string vehicle_sha256;     ///< SHA-256 of that file; empty if overrides or randomisation change the vehicle
+  std::string vehicle_text;       ///< text of that file; with overrides, the resolved text
   model::Vehicle vehicle;
   std::optional<sim::Randomisation> randomisation;
-  /// What every vehicle has besides, randomised or not: as model::Vehicle::effects.
+  /// Effects that are added to every vehicle, randomised or not; same form as model::Vehicle::effects.
   std::map<std::string, std::map<std::string, double>> added_effects;
   flight::FleetOptions fleet;
   std::string precision;
@@ -53,19 +53,19 @@ struct FlyConfig {
   LogOptions log;
   std::shared_ptr<const policy::Actor> actor;
   io::DdsConfig dds;
-  std::shared_ptr<Watch> watch;  ///< is shown flappers as they fly
-  /// Texts of the files that were read, overrides applied and defaults filled in, by name; fly.toml names the others.
-  /// Actors and scripts stay where they are.
+  std::shared_ptr<Watch> watch;  ///< observer of the flights; may be null
+  /// Resolved texts of the files by file name: overrides applied, defaults filled in; fly.toml names the others. Actors
+  /// and scripts are not copied.
   std::map<std::string, std::string> resolved;
 
-  /// The vehicle of a flapper: another one each, in each of its episodes, where they are randomised.
+  /// The vehicle of a flapper in an episode. With randomisation, every flapper and episode has a vehicle of its own.
   model::Vehicle vehicle_of(std::uint32_t flapper, std::uint32_t episode = 0) const;
 };
 
-/// The same, shown to nobody.
+/// The configuration without `watch`.
 FlyConfig unwatched(FlyConfig config);
 
-/// io::InputError for whatever is missing, unknown, out of range or does not fit together.
+/// Throws io::InputError for anything that is missing, unknown, out of range or inconsistent.
 FlyConfig read_fly_config(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
 
 }  // namespace flappy::rollout

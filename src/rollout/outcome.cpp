@@ -15,17 +15,17 @@ namespace {
 using flight::Motion;
 using flight::Target;
 
-constexpr double kTick = 1e-6;  // of times that are whole control ticks: what rounding may have moved them by
+constexpr double kTick = 1e-6;  // tolerance in s for rounding of times that are whole control ticks
 
 double length(const double (&a)[3], const double (&b)[3] = {0, 0, 0}) {
   const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
   return std::sqrt(x * x + y * y + z * z);
 }
 
-/// The true state as it is judged, relative to the set point.
+/// Quantities of the true state that are judged, relative to the set point.
 struct Seen {
   double distance_m, speed_m_s, body_rate_rad_s, upright;  // upright: cosine of tilt
-  double facing, aside;  // the body's x axis on the level, from the set point's heading
+  double facing, aside;  // horizontal components of the body's x axis along and left of the set point's heading
   double heading_cos() const { return facing / std::sqrt(std::max(facing * facing + aside * aside, 1e-12)); }
 };
 
@@ -40,7 +40,7 @@ Seen seen(const Motion& m, const Target& goal) {
           goal.heading_cos * r10 - goal.heading_sin * r00};
 }
 
-/// An angle over its limit, as cosines: 1 at the limit, and about in proportion.
+/// About the ratio of an angle to its limit, from their cosines; exactly 1 at the limit.
 double angle_share(double cos, double limit_cos) { return std::sqrt(std::max(0.0, 1 - cos) / (1 - limit_cos)); }
 
 std::size_t largest(std::span<const double> list) {
@@ -93,7 +93,7 @@ void OutcomeMonitor::see(const Motion& truth, const Target& goal, double t_s, co
     const std::size_t worst = largest(shares);
     if (shares[worst] < least_) least_ = shares[worst], missing_ = static_cast<Demand>(worst);
   }
-  // how far beyond the goal it went, along the way from its start, between first capture and where it must have stopped
+  // overshoot: distance beyond the goal along the line from start to goal, from the capture to keep_from_s
   if (captured && t_s < k.keep_from_s + kTick) {
     double beyond = 0;
     for (int i = 0; i < 3; ++i) beyond += way_[i] * (truth.position_m[i] - goal.position_m[i]);

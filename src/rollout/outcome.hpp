@@ -1,5 +1,5 @@
-// What became of flights of a task that says what a success is. Judged on the true state at each control tick, instantaneous:
-// nothing is averaged over a wing beat.
+// Outcomes of flights, for tasks that define success. They are judged on the instantaneous true state at each control tick; nothing
+// is averaged over a wing beat.
 #pragma once
 
 #include <array>
@@ -12,13 +12,13 @@
 
 namespace flappy::rollout {
 
-/// Why a flight failed: what first put success out of reach.
+/// Why a flight failed: the first event that made success impossible.
 enum class TaskFailure {
   none,
   not_finite,
-  crashed,        ///< touched ground, wall or ceiling
-  out_of_bounds,  ///< its task ended there, as in the next
-  too_late,
+  crashed,        ///< touched ground, wall, ceiling or a shape
+  out_of_bounds,  ///< ended by flight::kOutOfBounds
+  too_late,       ///< ended by flight::kHeadingLate or kArrivalLate
   never_captured,
   lost_position,
   lost_tilt,
@@ -27,42 +27,44 @@ enum class TaskFailure {
 inline constexpr std::size_t kTaskFailures = 9;
 const char* name_of(TaskFailure failure);
 
-/// What a capture asks for, all at once.
+/// Demands of a capture, which must all hold at once.
 enum class Demand { distance, speed, body_rate, tilt, heading };
 inline constexpr std::size_t kDemands = 5;
 const char* name_of(Demand demand);
 
 /// The strict goal of the escape (the study's first end condition).
 inline constexpr double kStrictDistance_m = 0.03, kStrictSpeed_m_s = 0.3, kStrictBodyRate_rad_s = 5;
-inline constexpr double kStrictCos = 0.9396926207859084;  // of 20 degrees: of tilt and of heading
+inline constexpr double kStrictCos = 0.9396926207859084;  // cosine of 20 degrees, limit of tilt and of heading error
 
 struct Outcome {
   double captured_s = 0, lost_s = 0;    ///< 0: never
   std::uint32_t status = 0, ended = 0;  ///< bits of sim::Status and of flight::Ended
   bool success() const;
 
-  // The rest of monitored flights only.
+  // only for flights with an OutcomeMonitor
   TaskFailure failure = TaskFailure::none;
-  Demand missing = Demand::distance;  ///< what was missing most at the closest moment of a flight that never captured
-  double strict_s = 0;                ///< when the strict goal was first reached; 0: never
-  double overshoot_m = 0;             ///< of a flight that captured
+  Demand missing = Demand::distance;  ///< worst demand at the closest moment of a flight that never captured
+  double strict_s = 0;                ///< time at which the strict goal was first reached; 0: never
+  double overshoot_m = 0;             ///< largest distance beyond the goal between capture and keep_from_s
   double position_error_m = 0, heading_error_rad = 0;  ///< at the end
-  /// Electrical, of both motors, until hand-back or until capture is too late; not a number where no voltage is modelled.
+  /// Energy of both wings' drives, and its duration, until the hand-back or the latest time of capture; NaN energy for
+  /// beat-averaged vehicles.
   double energy_J = 0, manoeuvre_s = 0;
 
-  std::uint64_t hash = 0;  ///< of how the vehicle moves, at the end
+  std::uint64_t hash = 0;  ///< hash of the final motion state; also without a monitor
 };
 
-/// Sees one flight, tick by tick, and says what became of it.
+/// Observes one flight tick by tick and determines its outcome.
 class OutcomeMonitor {
  public:
-  /// At the start of the flight.
+  /// Construct it at the start of the flight.
   OutcomeMonitor(const flight::Task& task, const flight::Motion& start, const flight::Target& goal);
 
-  /// A tick as the fleet shows it; `so_far`: captured_s, lost_s, status and ended by then.
+  /// Adds a control tick. `so_far`: captured_s, lost_s, status and ended up to this tick.
   void see(const flight::Motion& truth, const flight::Target& goal, double t_s, const Outcome& so_far);
-  /// Whether its energy counts at this tick: call it before spend(), which adds the tick's.
+  /// Whether the energy of this tick counts. Call it before spend().
   bool manoeuvring(double t_s) const;
+  /// Adds the energy of a tick.
   void spend(double energy_J, double period_s, bool handed_back);
   void finish(Outcome& outcome) const;
 
@@ -77,13 +79,14 @@ class OutcomeMonitor {
   double energy_J_ = 0, manoeuvre_s_ = 0;
 };
 
-/// A rate and its 95 % interval (Wilson 1927).
+/// A proportion and its 95 % interval (Wilson 1927).
 struct Rate {
   double value = 0, low = 0, high = 1;
 };
 Rate rate_of(std::size_t successes, std::size_t flights);
 
-/// 10 %, median and 90 %; nothing where there is no flight, infinite where it is one that never got there.
+/// 10 % quantile, median and 90 % quantile; empty without flights; infinite where the quantile is a flight that never
+/// reached the goal.
 struct Quantiles {
   std::optional<double> p10, median, p90;
 };
@@ -91,13 +94,14 @@ struct Quantiles {
 struct Summary {
   std::size_t flights = 0;
   Rate success, captured, strict;
-  Quantiles capture_s;    ///< of flights that captured
-  Quantiles strict_s;     ///< of all; infinite for those that never reached it
-  Quantiles overshoot_m;  ///< of flights that captured
-  Quantiles position_error_m, heading_error_rad, energy_J, power_W;  ///< of all; no energy where no voltage is modelled
-  std::array<std::size_t, kTaskFailures> failures{};                 ///< by TaskFailure; none: the successes
-  std::array<std::size_t, kDemands> missing{};                       ///< by Demand, of those that never captured
-  std::uint64_t hash = 0;                                            ///< of all outcomes in order
+  Quantiles capture_s;    ///< over flights that captured
+  Quantiles strict_s;     ///< over all flights; infinite for flights that never reached the strict goal
+  Quantiles overshoot_m;  ///< over flights that captured
+  /// Over all flights; energy and power only where energy is modelled.
+  Quantiles position_error_m, heading_error_rad, energy_J, power_W;
+  std::array<std::size_t, kTaskFailures> failures{};  ///< counts by TaskFailure; none: successes
+  std::array<std::size_t, kDemands> missing{};        ///< counts by Demand of the flights that never captured
+  std::uint64_t hash = 0;                             ///< hash of all outcomes in order
 };
 Summary summarise(std::span<const Outcome> flights);
 

@@ -19,12 +19,12 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// Without the last digits that sums of steps leave.
+/// Rounds to 1 ns, to remove the rounding errors of sums of steps.
 double tidy(double t_s) { return std::round(t_s * 1e9) / 1e9; }
 
-/// What every truth has, and what holds the flapper: 0 nothing, 1 the ground, 2 it is welded.
-/// Of a vehicle with four angles a wing: what its joints do, the power of the muscles of each side, their work since the start, all of it while a
-/// side's power is positive, and less what they take back.
+/// Columns of the joints' file of a vehicle with articulated wings: angle, rate and torque of each joint; power of each
+/// side's muscles; positive_work_J: work since the start while a side's power is positive; work_J: work with negative
+/// work subtracted.
 const std::vector<std::string> kJointNames = [] {
   std::vector<std::string> names = {"t_s"};
   for (const std::string side : {"left_", "right_"}) {
@@ -36,13 +36,15 @@ const std::vector<std::string> kJointNames = [] {
   return names;
 }();
 
+/// Columns of the truth: the motion, and what supports the flapper: 0 nothing, 1 the ground, 2 welded to a stand.
 const std::vector<std::string> kTruthNames = [] {
   std::vector<std::string> names = flightlog::kMotionNames;
   names.emplace_back("support");
   return names;
 }();
 
-/// Samples of a stream that the control ticks take: each at the first tick at or after its time.
+/// Sample times of a stream that is sampled at control ticks: each sample is taken at the first tick at or after its
+/// time.
 class TickSampler {
  public:
   explicit TickSampler(double rate_hz) : rate_hz_(rate_hz) {}
@@ -51,7 +53,7 @@ class TickSampler {
     ++count_;
     return true;
   }
-  /// Of normal numbers, each sample's own.
+  /// Index of the first of the four normal random numbers that belong to the last sample.
   std::uint32_t first_index() const { return 4 * (count_ - 1); }
 
  private:
@@ -63,7 +65,7 @@ class TickSampler {
 
 template <class T>
 std::vector<DriverUpdate> driver_updates(flight::Fleet<T>& fleet, std::size_t i) {
-  using L = model::Lanes<T, 1>;  // rounds and fuses as the kernels do
+  using L = model::Lanes<T, 1>;  // same rounding and fused operations as in the kernels
   auto& body = sim::storage_of(fleet.batch());
   const auto [block, lane] = body.at(i);
   const auto drive = sim::get<sim::Drive<double>>(block.drive, lane);
@@ -127,15 +129,14 @@ struct Recorder<T>::Storage {
   sim::RandomKey key;
   flightlog::FlightLog log;
   std::vector<flightlog::Column> truth = std::vector<flightlog::Column>(kTruthNames.size());
-  std::vector<flightlog::Column> joints;  // of driven angles
+  std::vector<flightlog::Column> joints;  // empty without articulated wings
   TickSampler power{0}, wings{0};
-  // at the last control tick
-  sim::FlapperState state;
+  sim::FlapperState state;  // at the last control tick
   double held_V[2] = {0, 0};
   struct {
     sim::Block<T> block;
     std::vector<T> effect_states, contact_memory;
-  } metered;  // where power.csv is asked for
+  } metered;  // copy of the block at the last control tick, for add_power(); unused without power.csv
   double step_hz;
 
   Storage(const FlyConfig& config, flight::Fleet<T>& f, std::size_t i, const model::Vehicle& vehicle)
@@ -166,7 +167,7 @@ struct Recorder<T>::Storage {
     if (vehicle.jointed) joints.resize(kJointNames.size());
     if (h.power) log.power.emplace(), power = TickSampler(h.power->rate_hz);
     if (h.wings) log.wings.emplace(), wings = TickSampler(h.wings->rate_hz);
-    if (h.power) {  // a meter needs the rows of effects, whatever is in force
+    if (h.power) {  // a meter needs the rows of effects, even if no effect is in force
       sim::storage_of(f.batch()).keep_effects(0);
       sim::storage_of(f.batch()).put_effect_rows(i, vehicle);
     }
@@ -251,7 +252,7 @@ struct Recorder<T>::Storage {
     c.right_voltage_V.push_back(u.right_V);
     held_V[0] = u.left_V;
     held_V[1] = u.right_V;
-    if (!c.inputs) return;  // of voltages that are set directly
+    if (!c.inputs) return;  // voltages are set directly
     c.inputs->amplitude_V.push_back(u.input.amplitude_V);
     c.inputs->difference_V.push_back(u.input.difference_V);
     c.inputs->bias_V.push_back(u.input.bias_V);
@@ -259,7 +260,7 @@ struct Recorder<T>::Storage {
     c.phase_rad->push_back(2 * kPi * 0x1p-32 * u.phase);
   }
 
-  /// Of a vehicle without motors.
+  /// Records the inputs of a vehicle without motors at physics step `step`.
   void add_inputs(std::int64_t step) {
     const std::vector<double> inputs = sim::storage_of(fleet.batch()).inputs_of(flapper);
     log.command.t_s.push_back(time_s(step));
@@ -271,8 +272,9 @@ struct Recorder<T>::Storage {
     return sim::normal(key, index);
   }
 
-  /// Of the state at the start of a period and the voltages from then on, as the command's times have them: what a meter in the
-  /// first physics step reads, which a copy takes once more.
+  /// Records battery voltage and motor currents at the start of a control period. They depend on the state then and the
+  /// voltages from then on. To read them, a copy of the block repeats the first physics step of the period with a
+  /// meter.
   void add_power(double t_s) {
     const flightlog::PowerHeader& h = *log.header.power;
     if (!power.due(t_s)) return;
@@ -357,7 +359,7 @@ struct Recorder<T>::Storage {
     }
   }
 
-  /// Whether every stream has two samples, and all of them some time in common.
+  /// Whether every stream has at least two samples, and all streams overlap in time.
   bool complete() const {
     std::vector<const flightlog::Column*> times = {&log.command.t_s, &log.mocap.t_s, &log.imu.t_s};
     if (log.power) times.push_back(&log.power->t_s);

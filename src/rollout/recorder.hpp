@@ -1,4 +1,4 @@
-// What a recorder sees of one flight of a fleet, and the truth beside it.
+// Records one flight of a fleet: a flight log as the robot's sensors would give it, and the truth.
 #pragma once
 
 #include <memory>
@@ -7,43 +7,45 @@
 
 namespace flappy::rollout {
 
-/// What the driver did at physics step `step`: inputs as it clipped them, voltages that hold until its next update.
+/// An update of the motor driver at physics step `step`: clipped inputs, and voltages that hold until the next update.
 struct DriverUpdate {
   std::int64_t step;
-  std::uint32_t phase;  ///< of the beat, 2^32 each
+  std::uint32_t phase;  ///< phase of the wing beat; 2^32 is one beat
   sim::Input input;
   double left_V, right_V;
 };
 
-/// The updates of flapper `i` within the fleet's last control period: the physics applies them between the samples that
-/// a batch shows, so they are worked out once more, to the bit. Of voltages that were set directly: one, when the period began.
+/// Driver updates of flapper `i` in the fleet's last control period. A batch does not show them, because they lie
+/// within the period; they are computed again, with the same bits. If voltages were set directly: one update, at the
+/// start of the period.
 template <class T>
 std::vector<DriverUpdate> driver_updates(flight::Fleet<T>& fleet, std::size_t i);
 
-/// The sensor as a reader models it: a first-order low-pass of `bandwidth_hz`, where the real one (mean over an interval,
-/// then its own low-pass) passes 1/sqrt(2), and a latency, so that slow motion is as late as it really is:
+/// Header that describes the simulated IMU to readers of logs, who assume one first-order low-pass and a latency. Its
+/// bandwidth_hz is the frequency at which the simulated IMU (mean over an interval, then a low-pass) passes 1/sqrt(2).
+/// The latency is chosen so that the total delay of slow motion is right:
 ///   latency + interval/2 + (1-c)/c interval - 1/(2 pi bandwidth)      c: share of a new value in the low-pass
 flightlog::ImuHeader imu_header(const flight::ImuSensor& imu);
 
 template <class T>
 class Recorder {
  public:
-  /// `i` of `fleet`, before the first period that it is to see; `vehicle` is its own.
+  /// Records flapper `i`, whose vehicle is `vehicle`. Construct it before the first control period to be recorded.
   Recorder(const FlyConfig& config, flight::Fleet<T>& fleet, std::size_t i, const model::Vehicle& vehicle);
   ~Recorder();
   Recorder(Recorder&&) noexcept;
   Recorder& operator=(Recorder&&) noexcept;
 
-  /// After each control period.
+  /// Call it after each control period.
   void record();
-  /// All samples so far.
+  /// All samples so far, even if the log is incomplete.
   const flightlog::FlightLog& so_far() const;
-  /// What was recorded so far; nothing before every stream has samples at one time.
+  /// The log so far; empty until all streams have at least two samples and overlap in time.
   std::optional<flightlog::FlightLog> log() const;
-  /// Writes log and truth. False, and no log, if the flight ended before every stream had samples at one time.
+  /// Writes log and truth. Returns false, and writes nothing, if log() is empty. Throws io::InputError.
   bool write(const std::filesystem::path& folder) const;
 
-  /// Of a second of flight.
+  /// Memory for a second of flight.
   static double bytes_per_s(const FlyConfig& config);
 
  private:

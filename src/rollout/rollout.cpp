@@ -11,7 +11,7 @@ namespace {
 flight::FleetOptions options_of(const FlyConfig& config, std::size_t count, bool has_policy) {
   flight::FleetOptions o = config.fleet;
   if (!config.actor && !has_policy) o.task.forbid_actions();
-  // threads that share a few blocks wait for each other more than they fly
+  // few blocks on many threads: waiting would take longer than flying
   const auto most = static_cast<std::size_t>(io::thread_count(o.batch.threads));
   o.batch.threads = static_cast<int>(std::clamp<std::size_t>(count / 64, 1, most));
   return o;
@@ -69,7 +69,7 @@ void Rollout<T>::step() {
   if (!recorders_.empty()) each([&](std::size_t i) { recorders_[i].record(); });
 }
 
-/// The policy sees what the task shows and says what is added, or the voltages.
+/// Lets the policy act for all flappers that have not been handed back.
 template <class T>
 void Rollout<T>::act() {
   std::vector<std::size_t> acting;

@@ -1,5 +1,5 @@
-// Flights of a configuration, from their start to their end: whatever flies a fleet does it here. What a flight does depends
-// on the number of its flapper alone, so flights may be flown all at once or in parts, on any number of threads.
+// Flights of a configuration from start to end. A flight depends only on the number of its flapper, so flights may be flown all at
+// once or in parts, on any number of threads.
 #pragma once
 
 #include <functional>
@@ -16,13 +16,14 @@ class Rollout {
  public:
   using Hover = std::vector<flight::Snapshot<T>>;
 
-  /// `count` flights, of the flappers from the configuration's first one on. Its actor acts, or `policy`; where there is
-  /// neither, the controller flies alone. Where the task starts settled, flights start from `hover`, which is flown first
-  /// while it is empty.
+  /// `count` flights, of the flappers from fleet.first_flapper on. The configuration's actor acts, or `policy`; with
+  /// neither, the controller flies alone. If the task starts settled, flights start from the snapshots in `hover`; if
+  /// it is empty, it is flown and filled first.
   Rollout(FlyConfig config, std::size_t count, const policy::Policy* policy = nullptr, Hover* hover = nullptr);
   Rollout(const Rollout&) = delete;
 
-  /// Starts an episode of a fleet's flapper `i`: as `hover` flew, or afresh with the vehicle that is sampled for it.
+  /// Starts an episode of flapper `i`: from the snapshot `hover`; if that is null, from the task's start with the
+  /// episode's vehicle.
   static void start(flight::Fleet<T>& fleet, const FlyConfig& config, std::size_t i, std::uint32_t episode,
                     const flight::Snapshot<T>* hover);
 
@@ -34,14 +35,14 @@ class Rollout {
   void record();
   const std::vector<Recorder<T>>& recorders() const { return recorders_; }
 
-  /// One control period. std::invalid_argument for a policy of another task.
+  /// Flies one control period. Throws std::invalid_argument if the policy does not fit the task.
   void step();
   std::int64_t tick() const { return tick_; }  ///< control periods so far
   double t_s() const { return static_cast<double>(tick_) * fleet_.period_s(); }
   /// Whether the configuration's duration has been flown.
   bool over() const { return tick_ >= ticks(config_); }
   static std::int64_t ticks(const FlyConfig& config);
-  double physics_steps() const;  ///< of all flights
+  double physics_steps() const;  ///< physics steps so far, summed over flights
 
   /// Calls job(i) for every flight, on the fleet's threads.
   void each(const auto& job) { io::parallel_for(fleet_.size(), fleet_.options().batch.threads, job); }
@@ -59,12 +60,12 @@ class Rollout {
 extern template class Rollout<float>;
 extern template class Rollout<double>;
 
-/// The share of all work that is done, told to who may end it.
+/// Reports the share of work that is done to a callback, which may end the work.
 struct Progress {
   const std::function<bool(double done)>& keep_going;
   double all, done = 0;
 
-  /// False where the work is to end.
+  /// Adds finished work. False: the work shall end.
   bool add(double more) { return done += more, !keep_going || keep_going(std::min(1.0, done / all)); }
 };
 

@@ -6,7 +6,8 @@
 namespace flappy::rollout {
 namespace {
 
-/// At the origin, to stay there: released in the air, for a flapper on a stand is content with too little thrust.
+/// Task to hover at the origin. Flappers are released in the air, because on a support a controller would accept too
+/// little thrust.
 flight::Task staying() {
   flight::Task task;
   task.name = "settle";
@@ -25,10 +26,10 @@ std::vector<flight::Snapshot<T>> settle(const flight::FleetOptions& options, std
   if (count == 0) return list;
   flight::FleetOptions o = options;
   o.task = staying();
-  o.batch.world.shapes.clear();  // they stand where the task has them, not about the hover
+  o.batch.world.shapes.clear();  // their places belong to the task, not to the hover at the origin
   flight::Fleet<T> fleet(count, vehicle(o.first_flapper), o);
   const long settled = std::lround(seconds / fleet.period_s());
-  std::vector<long> taken_at(count);  // of control ticks, over one beat
+  std::vector<long> taken_at(count);  // control tick of each snapshot, spread over one beat
   for (std::size_t i = 0; i < count; ++i) {
     const model::Vehicle v = vehicle(o.first_flapper + static_cast<std::uint32_t>(i));
     fleet.set_vehicle(i, v);

@@ -1,4 +1,4 @@
-// Settled flappers: each vehicle is released in the air and hovers until its controller has learnt its trim.
+// Settled flappers: each vehicle is released in the air and hovers until its controller has learnt the trim.
 #pragma once
 
 #include <functional>
@@ -9,9 +9,9 @@ namespace flappy::rollout {
 
 inline constexpr double kHover_s = 3;  // long enough for a controller to learn its trim
 
-/// Snapshots of `count` vehicles after `seconds` of hover, each at a phase of the wing beat of its own. `options`: sensors,
-/// controller and world of the flights to come; its task is not used. Bytes depend on the vehicles, the options and the
-/// number of each flapper alone.
+/// Snapshots of `count` vehicles after `seconds` of hover. Each is taken at another phase of the wing beat. `options`:
+/// sensors, controller and world of the later flights; its task and its world's shapes are not used. Each snapshot
+/// depends only on its vehicle, the options and the number of its flapper.
 template <class T>
 std::vector<flight::Snapshot<T>> settle(const flight::FleetOptions& options, std::size_t count, double seconds,
                                         const std::function<model::Vehicle(std::uint32_t flapper)>& vehicle);

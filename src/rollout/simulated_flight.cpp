@@ -8,7 +8,7 @@
 namespace flappy::rollout {
 namespace {
 
-/// Farther from its set point, a vehicle no longer flies what was asked.
+/// Distance from the set point beyond which a flight counts as lost.
 constexpr double kLost_m = 0.5;
 
 bool is_lost(const flight::Fleet<double>& fleet, std::size_t i) {

@@ -1,4 +1,4 @@
-// A flight of a vehicle in our own simulator, as its sensors would have logged it: in memory, for predictions.
+// Flight logs of a vehicle in our own simulator, kept in memory, for predictions.
 #pragma once
 
 #include <optional>
@@ -9,13 +9,13 @@
 namespace flappy::rollout {
 
 struct SimulatedFlight {
-  std::optional<flightlog::FlightLog> log;  ///< from where it was to be logged; nothing of a flight that was too short
-  bool lost = false;                        ///< came apart, tipped over, or strayed from its path while it was logged
+  std::optional<flightlog::FlightLog> log;  ///< from `from_s` on; empty if the flight was too short
+  bool lost = false;                        ///< frozen, tipped over, or far from its path while it was logged
 };
 
-/// Flies `vehicle` `copies` times on one thread, each with noise of its own, as `given` says (its own vehicle and
-/// randomisation are not used): path, controller or actor, sensors, excitation, duration. What comes before `from_s` is not
-/// logged, nor is a flight judged there.
+/// Flies `vehicle` `copies` times on one thread, each time with other noise. `given`: path, controller or actor,
+/// sensors, excitation and duration; its vehicle and randomisation are not used. Before `from_s`, flights are neither
+/// logged nor judged.
 std::vector<SimulatedFlight> simulate(const FlyConfig& given, const model::Vehicle& vehicle, std::size_t copies,
                                       double from_s = 0);
 

@@ -18,9 +18,9 @@
 namespace flappy::rollout {
 namespace {
 
-constexpr int kLook = 5;             // control periods between looks
-constexpr double kReach = 3;         // gains stay within e^+-3 of where they start
-constexpr double kFirstStep = 0.05;  // of the whole range 2 kReach: 0.3
+constexpr int kLook = 5;             // control periods between scored ticks
+constexpr double kReach = 3;         // gains stay within a factor of e^+-3 of their start
+constexpr double kFirstStep = 0.05;  // initial step over the whole range 2 kReach: 0.3
 
 struct Score {
   double farthest_m = 0, strayed_at = -1;
@@ -52,13 +52,13 @@ double cost_of(const Score& s) {
   return square(s.farthest_m / kFarAway_m) + s.sum / n + std::min(1.0, s.yaw / n);
 }
 
-/// What a file of gains has of one, so that its cost is that of the file.
+/// Rounds a gain to the four digits with which it is written to a file, so that the cost is that of the file.
 double four_digits(double gain) { return std::stod(io::format("%.4g", gain)); }
 
 struct Problem {
   const TuneConfig* config = nullptr;
 
-  /// A decision is the logarithm of each gain over where it started.
+  /// decision: logarithm of each gain over its start value.
   flight::Controller controller(const std::vector<double>& decision) const {
     flight::Controller c = config->start;
     const std::vector<flight::ControllerField> all = fields(c);
@@ -76,7 +76,7 @@ struct Problem {
   }
 };
 
-/// Flies, and scores each flight.
+/// Flies the flights and scores them.
 void judge(const TuneConfig& config, FlyConfig fly, std::span<Score> scores) {
   Rollout<float> flights(std::move(fly), scores.size());
   const flight::Fleet<float>& fleet = flights.fleet();
@@ -154,7 +154,7 @@ double cost_of(const TuneConfig& config, const flight::Controller& controller) {
 TuneResult tune(const TuneConfig& config, const std::function<bool(const TuneResult&)>& progress) {
   const Problem problem{&config};
   const auto seed = static_cast<unsigned>(config.seed);
-  // the first generation springs from the controller as it is
+  // the first generation starts from the given controller: all others cost 1e9
   pagmo::population population(pagmo::problem(problem), 0, seed);
   for (unsigned i = 0; i < config.population; ++i)
     population.push_back(std::vector<double>(config.vary.size(), 0), {i == 0 ? cost_of(config, config.start) : 1e9});

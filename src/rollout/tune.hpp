@@ -1,9 +1,9 @@
-// Tuning of a controller: evolution strategy (CMA-ES) over the logarithm of its gains, judged on many flights at once.
+// Tuning of a controller: evolution strategy (CMA-ES) over the logarithms of its gains; the cost is the mean over many flights.
 //
 //   schema = 1
 //   vary = ["attitude.roll.p", ...]       gains, as in the controller's file; each starts above 0
 //   duration_s, settle_s, seed, population, generations
-//   [[trial]]                             flights that judge; the controller of the first trial is where the search starts
+//   [[trial]]                             flights that give the cost; the search starts from the first trial's controller
 //   fly = "file"                          a configuration of flappy-fly
 //   count, weight
 #pragma once
@@ -28,15 +28,16 @@ struct TuneConfig {
   std::uint64_t seed;
   unsigned population, generations;
   flight::Controller start;
-  io::Ranks* ranks = nullptr;  ///< fly their shares of the flights of each trial
+  io::Ranks* ranks = nullptr;  ///< each rank flies its share of every trial's flights
 };
 
-/// io::InputError for whatever is missing, unknown or out of range.
+/// Throws io::InputError for anything that is missing, unknown or out of range.
 TuneConfig read_tune_config(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
 
-/// Mean cost of a flight, over trials by weight. A flight that strays 0.3 m from its path costs 3 to 4, the earlier the
-/// more; another one (largest distance / 0.3 m)^2 plus, once settled, the mean square of its errors over 5 deg of roll and
-/// of pitch, 10 deg of yaw (this term at most 1) and 5 cm.
+/// Mean cost of a flight, weighted over trials. A flight that strays 0.3 m from its path costs 3 to 4, more if it
+/// strays earlier. Any other flight costs (largest distance / 0.3 m)^2 plus, after settle_s, the mean of (roll / 5
+/// deg)^2 + (pitch / 5 deg)^2 + (distance / 5 cm)^2 plus the mean of (yaw / 10 deg)^2, the latter at most 1. Errors are
+/// from the set point.
 double cost_of(const TuneConfig& config, const flight::Controller& controller);
 
 struct TuneResult {
@@ -45,7 +46,7 @@ struct TuneResult {
   unsigned generations = 0;
 };
 
-/// `progress` after each generation; false ends the search.
+/// Searches for the best gains. `progress` is called after each generation; false ends the search.
 TuneResult tune(const TuneConfig& config, const std::function<bool(const TuneResult&)>& progress);
 
 }  // namespace flappy::rollout

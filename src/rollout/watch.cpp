@@ -6,13 +6,12 @@
 namespace flappy::rollout {
 namespace {
 
-constexpr std::uint32_t kStream = std::uint32_t{1}
-                                  << 30;  // numbers of flappers in a stream, as evaluation.hpp deals them out
+constexpr std::uint32_t kStream = std::uint32_t{1} << 30;  // flapper numbers per stream, as in evaluation.hpp
 
 }  // namespace
 
 Watch::Watch(const std::vector<std::uint32_t>& flappers) : size_(flappers.size()) {
-  if (size_ > kMost) throw std::invalid_argument("too many flappers to watch");
+  if (size_ > kMax) throw std::invalid_argument("too many flappers to watch");
   for (std::size_t i = 0; i < size_; ++i) flappers_[i] = flappers[i];
 }
 

@@ -1,4 +1,4 @@
-// Some of many flappers are shown to others while they fly. What is shown changes nothing of the flight.
+// Shows selected flappers to an observer while they fly. It does not change the flights.
 #pragma once
 
 #include <array>
@@ -13,22 +13,22 @@ namespace flappy::rollout {
 
 /// A flapper at the end of a control period.
 struct FlightSample {
-  std::uint32_t slot = 0, flapper = 0;  ///< place in the list of those that are watched; its number
+  std::uint32_t slot = 0, flapper = 0;  ///< index in the list of watched flappers; number of the flapper
   std::uint64_t tick = 0;               ///< control periods since the flight's start
-  double t_s = 0;                       ///< since then
-  sim::FlapperState state;              ///< true
-  double gyro_rad_s[3], accel_m_s2[3];  ///< as its IMU means them, in B; without noise
-  sim::Input input;                     ///< as controller and actor set it; nothing where the actor sets voltages
+  double t_s = 0;                       ///< time since the flight's start
+  sim::FlapperState state;              ///< true state
+  double gyro_rad_s[3], accel_m_s2[3];  ///< low-passed IMU signal without noise and bias, in B
+  sim::Input input;                     ///< set by controller and actor; without meaning if the actor sets voltages
   bool sets_voltages = false;
-  double left_V = 0, right_V = 0;  ///< as it sets them, where it does
+  double left_V = 0, right_V = 0;  ///< voltages set by the actor, if sets_voltages
 };
 
-/// Whoever watches. Flights ask it after each control period; it may be told from another thread whom to watch.
+/// Observer of flights, called after each control period. Other threads may change the watched flappers at any time.
 class Watch {
  public:
   explicit Watch(const std::vector<std::uint32_t>& flappers);
   virtual ~Watch() = default;
-  /// Of one flight thread at a time; it must not wait.
+  /// Receives a sample. Called by one thread at a time; it must not block.
   virtual void see(const FlightSample& sample) = 0;
 
   std::size_t size() const { return size_; }
@@ -36,12 +36,12 @@ class Watch {
   void set_flapper(std::size_t slot, std::uint32_t to) { flappers_[slot].store(to, std::memory_order_relaxed); }
 
  private:
-  static constexpr std::size_t kMost = 64;
+  static constexpr std::size_t kMax = 64;
   std::size_t size_;
-  std::array<std::atomic<std::uint32_t>, kMost> flappers_{};
+  std::array<std::atomic<std::uint32_t>, kMax> flappers_{};
 };
 
-/// Shows those of a fleet that are watched, by their numbers within their stream (training, validation, test).
+/// Shows the watched flappers of a fleet. Flappers are numbered within their stream (training, validation, test).
 template <class T>
 void show(Watch& watch, const flight::Fleet<T>& fleet);
 

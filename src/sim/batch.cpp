@@ -20,17 +20,18 @@ using model::Parameters;
 using model::State;
 using model::Vec3;
 
-/// h^2 omega^2 of the stiffest contact that is flown: of vehicles that are drawn about one whose file keeps to less.
+/// Largest h^2 omega^2 of a contact. It exceeds kStiffestContact, which limits vehicle files, because vehicles are also
+/// drawn at random around such a file.
 constexpr double kStiffestDrawn = 2;
 
-/// How the centre of mass moves relative to the torso origin, in W.
+/// Velocity of the centre of mass relative to the torso origin, in W.
 Vec3<double> com_minus_origin_velocity(const Parameters<double>& p, const State<double>& x) {
   const auto whole = model::whole_vehicle<double>(p, {model::place_wing<+1>(p.left, x.left, x.body_rate_rad_s),
                                                       model::place_wing<-1>(p.right, x.right, x.body_rate_rad_s)});
   return model::rotation_matrix(x.attitude) * (model::cross(x.body_rate_rad_s, whole.com) + whole.com_rate);
 }
 
-/// 1 / R and N K / R, left and right.
+/// 1 / R and N K / R, left and right; empty for vehicles without motors.
 template <class T>
 std::vector<T> motor_rows(const model::Vehicle& v) {
   std::vector<T> rows;
@@ -109,8 +110,8 @@ void Batch<T>::Storage::put_contact(std::size_t i, const std::vector<T>& rows, c
   for_contact_memory(i, [&](T& number) { number = memory[next++]; });
 }
 
-/// Of a robot that is known by the beat: its own rows have the others.
-/// Of a robot that is known by the beat, whose own rows have the others, or that has four angles a wing and no others.
+/// Effects of sensors only: other effects of beat-averaged robots are in rows of their own, and articulated wings have
+/// none.
 template <class T>
 void Batch<T>::Storage::put_effects_of_sensors(std::size_t i, const model::Vehicle& v) {
   model::Vehicle seen;
@@ -121,7 +122,7 @@ void Batch<T>::Storage::put_effects_of_sensors(std::size_t i, const model::Vehic
   put_effects(i, seen);
 }
 
-/// A lane without an effect that its block has gets the sizes at which the effect vanishes.
+/// A lane that lacks an effect of its block gets magnitudes of 0.
 template <class T>
 void Batch<T>::Storage::put_effects(std::size_t i, const model::Vehicle& v) {
   if (v.beat_averaged || v.jointed) return put_effects_of_sensors(i, v);
@@ -157,14 +158,14 @@ void Batch<T>::Storage::put_effect_rows(std::size_t i, const model::Vehicle& v) 
   };
   lane_effects[i] = 0;
   for (std::size_t e = 0; e < model::effects().size(); ++e) {
-    const model::EffectEntry& entry = model::effects()[e];
+    const model::CatalogueEffect& entry = model::effects()[e];
     const std::vector<double> values = entry.values_of(v);
     if (entry.change == nullptr && entry.acts(values)) lane_effects[i] |= std::uint64_t{1} << e;
     for (std::size_t k = 0; k < values.size(); ++k) put_row(entry.first_row + static_cast<int>(k), values[k]);
   }
-  const auto figures = model::effect_figures(v);
-  const double* from = reinterpret_cast<const double*>(&figures);
-  for (int k = 0; k < 2 * model::kRows<model::SideFigures>; ++k) put_row(model::kEffectParameterRows + k, from[k]);
+  const auto side_constants = model::effect_constants(v);
+  const double* from = reinterpret_cast<const double*>(&side_constants);
+  for (int k = 0; k < 2 * model::kRows<model::SideConstants>; ++k) put_row(model::kEffectParameterRows + k, from[k]);
 }
 
 template <class T>
@@ -194,7 +195,7 @@ void Batch<T>::Storage::put_effects(std::size_t i, std::uint64_t set, const std:
   unite_effects(i / kLanes<T>);
 }
 
-/// Gives effects of `set` memory; what there was of it stays.
+/// Gives the effects of `set` memory, and keeps the memory that others already have.
 template <class T>
 void Batch<T>::Storage::keep_effects(std::uint64_t set) {
   if (lane_effects.empty()) {
@@ -227,7 +228,7 @@ template <class T>
 Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOptions& options)
     : storage_(std::make_unique<Storage>()) {
   Storage& s = *storage_;
-  // inputs of a vehicle without motors are held for as long as its controller says
+  // the controller of a vehicle without motors decides how long inputs hold
   const bool undriven = vehicle.beat_averaged || vehicle.jointed;
   const double steps = undriven ? 1 : vehicle.driver.hold_s / options.step_s;
   if (!(options.step_s > 0) || std::llround(steps) < 1 || std::abs(steps - std::round(steps)) > 1e-6)
@@ -239,11 +240,11 @@ Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOpt
   s.steps_per_update = static_cast<int>(std::llround(steps));
   s.world = options.world;
   s.hold_s = vehicle.driver.hold_s;
-  s.kernel = vehicle.beat_averaged ? mean_step_kernel<T>(options.instruction_set)
+  s.kernel = vehicle.beat_averaged ? beat_averaged_step_kernel<T>(options.instruction_set)
              : vehicle.jointed     ? jointed_step_kernel<T>(options.instruction_set)
                                    : step_kernel<T>(options.instruction_set);
   s.blocks.resize((count + kLanes<T> - 1) / kLanes<T>);
-  // lanes beyond the last flapper fly along as copies, so that no lane ever holds numbers of no vehicle
+  // lanes beyond the last flapper are copies, so that every lane holds the numbers of a real vehicle
   Block<T> block{};
   for (int lane = 0; lane < kLanes<T>; ++lane) {
     s.put_vehicle(block, lane, vehicle);
@@ -252,7 +253,8 @@ Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOpt
     put(x, block.state, lane);
   }
   for (Block<T>& b : s.blocks) b = block;
-  for (std::size_t i = 0; vehicle.beat_averaged && i < s.blocks.size() * kLanes<T>; ++i) s.put_mean(i, vehicle);
+  for (std::size_t i = 0; vehicle.beat_averaged && i < s.blocks.size() * kLanes<T>; ++i)
+    s.put_beat_averaged(i, vehicle);
   for (std::size_t i = 0; vehicle.jointed && i < s.blocks.size() * kLanes<T>; ++i) s.put_jointed(i, vehicle);
   if (options.meters_energy && !undriven) s.motors.resize(s.blocks.size());
   for (std::size_t i = 0; i < count; ++i) s.put_motors(i, motor_rows<T>(vehicle));
@@ -282,19 +284,19 @@ template <class T>
 void Batch<T>::set_vehicle(std::size_t i, const model::Vehicle& vehicle) {
   if (vehicle.driver.hold_s != storage_->hold_s)
     throw std::invalid_argument("all flappers of a batch share the driver's hold");
-  if (vehicle.beat_averaged.has_value() != (storage_->mean != nullptr) ||
+  if (vehicle.beat_averaged.has_value() != (storage_->beat_averaged != nullptr) ||
       vehicle.jointed.has_value() != (storage_->jointed != nullptr))
     throw std::invalid_argument("all flappers of a batch are of one kind");
   const auto [block, lane] = storage_->at(i);
   storage_->put_vehicle(block, lane, vehicle);
-  if (storage_->mean) storage_->put_mean(i, vehicle);
+  if (storage_->beat_averaged) storage_->put_beat_averaged(i, vehicle);
   if (storage_->jointed) storage_->put_jointed(i, vehicle);
   storage_->put_effects(i, vehicle);
   storage_->put_contact(i, vehicle);
   storage_->put_motors(i, motor_rows<T>(vehicle));
 }
 
-/// Puts flapper `i` where `state` is, held as `start` says, and clears its status: all else stays.
+/// Puts flapper `i` into `state`, held as `start` says, and clears its status; everything else stays.
 template <class T>
 void Batch<T>::Storage::put_state(std::size_t i, const FlapperState& state, Start start) {
   const auto [block, lane] = at(i);
@@ -315,7 +317,7 @@ void Batch<T>::Storage::put_state(std::size_t i, const FlapperState& state, Star
   x.right = hinges(1);
   const Vec3<double> velocity{state.velocity_m_s[0], state.velocity_m_s[1], state.velocity_m_s[2]};
   x.com_velocity_m_s = velocity + com_minus_origin_velocity(get<Parameters<double>>(block.parameters, lane), x);
-  // on points of contact it stands by itself
+  // with points of contact, the flapper stands on them without a support
   if (start == Start::standing && points.empty()) x.support = static_cast<double>(model::Support::standing);
   if (start == Start::welded) x.support = static_cast<double>(model::Support::welded);
   put(x, block.state, lane);
@@ -334,7 +336,7 @@ void Batch<T>::reset(std::size_t i, const FlapperState& state, Start start) {
   storage_->clear_energy(i);
   storage_->for_states(i, ~std::uint64_t{0}, [](T& number) { number = 0; });
   storage_->for_contact_memory(i, [](T& number) { number = 0; });
-  if (storage_->mean) *storage_->mean->memory_of(i) = 0;
+  if (storage_->beat_averaged) *storage_->beat_averaged->memory_of(i) = 0;
   for (std::size_t k = 0; storage_->jointed && k < JointedVehicles<T>::kMemoryRows; ++k)
     storage_->jointed->memory_of(i)[k * kLanes<T>] = 0;
 }
@@ -466,7 +468,8 @@ std::uint64_t Batch<T>::hash(std::size_t first, std::size_t last) const {
     storage_->for_states(i, storage_->effects_of_lane(i) & ~model::sensor_effects(),
                          [&](T number) { h = mixed(h, bits_of(number)); });
     storage_->for_contact_memory(i, [&](T number) { h = mixed(h, bits_of(number)); });
-    if (storage_->mean) storage_->mean->for_memory(i, [&](T number) { h = mixed(h, bits_of(number)); });
+    if (storage_->beat_averaged)
+      storage_->beat_averaged->for_memory(i, [&](T number) { h = mixed(h, bits_of(number)); });
     for (std::size_t k = 0; storage_->jointed && k < JointedVehicles<T>::kMemoryRows; ++k)
       h = mixed(h, bits_of(storage_->jointed->memory_of(i)[k * kLanes<T>]));
     all = mixed(all, h);

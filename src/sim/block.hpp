@@ -1,6 +1,5 @@
-// A block: kLanes flappers side by side, one row for each number of a flapper. It is the unit of work: one
-// block steps a whole control period with its state in registers and L1 before the next block starts, and
-// nothing in a block depends on another.
+// A block: kLanes flappers next to each other, one row for each number of a flapper. It is the unit of work: a block steps a whole control period
+// with its state in registers and L1 before the next block starts, and blocks do not depend on each other.
 #pragma once
 
 #include <cstdint>
@@ -12,23 +11,23 @@ namespace flappy::sim {
 
 inline namespace FLAPPY_ISA {
 
-/// At the motors, held between driver updates.
+/// Voltages of the motors, held between driver updates.
 template <class T>
 struct Voltages {
   T left_V, right_V;
 };
 
-/// What drives a flapper between its control updates, as rows.
+/// Inputs, limits and voltages of a flapper between its control updates, as rows.
 template <class T>
 struct Drive {
   model::WingBeat<T> input;  // as commanded
-  model::WingBeat<T> limit;  // |input| is clipped to it
+  model::WingBeat<T> limit;  // bounds of |input|
   Voltages<T> voltages;
 };
 
 }  // namespace FLAPPY_ISA
 
-/// Flappers in a block: one cache line for each row.
+/// Number of flappers in a block: a row fills one cache line.
 template <class T>
 inline constexpr int kLanes = 64 / sizeof(T);
 
@@ -36,8 +35,8 @@ inline constexpr int kParameterRows = model::kRows<model::Parameters>;
 inline constexpr int kStateRows = model::kRows<model::State>;
 inline constexpr int kDriveRows = model::kRows<Drive>;
 
-/// Of a flapper whose voltages stay as they were set, where others have those of their wing beat: a bit beside those of Status, for
-/// a row of its own would take every flapper beyond its 2 kB.
+/// Status bit of a flapper whose voltages were set directly and stay, while others have those of their wing beat. It is
+/// kept in the word of Status, because a row of its own would make every flapper larger than 2 kB.
 inline constexpr std::uint32_t kDirect = std::uint32_t{1} << 31;
 
 template <class T>

@@ -1,4 +1,5 @@
-// What every kernel does at the end of its steps: contact, and robots that come apart. For files that are compiled once for each instruction set.
+// End of the steps of every kernel: contact events, and freezing of implausible states. For files that are compiled once for each
+// instruction set.
 #pragma once
 
 #include "sim/rows.hpp"
@@ -10,15 +11,15 @@ inline namespace FLAPPY_ISA {
 
 using namespace model;
 
-/// A flapper that goes faster than this is not flying but diverging.
+/// A flapper that moves faster than this does not fly but diverges.
 inline constexpr double kPlausibleSpeed_m_s = 100;
 inline constexpr double kPlausibleBodyRate_rad_s = 1000;
 inline constexpr double kPlausibleHingeRate_rad_s = 20000;  // the published limit of the rotation joint is 2000
 inline constexpr double kPlausiblePosition_m = 10000;
-/// A flapper that rose this far has left its support: touching the ground is an event from then on.
+/// A flapper that rose by this height has left its support: from then on, touching the ground is an event.
 inline constexpr double kTakeOffClearance_m = 0.005;
 
-/// Marks flappers that have come apart or touched something, and stands those that never took off back up.
+/// Marks flappers that touched a surface, and returns flappers to their support that fell back before they took off.
 template <class T, class L>
 FLAPPY_INLINE void look_around(State<L>& x, const Parameters<L>& p, const StepPlan& plan, Block<T>& block, int first) {
   const auto mark = [&](typename L::Mask mask, std::uint32_t bit) {
@@ -62,7 +63,7 @@ FLAPPY_INLINE typename L::Mask plausible(const State<L>& x) {
          all(x.body_rate_rad_s, kPlausibleBodyRate_rad_s) & within(x.attitude.w, 2) & side(x.left) & side(x.right);
 }
 
-/// Freezes what is no longer plausible; true for lanes that may move on.
+/// Marks implausible flappers as frozen; true for lanes that are not frozen.
 template <class T, class L>
 FLAPPY_INLINE typename L::Mask freeze_implausible(const State<L>& x, Block<T>& block, int first) {
   typename L::Mask moves = plausible(x);
@@ -77,7 +78,7 @@ FLAPPY_INLINE typename L::Mask freeze_implausible(const State<L>& x, Block<T>& b
   return moves;
 }
 
-/// Takes back what moved in some lanes.
+/// Restores the state `before` in the given lanes.
 template <class L>
 FLAPPY_INLINE void keep(const typename L::Mask& lanes, const State<L>& before, State<L>& x) {
   const L* from = reinterpret_cast<const L*>(&before);

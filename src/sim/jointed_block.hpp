@@ -1,8 +1,8 @@
-// What vehicles with four angles a wing (model/jointed.hpp) have beside the rows of their Block. Those of a batch share modes, harmonics, strips and
-// which input acts on what, and differ in every number.
+// Data of vehicles with articulated wings (model/jointed.hpp) in addition to the rows of their Block. The vehicles of a batch share modes, harmonics,
+// strips and the structure of their modulations; every number is each vehicle's own.
 //
-// In a Block, parameters have the single-point wings and the extent, drive.input is what a controller says, which the vehicle's inputs mix, and the
-// velocity of the state is that of the torso's origin.
+// In a Block, parameters have the single-point wings and the extent, drive.input has the controller's outputs, which the vehicle's inputs mix, and
+// the velocity of the state is that of the torso's origin.
 #pragma once
 
 #include <vector>
@@ -19,7 +19,7 @@ inline constexpr int kSides = 2;  // left, right
 
 inline namespace FLAPPY_ISA {
 
-/// Of one input, as rows. `follows`: its filter over half a step.
+/// One input, as rows. `follows`: its filter over half a step.
 template <class T>
 struct JointedInput {
   T low, high, neutral;
@@ -27,29 +27,29 @@ struct JointedInput {
   model::InputFilter<T> follows;
 };
 
-/// What moves besides the rows of State. Angles of free joints, rates, and accelerations of the step before.
+/// State in addition to the rows of State. Accelerations are those of the previous step.
 template <class T>
 struct JointedMemory {
-  T flown;  // 0: starts
-  T clock;  // beats, its fraction
-  T input[model::kMostInputs], input_rate[model::kMostInputs];
+  T flown;  // 0: not yet stepped since a reset
+  T clock;  // fraction of the beat
+  T input[model::kMaxInputs], input_rate[model::kMaxInputs];
   model::Vec3<T> acceleration_B_m_s2, angular_acceleration_rad_s2;
   T angle_rad[kSides][kJoints], rate_rad_s[kSides][kJoints], acceleration_rad_s2[kSides][kJoints];
-  T torque_Nm[kSides][kJoints];  // of the last step
+  T torque_Nm[kSides][kJoints];  // in the last step
 };
 
 }  // namespace FLAPPY_ISA
 
-/// An input that acts on something of a side; its coefficient is each vehicle's own.
+/// An input that modulates a quantity of a side. Its coefficient differs from vehicle to vehicle.
 struct Modulation {
   enum class Of { frequency, timing, scale, offset } of;
-  int side;   // of timing, scale and offset
-  int joint;  // of scale and offset
+  int side;   // for timing, scale and offset
+  int joint;  // for scale and offset
   int input;
   bool operator==(const Modulation&) const = default;
 };
 
-/// What vehicles of a batch share, plain, as kernels are not to share code.
+/// Structure that all vehicles of a batch share, plain, because kernels must not share code.
 struct JointedShape {
   int inputs = 0, modulations = 0;
   model::Jointed::Mode modes[kSides][kJoints] = {};
@@ -57,11 +57,11 @@ struct JointedShape {
   int strips[kSides] = {};
   model::FreeJoints free[kSides];
   int unknowns = model::kBodyUnknowns;
-  bool timed[kSides] = {};   // some input shifts the phase
-  bool slides[kSides] = {};  // some C_T
-  bool carries_air = false;  // some added mass
+  bool timed[kSides] = {};   // an input changes the timing
+  bool slides[kSides] = {};  // the wing has a C_T
+  bool carries_air = false;  // a wing has added mass
   bool same_gait = false;    // both sides have the same harmonics
-  // Where rows are, after those of the vehicle's JointedParameters.
+  // First rows of each part, after those of JointedParameters.
   int input_row = 0, modulation_row = 0, series_row[kSides] = {}, harmonic_row[kSides][kJoints] = {},
       strip_row[kSides] = {}, rows = 0;
   bool operator==(const JointedShape&) const = default;
@@ -73,14 +73,14 @@ struct JointedProgram {
   bool operator==(const JointedProgram&) const = default;
 };
 
-/// A block's part.
+/// Pointers to the data of one block.
 template <class T>
 struct JointedRows {
   const JointedShape* shape = nullptr;
   const Modulation* modulations = nullptr;
   const T* rows = nullptr;
   T* memory = nullptr;
-  double* work_J = nullptr;  // [two][lane]: positive muscle work, and all of it
+  double* work_J = nullptr;  // [2][lane]: positive muscle work, and total muscle work
 };
 
 }  // namespace flappy::sim

@@ -1,7 +1,8 @@
-// The step of vehicles with four angles a wing: a gait prescribes the driven ones, model/jointed_dynamics.hpp has the rest.
-// Positions, free angles and the clock of the beat drift for half a step; in the middle, loads and accelerations are taken, at rates u + h/2 u'(the step
-// before), and kick the rates; positions drift on with the new ones (leapfrog, rates by the method of Adams and Bashforth: of second order). Driven
-// angles are where the gait has them in the middle, exactly. Compiled once for each instruction set (FLAPPY_ISA); the bits are the same on all of them.
+// The step of vehicles with articulated wings: a gait prescribes the driven angles, model/jointed_dynamics.hpp solves for the rest.
+// Positions, free angles and the clock of the beat drift for half a step. In the middle, loads and accelerations are computed with the rates
+// u + h/2 u'(previous step), and change the rates; then positions drift on with the new rates (leapfrog, with rates by the method of Adams and
+// Bashforth: of second order). Driven angles are exactly those of the gait in the middle. Compiled once for each instruction set (FLAPPY_ISA); the
+// bits are the same on all of them.
 #include <cstddef>
 #include <type_traits>
 
@@ -14,11 +15,11 @@ namespace {
 
 using Mode = Jointed::Mode;
 
-/// Angles of both sides.
+/// Angles of both sides, with rates and accelerations.
 template <class L>
 using Angles = Sides<Moving<L>[kJoints]>;
 
-/// One register of lanes, and what stays the same while it steps.
+/// The vehicles of one register of lanes, with the constants of their steps.
 template <class T>
 class JointedLanes {
   using L = Lanes<T, kWidth<T>>;
@@ -34,7 +35,7 @@ class JointedLanes {
         block_(view_rows<Parameters<L>>(block.parameters, first)),
         m_(load_rows<JointedMemory<L>>(memory(), first)) {}
 
-  /// Inputs for these steps, from what the controller says.
+  /// Mixes the inputs of these steps from the controller's outputs.
   void set_inputs(const WingBeat<L>& says, const State<L>& x) {
     const L four[] = {says.amplitude_V, says.difference_V, says.bias_V, says.split_cycle};
     for (int k = 0; k < shape_.inputs; ++k) {
@@ -47,13 +48,13 @@ class JointedLanes {
     start_fresh(x);
   }
 
-  /// By half a step, either way.
+  /// Advances clock and free angles by half a step, forward or backward.
   void drift(const L& time_s) {
     m_.clock += time_s * frequency();
     for_free([&](int side, int j) { m_.angle_rad[side][j] += time_s * m_.rate_rad_s[side][j]; });
   }
 
-  /// From the middle of a step to its end and on to the middle of the next.
+  /// Advances inputs, clock and free angles from the middle of a step to the middle of the next.
   void drift_on() {
     for (int k = 0; k < shape_.inputs; ++k) follow(follows_[k], wanted_[k], m_.input[k], m_.input_rate[k]);
     m_.clock += step_ * frequency();
@@ -61,9 +62,9 @@ class JointedLanes {
     for_free([&](int side, int j) { m_.angle_rad[side][j] += step_ * m_.rate_rad_s[side][j]; });
   }
 
-  /// Inputs in the middle of the step, and the angles that they and the clock make.
+  /// Advances the inputs to the middle of the step, and computes the angles from inputs and clock.
   void move_wings(Angles<L>& q) {
-    Moving<L> u[kMostInputs];
+    Moving<L> u[kMaxInputs];
     for (int k = 0; k < shape_.inputs; ++k) {
       follow(follows_[k], wanted_[k], m_.input[k], m_.input_rate[k]);
       u[k] = moving(follows_[k], wanted_[k], m_.input[k], m_.input_rate[k]);
@@ -114,7 +115,8 @@ class JointedLanes {
       }
   }
 
-  /// Air on one side at its shoulder in E, and pulls of its free angles. `shoulder_m_s`: its velocity in the air, in B.
+  /// Loads of air on one side at its shoulder in E, and pulls of its free angles. `shoulder_m_s`: velocity of the
+  /// shoulder in the air, in B.
   template <int s>
   JointedLoad<L> load_side(const JointedPose<L>& g, const Vec3<L>& shoulder_m_s) const {
     constexpr int kSide = s > 0 ? 0 : 1;
@@ -143,7 +145,8 @@ class JointedLanes {
       if (shape_.modes[kSide][j] != Mode::free) continue;
       load.pulls[j] = pull_of(p.joints[j], m_.angle_rad[kSide][j], m_.rate_rad_s[kSide][j], step_);
       if (j != kRotation) continue;
-      // what damps a light wing is taken as if it grew with the rate's change since the last step: explicit, it may be stiff
+      // aerodynamic damping of a light wing may be stiff: it acts as inertia, relative to the acceleration of the
+      // last step
       const L damped = L(step_ * L(p.rotational_damping_Nm_s2 * abs(g.wing_rate.y)));
       load.pulls[j].inertia_kg_m2 += damped;
       load.pulls[j].torque_Nm += damped * m_.acceleration_rad_s2[kSide][j];
@@ -151,7 +154,7 @@ class JointedLanes {
     return load;
   }
 
-  /// New rates of free angles; torque and work of the others.
+  /// Advances the rates of free angles, and computes torque and work of the others.
   void take(const JointedMotion<L>& motion, const Angles<L>& q) {
     m_.acceleration_B_m_s2 = motion.acceleration_m_s2;
     m_.angular_acceleration_rad_s2 = motion.angular_acceleration_rad_s2;
@@ -199,7 +202,7 @@ class JointedLanes {
 
   const JointedMemory<L>& memory_now() const { return m_; }
 
-  /// What an onlooker sees of the wings.
+  /// Copies stroke and rotation of the wings to State, for observers.
   void show(State<L>& x) const {
     const auto side = [&](int s, SideState<L>& to) {
       to.stroke_rad = m_.angle_rad[s][kStroke];
@@ -213,7 +216,7 @@ class JointedLanes {
     side(1, x.right);
   }
 
-  /// Lanes whose other two angles are still possible.
+  /// Lanes whose stroke plane and deviation are within kLargestAngle_rad; plausible() checks stroke and rotation.
   typename L::Mask possible() const {
     const L limit(kLargestAngle_rad);
     auto all = abs(m_.angle_rad[0][kPlane]) <= limit;
@@ -222,7 +225,7 @@ class JointedLanes {
     return all;
   }
 
-  /// `moves`: lanes of which it is kept.
+  /// Stores the memory of the lanes in `moves`, and adds their work.
   void store(const typename L::Mask& moves, Block<T>& block) const {
     const auto before = load_rows<JointedMemory<L>>(memory(), first_);
     const L *from = reinterpret_cast<const L*>(&m_), *old = reinterpret_cast<const L*>(&before);
@@ -250,7 +253,7 @@ class JointedLanes {
         if (shape_.modes[side][j] == Mode::free) use(side, j);
   }
 
-  /// Beats per second at the inputs of now.
+  /// Beats per second with the present inputs.
   L frequency() const {
     L factor(1);
     for (int i = 0; i < shape_.modulations; ++i)
@@ -259,7 +262,8 @@ class JointedLanes {
     return p_.frequency_Hz * factor;
   }
 
-  /// It starts as if its first inputs had been there for long, free strokes and rotations as its state has them.
+  /// Initialises a vehicle that has not flown yet: inputs as if the first ones had been held for long, free strokes and
+  /// rotations from State, other free angles at rest.
   void start_fresh(const State<L>& x) {
     const auto fresh = m_.flown == L(0);
     if (!any(fresh)) return;
@@ -290,18 +294,19 @@ class JointedLanes {
   const JointedShape& shape_;
   int first_;
   const L step_, half_;
-  // in place where lanes fill a row, as view_rows() has it
+  // references if lanes fill a row, as view_rows() returns them
   template <class S>
   using View = std::conditional_t<kWidth<T> == kLanes<T>, const S&, const S>;
   View<JointedParameters<L>> p_;
   View<Parameters<L>> block_;
   JointedMemory<L> m_;
-  L wanted_[kMostInputs];
-  InputFilter<L> follows_[kMostInputs];
+  L wanted_[kMaxInputs];
+  InputFilter<L> follows_[kMaxInputs];
   L positive_J{0.0}, all_J{0.0};
 };
 
-/// What holds the body feels the air on the wings; a standing one leaves when that carries it.
+/// Adds the air on the wings to the impulse on the support of a held body, and to its averaged lift; releases a
+/// standing body once that lift carries it.
 template <class L>
 FLAPPY_INLINE void feel(const Parameters<L>& p, const Vec3<L>& force_B, const Vec3<L>& moment_B, const Matrix3<L>& R,
                         const StepPlan& plan, const typename L::Mask& held, State<L>& x) {

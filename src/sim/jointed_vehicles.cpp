@@ -1,4 +1,4 @@
-// Vehicles of a batch with four angles a wing: from a vehicle to its rows.
+// Vehicles of a batch with articulated wings: conversion of vehicles to rows.
 #include <stdexcept>
 
 #include "model/derive_jointed.hpp"
@@ -11,7 +11,7 @@ using model::Jointed;
 
 const Jointed::Wing& wing_of(const Jointed& v, int side) { return side == 0 ? v.left : v.right; }
 
-/// Calls `use(modulation, coefficient)` for all that inputs act on.
+/// Calls `use(modulation, coefficient)` for every quantity that an input modulates.
 void for_modulations(const Jointed& v, const auto& use) {
   using Of = Modulation::Of;
   for (int i = 0; i < static_cast<int>(v.inputs.size()); ++i) {
@@ -77,9 +77,9 @@ JointedProgram program_of(const Jointed& v) {
 template <class T>
 void Batch<T>::Storage::put_jointed(std::size_t i, const model::Vehicle& v) {
   const Jointed& j = *v.jointed;
-  if (j.inputs.size() > model::kMostInputs)
+  if (j.inputs.size() > model::kMaxInputs)
     throw std::invalid_argument("a vehicle of " + std::to_string(j.inputs.size()) + " inputs; at most " +
-                                std::to_string(model::kMostInputs) + " can be flown");
+                                std::to_string(model::kMaxInputs) + " can be flown");
   const JointedProgram program = program_of(j);
   if (!jointed) {
     jointed = std::make_unique<JointedVehicles<T>>();

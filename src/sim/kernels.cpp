@@ -18,7 +18,7 @@ std::vector<std::string> instruction_sets() {
 #if defined(__aarch64__)
   const bool has[] = {true, true};  // NEON is part of it
 #else
-  // clang 14 does not know "x86-64-v2" and so on: the youngest extensions of each level stand for it
+  // clang 14 does not know "x86-64-v2" and so on: the newest extensions of each level stand for it
   const bool has[] = {
       true, __builtin_cpu_supports("ssse3") && __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt"),
       __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
@@ -50,11 +50,11 @@ template StepBlock<float> step_kernel<float>(std::string_view);
 template StepBlock<double> step_kernel<double>(std::string_view);
 
 template <class T>
-StepBlock<T> mean_step_kernel(std::string_view instruction_set) {
+StepBlock<T> beat_averaged_step_kernel(std::string_view instruction_set) {
   return kernel_of<T>(mean_floats, mean_doubles, instruction_set).step;
 }
-template StepBlock<float> mean_step_kernel<float>(std::string_view);
-template StepBlock<double> mean_step_kernel<double>(std::string_view);
+template StepBlock<float> beat_averaged_step_kernel<float>(std::string_view);
+template StepBlock<double> beat_averaged_step_kernel<double>(std::string_view);
 
 template <class T>
 StepBlock<T> jointed_step_kernel(std::string_view instruction_set) {

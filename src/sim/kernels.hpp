@@ -1,4 +1,4 @@
-// What this program has compiled once for each instruction set, and which of it this processor runs.
+// Selection of the code that this program has compiled once for each instruction set.
 #pragma once
 
 #include <cstddef>
@@ -6,7 +6,8 @@
 
 #include "sim/step.hpp"
 
-/// Declares `kernel` as it is compiled for each instruction set (FLAPPY_ISA), and a table of all, `kernel`s, worst first.
+/// Declares `kernel` for each instruction set (FLAPPY_ISA) for which it is compiled, and a table `kernel`s of all,
+/// worst first.
 #if defined(__aarch64__)
 #define FLAPPY_KERNELS(Type, kernel) \
   inline namespace scalar {          \
@@ -35,11 +36,11 @@
 
 namespace flappy::sim {
 
-/// The place of an instruction set in such tables, of the best one for an empty name; std::invalid_argument where this
-/// processor has it not.
+/// Index of an instruction set in such tables; the best one for an empty name. Throws std::invalid_argument if this
+/// processor does not have it.
 std::size_t place_of(std::string_view instruction_set);
 
-/// What T's table has for an instruction set.
+/// The element for an instruction set of T's table.
 template <class T, class Single, class Double, std::size_t sets>
 const auto& kernel_of(const Single* const (&singles)[sets], const Double* const (&doubles)[sets],
                       std::string_view instruction_set) {
@@ -47,11 +48,11 @@ const auto& kernel_of(const Single* const (&singles)[sets], const Double* const 
   else return *doubles[place_of(instruction_set)];
 }
 
-/// The simulator's step, that of robots that are known by the beat, and that of vehicles with four angles a wing.
+/// Steps of vehicles with motors, of beat-averaged robots, and of vehicles with articulated wings.
 template <class T>
 StepBlock<T> step_kernel(std::string_view instruction_set);
 template <class T>
-StepBlock<T> mean_step_kernel(std::string_view instruction_set);
+StepBlock<T> beat_averaged_step_kernel(std::string_view instruction_set);
 template <class T>
 StepBlock<T> jointed_step_kernel(std::string_view instruction_set);
 

@@ -1,7 +1,6 @@
-// Lanes<T, N>: N flappers in one register. Arithmetic is elementwise and the same to the bit on every
-// instruction set: a product that meets a sum is one fused multiply-add *because the source says so*
-// (operator* returns an unevaluated Product), never because a compiler chose to contract. v2 has no fma
-// instruction and emulates it.
+// Lanes<T, N>: N flappers in one register. Arithmetic is elementwise and the same to the bit on every instruction set: a product that meets a sum is
+// one fused multiply-add *because the source says so* (operator* returns an unevaluated Product), never because a compiler chose to contract. The
+// instruction set v2 has no fma instruction and emulates it.
 #pragma once
 
 #if defined(__x86_64__)
@@ -53,14 +52,14 @@ struct LaneMask {
 
 template <class T, int N>
 struct Lanes {
-  using Raw __attribute__((vector_size(N * sizeof(T)), may_alias)) = T;  // a row of numbers may be seen as lanes
+  using Raw __attribute__((vector_size(N * sizeof(T)), may_alias)) = T;  // a row of numbers may be read as lanes
   using Mask = LaneMask<T, N>;
   using P = Product<Lanes>;
   Raw raw;
 
   Lanes() = default;
   FLAPPY_INLINE explicit Lanes(Raw r) : raw(r) {}
-  FLAPPY_INLINE Lanes(double value) : raw(static_cast<T>(value) - Raw{}) {}  // a sum would lose the sign of -0
+  FLAPPY_INLINE Lanes(double value) : raw(static_cast<T>(value) - Raw{}) {}  // 0 + value would lose the sign of -0
 
   static FLAPPY_INLINE Lanes load(const T* from) {
     Lanes l;
@@ -89,8 +88,8 @@ struct Lanes {
   FLAPPY_INLINE Lanes& operator-=(P p) { return *this = *this - p; }
   FLAPPY_INLINE Lanes& operator*=(Lanes b) { return *this = *this * b; }
 
-  // One lane is compared and chosen as a number: the range propagation of gcc 12 gets the masks of such vectors wrong.
-  // With V and M vectors of one double and one long, at -O2 this gives 2 for V{-1}, not 1:
+  // A single lane is compared and selected as a number, because the range propagation of gcc 12 gets the masks of such
+  // vectors wrong. With V and M vectors of one double and one long, at -O2 this gives 2 for V{-1}, not 1:
   //   double f(V x) { M m = x < 0; return (long)m != 0 ? ((m & (x < 1)) ? V{1} : V{2})[0] : 3; }
   FLAPPY_INLINE auto comparable() const {
     if constexpr (N == 1) return raw[0];
@@ -105,8 +104,8 @@ struct Lanes {
   friend FLAPPY_INLINE Lanes where(Mask m, Lanes yes, Lanes no) { return select(m, yes, no); }
   friend FLAPPY_INLINE Lanes clamp(Lanes v, Lanes low, Lanes high) { return min(max(v, low), high); }
 
-  // Elementwise, for what the vector types of the compiler lack; the overloads below replace them where the
-  // processor has the instruction. All are correctly rounded, so the bits are the same.
+  // Elementwise functions that the compiler's vector types lack. Intrinsics replace the loops where the processor has
+  // the instruction. All are correctly rounded, so the bits are the same.
   template <class Op>
   static FLAPPY_INLINE Lanes each(Op op) {
     Lanes r;
@@ -164,7 +163,7 @@ struct Lanes {
     if constexpr (sizeof(T) == 4) return each([&](int i) { return __builtin_sqrtf(a.raw[i]); });
     else return each([&](int i) { return __builtin_sqrt(a.raw[i]); });
   }
-  // min and max as the x86 instructions define them: the second operand where they compare unordered.
+  // min and max as the x86 instructions define them: the second operand if the comparison is unordered.
   friend FLAPPY_INLINE Lanes min(Lanes a, Lanes b) {
 #if defined(__AVX512F__)
     if constexpr (N * sizeof(T) == 64) {
@@ -187,7 +186,7 @@ struct Lanes {
     if constexpr (N == 1) return m.raw[0] != 0 ? yes : no;
     else return Lanes(m.raw ? yes.raw : no.raw);
   }
-  // What scalar.hpp says about bits, in every lane.
+  // Functions on bits of scalar.hpp, in every lane.
   using Unsigned = std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint64_t>;
   using Bits __attribute__((vector_size(N * sizeof(T)))) = Unsigned;
   static constexpr int kMantissaBits = sizeof(T) == 4 ? 23 : 52;
@@ -199,7 +198,7 @@ struct Lanes {
     return Lanes((Raw)((Bits)(Lanes(kToWhole<T> + kBias) - k).raw << kMantissaBits));
   }
   friend FLAPPY_INLINE Lanes exponent(Lanes a) {
-    constexpr T kWhole = T(kMantissa) + 1;  // whose lowest bits are whole numbers
+    constexpr T kWhole = T(kMantissa) + 1;  // the lowest bits of such numbers are whole numbers
     constexpr Unsigned kWholeBits = (kBias + kMantissaBits) << kMantissaBits;
     return Lanes((Raw)((Bits)a.raw >> kMantissaBits | kWholeBits)) - Lanes(kWhole + T(kBias));
   }

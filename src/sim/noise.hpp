@@ -1,5 +1,5 @@
-// Random numbers for many flappers at once: the words of random.hpp, drawn in lanes. A word w becomes the uniform
-// ((w >> 9) + 1/2) 2^-23, which float holds exactly, so flights in float and in double meet the same noise.
+// Random numbers for many flappers at once: the words of random.hpp, drawn in lanes. A word w becomes the uniform number
+// ((w >> 9) + 1/2) 2^-23, which float represents exactly, so flights in float and in double have the same noise.
 #pragma once
 
 #if defined(__x86_64__)
@@ -24,8 +24,8 @@ struct Normals4 {
   L n[4];
 };
 
-/// 32-bit words of N lanes, each in the low half of 64 bits, as multiplication reads and leaves them; the high half is
-/// anything.
+/// 32-bit words of N lanes, each in the low half of 64 bits, as 64-bit multiplication needs and returns them; the high
+/// half is undefined.
 template <int N>
 struct WideWords {
   using Raw __attribute__((vector_size(N * sizeof(std::uint64_t)))) = std::uint64_t;
@@ -48,7 +48,7 @@ struct WideWords {
   }
 };
 
-/// Philox 4x32-10 (Salmon et al. 2011) of `parts` times N lanes; the counters become the result.
+/// Philox 4x32-10 (Salmon et al. 2011) for `parts` times N lanes; replaces the counters by the result.
 template <int N, int parts>
 FLAPPY_INLINE void philox(WideWords<N> (&c)[4][parts], std::uint64_t seed) {
   auto key0 = WideWords<N>::all(seed), key1 = WideWords<N>::all(seed >> 32);
@@ -63,7 +63,7 @@ FLAPPY_INLINE void philox(WideWords<N> (&c)[4][parts], std::uint64_t seed) {
   }
 }
 
-/// Four uniforms in (0, 1) for each lane; flapper and episode point to one number per lane.
+/// Four uniform numbers in (0, 1) for each lane; `flapper` and `episode` point to one number per lane.
 template <class L>
 FLAPPY_INLINE Uniforms4<L> uniforms(std::uint64_t seed, std::uint32_t stream, std::uint32_t index,
                                     const std::uint32_t* flapper, const std::uint32_t* episode) {
@@ -75,7 +75,7 @@ FLAPPY_INLINE Uniforms4<L> uniforms(std::uint64_t seed, std::uint32_t stream, st
   const L below_one(1 - 0x1p-24);
   Uniforms4<L> r;
   if constexpr (kSingle && N % 2 == 0) {
-    // Two neighbours fill 64 bits: even lanes are there already, odd ones in the high half.
+    // two neighbouring lanes share 64 bits: even lanes are in the low half, odd ones in the high half
     using Wide = WideWords<N / 2>;
     const auto load = [](const std::uint32_t* from) {
       Wide w;

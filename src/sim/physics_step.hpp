@@ -1,4 +1,4 @@
-// One physics step of a flapper, stage by stage: where it is, what acts on it, new rates, new positions.
+// One physics step of a flapper, stage by stage: pose, loads, new rates, new positions.
 #pragma once
 
 #include "model/effects/registry.hpp"
@@ -13,34 +13,35 @@ inline namespace FLAPPY_ISA {
 
 using namespace model;
 
-/// What is the same for all steps of a block.
+/// Constants of all steps of a block.
 template <class T>
 struct Constants {
   T step, half_step, per_step, gravity, ground_z, ceiling_z;
 };
 
-/// Effects in force, with their parameters in lanes. Every lane of a block has the same set.
+/// Effects in force in a block, with their parameters in lanes. All lanes share the set; magnitudes may be 0 in some
+/// lanes.
 template <class T>
 struct ActiveEffects {
-  std::uint64_t set = 0, kept = 0;  // in force; and those that have memory in the batch
+  std::uint64_t set = 0, kept = 0;  // effects in force; effects with memory in the batch
   Element<T>* states = nullptr;     // of the first lane
   int stride = 0;
   const Wall* walls = nullptr;
   std::size_t wall_count = 0;
-  Parameters<T>* own = nullptr;        // begins as those of the block
+  Parameters<T>* own = nullptr;        // copy of the block's parameters, for effects to change
   Element<T>* meter = nullptr;         // of the first lane
-  const Element<T>* motors = nullptr;  // rows of MotorRows, where energy is metered
-  T* energy_J = nullptr;               // what motors drew beyond what the driver's voltage has them
+  const Element<T>* motors = nullptr;  // rows of MotorRows, if energy is metered
+  T* energy_J = nullptr;               // sum to which effects add extra_work_J()
   ContactBlock<Element<T>> contact;    // of the first lane
   const StepPlan* world = nullptr;
   Touched<T>* touched = nullptr;
-  T rows[kEffectRows];  // parameters, then figures
+  T rows[kEffectRows];  // parameters, then SideConstants of both sides
 
-  const Sides<SideFigures<T>>& figures() const {
-    return *reinterpret_cast<const Sides<SideFigures<T>>*>(rows + kEffectParameterRows);
+  const Sides<SideConstants<T>>& constants() const {
+    return *reinterpret_cast<const Sides<SideConstants<T>>*>(rows + kEffectParameterRows);
   }
 
-  /// Lets every effect in force change what a stage hands on: `stage(effect, parameters, state, change)`.
+  /// Lets every effect in force change the result of a stage: `stage(effect, parameters, state, change)`.
   template <class Change, class Stage, int I = 0>
   FLAPPY_INLINE void apply(Change& change, const Stage& stage, int state_row = 0) const {
     if constexpr (I < kEffects) {
@@ -60,11 +61,11 @@ struct ActiveEffects {
   }
 
  private:
-  /// Lanes in which not all sizes are 0.
+  /// Lanes in which at least one magnitude differs from 0.
   template <class Effect>
   static FLAPPY_INLINE auto acts(const T (&q)[Effect::kParameters.size()]) {
     auto none = q[0] == T(0);
-    for (int i = 1; i < Effect::kInfo.sizes; ++i) none = none & (q[i] == T(0));
+    for (int i = 1; i < Effect::kInfo.magnitudes; ++i) none = none & (q[i] == T(0));
     return !none;
   }
 };
@@ -74,10 +75,11 @@ FLAPPY_INLINE auto on_stop(const T& angle, const T& lower, const T& upper) {
   return (angle == lower) | (angle == upper);
 }
 
-/// Rates in the middle of the step, where angles already are. With u of this step and u_before of the last, the next is
-/// v = 2 u - u_before, or as much as the stops allow, for a hinge on its stop has no rate to extrapolate. Mean and mean square,
-/// (u + v)/2 and (u^2 + v^2)/2, are second order, and of a landing what the two steps of it really have, or near it: within
-/// them the rate drops to 0, tau of a step after the angle was where it is, and they sum to u (1/2 + tau) and u^2 (1/2 + tau^2).
+/// Rates in the middle of the step, where angles already are. With u the rate of this step and u_before of the last,
+/// the next rate is v = 2 u - u_before, limited by the stops; a hinge on its stop keeps its rate, because it has none
+/// to extrapolate. Mean and mean square, (u + v)/2 and (u^2 + v^2)/2, are second order. For a landing they are the true
+/// values of its two steps, or near them: within these the rate drops to 0, tau of a step after the angle was where it
+/// is, and they sum to u (1/2 + tau) and u^2 (1/2 + tau^2).
 template <class T>
 FLAPPY_INLINE HingeRates<T> mid_step_rates(const SideParameters<T>& p, const SideState<T>& q,
                                            const T& rotation_lower_rad, const T& rotation_upper_rad, const T& step,
@@ -92,8 +94,9 @@ FLAPPY_INLINE HingeRates<T> mid_step_rates(const SideParameters<T>& p, const Sid
   return {T(0.5) * T(s + s_next), T(0.5) * T(r + r_next), T(0.5) * T(r * r + r_next * r_next)};
 }
 
-/// What air and motor do to one side. M_rd is in `air` at the mid-step rate of theta, `mid_rad_s`, and so the body feels it;
-/// the hinge feels |old| new. Damping is implicit, as inertia added to the hinge: step/2 damping, and step M_rd/|theta'|.
+/// Loads of air and motor on one side. `air` includes M_rd at the mid-step rate of theta, `mid_rad_s`, which the body
+/// feels; the hinge feels |old| new instead. Damping is implicit, as inertia added to the hinge: step/2 damping, and
+/// step M_rd/|theta'|.
 template <int side, class T>
 FLAPPY_INLINE SideLoad<T> load_side(const SideParameters<T>& p, const SideState<T>& q, const T& mid_rad_s,
                                     const WingWrench<T>& air, const T& voltage_V, const T& step) {
@@ -109,14 +112,14 @@ FLAPPY_INLINE SideLoad<T> load_side(const SideParameters<T>& p, const SideState<
   return load;
 }
 
-/// Air on one wing, from the velocity of its shoulder in B.
+/// Air on one wing. `velocity_B`: of its shoulder in the air, in B.
 template <int side, class T>
 FLAPPY_INLINE WingWrench<T> air_on_wing(const SideParameters<T>& p, const WingPose<T>& g, const Vec3<T>& velocity_B) {
   return blade_element<side>(p, g.theta, g.theta_rate, rotate_back_z(g.beta.sin, g.beta.cos, velocity_B),
                              {g.body_rate_L.x, g.body_rate_L.y, g.body_rate_L.z + g.beta_rate});
 }
 
-/// Turns the hinges of one side. The last clamp takes the rounding of a landing on a stop.
+/// Turns the hinges of one side. The last clamp removes the rounding error of a landing on a stop.
 template <int side, class T>
 FLAPPY_INLINE void turn(const SideParameters<T>& p, SideState<T>& q, const T& beta, const T& theta, const T& per_step) {
   const T stroke_rate = T(side) * T(beta * per_step), rotation_rate = theta * per_step;
@@ -130,7 +133,7 @@ FLAPPY_INLINE void turn(const SideParameters<T>& p, SideState<T>& q, const T& be
   q.rotation_rad = clamp(T(q.rotation_rad + theta), p.rotation_lower_rad, p.rotation_upper_rad);
 }
 
-/// Distance of a point in W to the nearest wall, and the wall's normal.
+/// Distance of the torso's origin to the nearest wall, and the normal of that wall.
 template <class T>
 FLAPPY_INLINE void find_wall(const ActiveEffects<T>& effects, Surroundings<T>& s) {
   s.wall_clearance_m = T(1e6);
@@ -147,13 +150,13 @@ FLAPPY_INLINE void find_wall(const ActiveEffects<T>& effects, Surroundings<T>& s
 }
 
 template <class T>
-FLAPPY_INLINE Hinges<T> hinges_of(const SideParameters<T>& p, const SideFigures<T>& figures, const SideState<T>& x,
+FLAPPY_INLINE Hinges<T> hinges_of(const SideParameters<T>& p, const SideConstants<T>& constants, const SideState<T>& x,
                                   const T& voltage_V) {
   const T none(-0.0);
   return {T(1),
           voltage_V,
           x.stroke_rate_rad_s,
-          figures.resistance_ohm,
+          constants.resistance_ohm,
           p.stroke_torque_per_V_Nm,
           p.stroke_damping_Nm_s,
           p.stroke_stiffening_kg_m2,
@@ -169,7 +172,7 @@ FLAPPY_INLINE Hinges<T> hinges_of(const SideParameters<T>& p, const SideFigures<
           none};
 }
 
-/// Changes the parameters of a side to its hinges as effects left them.
+/// Replaces the parameters of a side by its hinges after effects changed them.
 template <class T>
 FLAPPY_INLINE void put_hinges(const Hinges<T>& h, SideParameters<T>& p) {
   p.stroke_torque_per_V_Nm = h.torque_per_V_Nm;
@@ -183,7 +186,7 @@ FLAPPY_INLINE void put_hinges(const Hinges<T>& h, SideParameters<T>& p) {
   p.rotation_upper_rad = h.rotation_upper_rad;
 }
 
-/// What acts on a flapper: air and motors;
+/// Loads on a flapper without effects.
 template <bool with_effects, class T>
 struct Acting {
   const Parameters<T>& p;
@@ -192,7 +195,7 @@ struct Acting {
   BodyLoad<T> body;
 };
 
-/// and effects beyond the base model, which have parameters and voltages of their own.
+/// Loads on a flapper with effects, which change a copy of its parameters and voltages.
 template <class T>
 struct Acting<true, T> {
   Surroundings<T> s;
@@ -203,19 +206,20 @@ struct Acting<true, T> {
   BodyLoad<T> body;
 };
 
-/// What the motors draw.
+/// Writes the source's share of its nominal voltage and the currents of both motors.
 template <class T>
 FLAPPY_INLINE void read_meter(const Surroundings<T>& s, const Sides<Hinges<T>>& hinges, Element<T>* meter, int stride) {
-  const auto current = [](const Hinges<T>& h, const SideFigures<T>& f) {
+  const auto current = [](const Hinges<T>& h, const SideConstants<T>& f) {
     return T(T(h.voltage_V - f.back_emf_V_s * h.motor_rate_rad_s) / h.resistance_ohm);
   };
   hinges.left.source_share.store(meter);
-  current(hinges.left, s.figures.left).store(meter + stride);
-  current(hinges.right, s.figures.right).store(meter + 2 * stride);
+  current(hinges.left, s.constants.left).store(meter + stride);
+  current(hinges.right, s.constants.right).store(meter + 2 * stride);
 }
 
-/// What a motor draws in a step beyond what it would have at the driver's voltage `given_V` without effects: V i h, at the rate at the
-/// step's end, as that is the one that turns the wing; exactly 0 where effects leave the motor alone. `slip_rad_s`: its play's rate.
+/// Energy that a motor draws in a step in excess of that at the driver's voltage `given_V` without effects: V i h, at
+/// the rate at the end of the step, which is the rate that turns the wing; exactly 0 if no effect changes the motor.
+/// `slip_rad_s`: rate of the motor relative to the wing.
 template <int side, class T>
 FLAPPY_INLINE T extra_work_J(const ActiveEffects<T>& effects, const Hinges<T>& h, const T& given_V, const T& rate_rad_s,
                              const T& slip_rad_s, const T& step_s) {
@@ -224,12 +228,12 @@ FLAPPY_INLINE T extra_work_J(const ActiveEffects<T>& effects, const Hinges<T>& h
   const auto power_W = [&](const T& volt, const T& rate) {
     return T(volt * T(conductance_S * volt - emf_current_A_s * rate));
   };
-  const T& cold_ohm = of_side<side>(effects.figures()).resistance_ohm;
+  const T& cold_ohm = of_side<side>(effects.constants()).resistance_ohm;
   const T share = where(h.resistance_ohm == cold_ohm, T(1), T(cold_ohm / h.resistance_ohm));
   return step_s * T(share * power_W(h.voltage_V, T(rate_rad_s + slip_rad_s)) - power_W(given_V, rate_rad_s));
 }
 
-/// How far effects let a wing go, either way; 0: to its stops.
+/// Rotation angle up to which effects let a wing turn, in both directions; 0: its own stops.
 template <class T>
 FLAPPY_INLINE T reach_beyond_stops(const ActiveEffects<T>& effects) {
   T reach_rad(0);
@@ -246,7 +250,7 @@ FLAPPY_INLINE void widen_stops(const T& reach_rad, T& lower_rad, T& upper_rad) {
   upper_rad = where(reach_rad > T(0), reach_rad, upper_rad);
 }
 
-/// Stage by stage, in the order of effect.hpp.
+/// Applies all stages, in the order of effect.hpp.
 template <class T>
 FLAPPY_INLINE void apply_effects(const ActiveEffects<T>& effects, Acting<true, T>& a) {
   Surroundings<T>& s = a.s;
@@ -299,7 +303,7 @@ FLAPPY_INLINE void add_hinges(const Hinges<T>& h, SideLoad<T>& load, WingInertia
   wing.cross_inertia += h.cross_inertia_kg_m2;
 }
 
-/// Lets effects keep what they will need of this step.
+/// Lets effects update their memory at the end of the step.
 template <class T>
 FLAPPY_INLINE void remember(const ActiveEffects<T>& effects, Acting<true, T>& a) {
   effects.apply(
@@ -309,7 +313,8 @@ FLAPPY_INLINE void remember(const ActiveEffects<T>& effects, Acting<true, T>& a)
       });
 }
 
-/// A held body goes where its support is. A standing one leaves when its wings carry it: true for lanes still held.
+/// Computes the centre of mass of a held body and its velocity from the fixed torso, and releases a standing body once
+/// its wings carry it. True for lanes that are still held.
 template <class T>
 FLAPPY_INLINE typename T::Mask hold(const Parameters<T>& p, State<T>& x, const WholeVehicle<T>& whole,
                                     const Matrix3<T>& R, Vec3<T>& com_m, const T& gravity) {
@@ -322,7 +327,7 @@ FLAPPY_INLINE typename T::Mask hold(const Parameters<T>& p, State<T>& x, const W
   return x.support > T(0);
 }
 
-/// What holds the body feels the air on the wings.
+/// Adds the air on the wings to the impulse on the support of a held body, and to its averaged lift.
 template <class T>
 FLAPPY_INLINE void feel(const Parameters<T>& p, State<T>& x, const Sides<WingPose<T>>& pose,
                         const Sides<WingWrench<T>>& air, const T& lift, const T& step, typename T::Mask held) {
@@ -341,7 +346,7 @@ FLAPPY_INLINE void feel(const Parameters<T>& p, State<T>& x, const Sides<WingPos
   x.lift_N = where(held, T(x.lift_N + T(lift - x.lift_N) / p.beat_steps), x.lift_N);
 }
 
-/// What acts on it: air and motors, or what effects begin with.
+/// Loads on a flapper: air and motors, or with effects the values with which they begin.
 template <bool with_effects, class T>
 FLAPPY_INLINE Acting<with_effects, T> acts_on(const Parameters<T>& p, const State<T>& x, const Voltages<T>& voltages,
                                               const Matrix3<T>& R, const Sides<WingPose<T>>& pose,
@@ -353,11 +358,11 @@ FLAPPY_INLINE Acting<with_effects, T> acts_on(const Parameters<T>& p, const Stat
   const BodyLoad<T> none{{zero, zero, zero}, {zero, zero, zero}};
   if constexpr (with_effects) {
     const T stroke_plane = T(0.5) * T(p.left.shoulder_m.z + p.right.shoulder_m.z);
-    const Sides<SideFigures<T>>& figures = effects.figures();
+    const Sides<SideConstants<T>>& constants = effects.constants();
     return {{p,
              x,
              pose,
-             figures,
+             constants,
              R,
              com_m - R * whole.com,
              v_C - cross(w, whole.com),
@@ -374,8 +379,8 @@ FLAPPY_INLINE Acting<with_effects, T> acts_on(const Parameters<T>& p, const Stat
              {zero, zero, zero},
              {v_left, v_right},
              zero},
-            {hinges_of(p.left, figures.left, x.left, voltages.left_V),
-             hinges_of(p.right, figures.right, x.right, voltages.right_V)},
+            {hinges_of(p.left, constants.left, x.left, voltages.left_V),
+             hinges_of(p.right, constants.right, x.right, voltages.right_V)},
             *effects.own,
             voltages,
             {},
@@ -386,11 +391,12 @@ FLAPPY_INLINE Acting<with_effects, T> acts_on(const Parameters<T>& p, const Stat
   }
 }
 
-/// One physics step. `com_m`: the vehicle's centre of mass in W, carried along because it is what inertia moves.
+/// One physics step. `com_m`: the vehicle's centre of mass in W, integrated instead of the torso's origin because
+/// momentum is that of the centre of mass.
 template <bool with_effects, class T>
 FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const Voltages<T>& voltages, Vec3<T>& com_m,
                                 const ActiveEffects<T>& effects, const Constants<T>& k) {
-  // where everything is and how it moves
+  // pose and motion of the wings
   const Matrix3<T> R = rotation_matrix(x.attitude);
   const Vec3<T>& w = x.body_rate_rad_s;
   const auto mid_rates = [&](const SideParameters<T>& p, const SideState<T>& q) {
@@ -403,7 +409,7 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const
   const WholeVehicle<T> whole = whole_vehicle(vehicle, pose);
   const auto held = hold(vehicle, x, whole, R, com_m, k.gravity);
 
-  // what acts on it: air, effects beyond the base model, motors
+  // loads: air, effects beyond the base model, motors
   auto acting = acts_on<with_effects>(vehicle, x, voltages, R, pose, whole, com_m, effects, k);
   if constexpr (with_effects) apply_effects(effects, acting);
   const Parameters<T>& p = acting.p;

@@ -1,5 +1,5 @@
-// Counter-based random numbers (Philox 4x32-10, Random123): a draw depends on its key alone, so it is the
-// same for any number of threads and any order of asking.
+// Counter-based random numbers (Philox 4x32-10, Random123): a draw depends on its key alone, so it is the same for any number of threads and any
+// order of draws.
 #pragma once
 
 #include <Random123/philox.h>
@@ -10,7 +10,7 @@
 
 namespace flappy::sim {
 
-/// What a random number is for; part of its key. Never renumber: recorded runs depend on it.
+/// Purpose of a random number; part of its key. Never renumber: recorded runs depend on it.
 enum class Stream : std::uint32_t {
   vehicle = 1,
   sensor_bias = 2,

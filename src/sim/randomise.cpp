@@ -11,7 +11,7 @@
 namespace flappy::sim {
 namespace {
 
-/// Of a figure whose file says how well it is known.
+/// Cut of the draw of a coefficient whose vehicle file declares a standard deviation.
 constexpr double kDeclaredCut_sd = 4;
 constexpr std::uint32_t kIndicesPerDraw = 64;  // a cut at 1 sd is redrawn 63 times once in 1e31
 
@@ -50,7 +50,7 @@ Randomisation::Randomisation(model::Vehicle nominal, const io::Table& config) : 
     }
   }
   if (!vehicle.beat_averaged) return;
-  // what its file declares of coefficients that the table does not name
+  // standard deviations that the vehicle file declares, for coefficients that the table does not name
   for (const model::BeatAveraged::Coefficient& c : vehicle.beat_averaged->coefficients) {
     const auto at = std::ranges::find(parameters, "coefficients." + c.name, &model::Parameter::path);
     const auto index = static_cast<std::size_t>(at - parameters.begin());
@@ -67,7 +67,7 @@ Randomisation Randomisation::of_posterior(model::Vehicle vehicle) {
   if (!vehicle.posterior) throw std::invalid_argument("a vehicle without posterior");
   const model::Posterior posterior = *std::exchange(vehicle.posterior, std::nullopt);
   const auto factor = model::lower_factor(posterior);
-  if (!factor) throw std::invalid_argument("a covariance that is none");
+  if (!factor) throw std::invalid_argument("a covariance that is not positive definite");
   Randomisation r(std::move(vehicle));
   const std::vector<model::Parameter> parameters = model::parameters(r.nominal_);
   for (std::size_t i = 0; i < posterior.names.size(); ++i) {
@@ -116,7 +116,7 @@ Randomisation::Draw Randomisation::read_draw(const io::Table& table, const std::
   return draw;
 }
 
-/// Follows how far the draws so far can take each parameter.
+/// Extends the reach of each parameter by a draw, and refuses a draw that could leave the accepted range.
 void Randomisation::check_reach(const io::Table& table, const Draw& draw,
                                 const std::vector<model::Parameter>& parameters, std::vector<Reach>& reach) {
   for (const std::size_t i : draw.parameters) {
@@ -134,7 +134,8 @@ void Randomisation::check_reach(const io::Table& table, const Draw& draw,
   }
 }
 
-/// Possible inertias are a convex set and the laws are straight lines, so the ends of a draw speak for all of it.
+/// Refuses impossible inertias. Possible inertias are a convex set and the laws are linear, so the ends of a draw
+/// suffice.
 void Randomisation::check_bodies(const io::Table& table, const Draw& draw) const {
   for (const double extreme : {-draw.cut_sd, 0.0, draw.cut_sd}) {
     model::Vehicle vehicle = nominal_;
@@ -195,7 +196,8 @@ model::Vehicle Randomisation::sample(RandomKey key) const {
 model::Vehicle Randomisation::from_posterior(std::vector<double> variates) const {
   model::Vehicle vehicle = nominal_;
   const std::vector<model::Parameter> parameters = model::parameters(vehicle);
-  // A draw that gives a body an inertia that none has is drawn in towards the mean: possible inertias are a convex set.
+  // A draw with an impossible inertia is moved towards the mean, where it is possible: possible inertias are a convex
+  // set.
   for (int tries = 0; tries < 60; ++tries) {
     for (const Uncertain& u : posterior_) {
       double value = u.mean;

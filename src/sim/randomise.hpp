@@ -2,19 +2,19 @@
 //
 //   [[randomise]]
 //   parameters = ["torso.mass_kg", "torso.inertia_kg_m2"]   # one draw for all; a table stands for all below it
-//   law = "scale_normal"
+//   parameters = ["torso.mass_kg", "torso.inertia_kg_m2"]   # one draw for all; a table stands for all parameters in it
 //   sd = 0.10
 //   cut_sd = 3.0                                            # draws farther out are drawn again
-//   minor = true                                            # changes little: who fits a vehicle takes it as linear
-//   each = true                                             # a draw for each of the parameters, instead of one for all
+//   minor = true                                            # small influence: a fit may treat it as linear
+//   each = true                                             # a separate draw for each of the parameters
 //
 // With n a normal draw and u a uniform one: scale_normal x (1 + sd n), scale_half_normal x (1 + |sd n|),
 // replace_normal mean + sd n, add_normal + sd n, scale_uniform x u, replace_uniform u in [low, high].
 //
-// Minor draws stand behind all others. No vehicle is drawn by them, and a body may become one that no body is, on one side.
+// Minor draws come after all others. sample() leaves them out, and they may give a body an impossible inertia to one side.
 //
-// Or the posterior of a vehicle file: its parameters are drawn together from one normal distribution, whatever their
-// nominal figures, and kept within their accepted ranges.
+// Alternatively, the posterior of a vehicle file: its parameters are drawn jointly from one normal distribution, independently of their nominal
+// values, and clipped to their accepted ranges.
 #pragma once
 
 #include <vector>
@@ -30,28 +30,30 @@ class Randomisation {
   /// No randomisation: every vehicle is the nominal one.
   explicit Randomisation(model::Vehicle nominal) : nominal_(std::move(nominal)) { nominal_.posterior.reset(); }
 
-  /// Reads the array `randomise` of a configuration. io::InputError where a parameter is unknown, or a draw could
-  /// leave its accepted range or give a body an inertia that no body has.
+  /// Reads the array `randomise` of a configuration. Throws io::InputError if a parameter is unknown, or if a draw
+  /// could leave its accepted range or give a body an impossible inertia.
   Randomisation(model::Vehicle nominal, const io::Table& config);
 
-  /// Draws from the posterior of `vehicle`, which it must have; std::invalid_argument where its covariance is none.
+  /// Draws from the posterior of `vehicle`. Throws std::invalid_argument if it has none, or if its covariance is not
+  /// positive semidefinite.
   static Randomisation of_posterior(model::Vehicle vehicle);
 
   const model::Vehicle& nominal() const { return nominal_; }
-  /// The vehicle of this key: the same for the same key, whatever else was sampled.
+  /// The vehicle of a key: the same for the same key, whatever else is sampled.
   model::Vehicle sample(RandomKey key) const;
 
-  /// Draws of the table; each has one variate, standard normal or uniform in [-1, 1].
+  /// Number of draws; each has one variate, standard normal or uniform in [-1, 1].
   std::size_t draws() const { return draws_.size() + posterior_.size(); }
-  /// Those before the minor ones.
+  /// Number of draws that are not minor.
   std::size_t majors() const { return majors_ + posterior_.size(); }
-  /// Minor variates of `at` where none are given; one that makes a body none is drawn in.
+  /// Variates that at() uses for minor draws if none are given. A variate that makes an inertia impossible is reduced.
   void set_minors(const std::vector<double>& variates);
   const std::vector<double>& minors() const { return minors_; }
   bool is_uniform(std::size_t draw) const;
-  /// Path of its first parameter.
+  /// Path of the first parameter of a draw.
   std::string name(std::size_t draw) const;
-  /// The vehicle of given variates, one for each draw, or each but the minor ones; a half-normal law takes the sign of its own.
+  /// The vehicle with given variates, one for each draw, or for each draw that is not minor. For a half-normal law, the
+  /// variate keeps its sign.
   model::Vehicle at(const std::vector<double>& variates) const;
 
  private:
@@ -73,7 +75,7 @@ class Randomisation {
   model::Vehicle from_posterior(std::vector<double> variates) const;
   static double apply(const Draw& draw, double nominal, double variate);
 
-  /// A parameter's mean, and what the variates up to its own add.
+  /// A parameter's mean, and its row of the covariance's lower factor.
   struct Uncertain {
     std::size_t parameter;  // index in model::parameters()
     double mean;
@@ -84,10 +86,10 @@ class Randomisation {
   std::vector<Draw> draws_;
   std::size_t majors_ = 0;
   std::vector<double> minors_;
-  std::vector<Uncertain> posterior_;  // one or the other
+  std::vector<Uncertain> posterior_;  // empty unless of_posterior() made this; then draws_ is empty
 };
 
-/// Reads all of a file of [[randomise]] tables, as configs/randomisation has them.
+/// Reads a file of [[randomise]] tables, as in configs/randomisation.
 Randomisation read_randomisation(model::Vehicle nominal, const io::Table& root);
 
 }  // namespace flappy::sim

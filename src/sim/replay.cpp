@@ -12,10 +12,10 @@ namespace flappy::sim {
 namespace {
 
 constexpr std::size_t kWindows = kLanes<double>;
-/// Of a step: a change this near to its end is at its end.
+/// Share of a step: a change this near to the end of a step counts as at its end.
 constexpr double kSameShare = 1e-6;
 
-/// Means of a script's voltages over one step after another.
+/// Means of a script's voltages over consecutive steps.
 class StepVoltages {
  public:
   StepVoltages(const VoltageScript& script, double begin_s, double step_s)
@@ -23,17 +23,17 @@ class StepVoltages {
     const auto after = std::ranges::upper_bound(script.t_s, begin_s + kSameShare * step_s);
     next_ = static_cast<std::size_t>(after - script.t_s.begin());
   }
-  /// Of step `i`, each after the one before.
+  /// Means over step `i`; steps are to be taken in ascending order.
   void take(int i, double& left_V, double& right_V) {
     const std::size_t now = next_ > 0 ? next_ - 1 : 0;
     left_V = script_.left_V[now];
     right_V = script_.right_V[now];
-    double share = 1;  // of the step, that the voltages of `next_` have to themselves
+    double share = 1;  // share of the step after the change to the voltages of `next_`
     const double from_s = begin_s_ + i * step_s_;
     for (; next_ < script_.t_s.size(); ++next_) {
       const double at = (script_.t_s[next_] - from_s) / step_s_;
       if (at > 1 - kSameShare) {
-        if (at < 1 + kSameShare) ++next_;  // with the next step
+        if (at < 1 + kSameShare) ++next_;  // belongs to the next step
         break;
       }
       share = 1 - std::max(at, 0.0);
@@ -48,7 +48,7 @@ class StepVoltages {
   std::size_t next_;
 };
 
-/// Takes back what a body turned too much or too little within `carried_s`, as a rate in B; small angles.
+/// Corrects the body rate, in B, by the turn that the body made within `carried_s` beyond its record; for small angles.
 void correct_rate(const FlapperState& flown, double carried_s, FlapperState& x) {
   const double *a = flown.attitude, *b = x.attitude;
   const double turn[4] = {
@@ -69,17 +69,17 @@ void keep_wings(const FlapperState& from, FlapperState& x) {
   }
 }
 
-/// Brings strokes nearer to where they were seen.
+/// Moves strokes towards their recorded angles.
 void correct_strokes(const FlapperState& seen, double carried_s, double share, FlapperState& x) {
   for (int side = 0; side < 2; ++side) {
     const double off = seen.stroke_rad[side] - x.stroke_rad[side];
-    if (!(std::abs(off) > 0)) continue;  // also where it was not seen
+    if (!(std::abs(off) > 0)) continue;  // also if it was not recorded (NaN)
     x.stroke_rad[side] += share * off;
     x.stroke_rate_rad_s[side] += share * share / (2 - share) / carried_s * off;
   }
 }
 
-/// One block of lanes, used again and again.
+/// One block of lanes, reused for many windows.
 class ReplayBlock {
  public:
   ReplayBlock(const model::Vehicle& vehicle, const ReplayOptions& o)
@@ -89,7 +89,7 @@ class ReplayBlock {
     plan_.steps_per_update = 1;
   }
 
-  /// Flies windows [first, first + count); lanes without one fly along with the first.
+  /// Flies windows [first, first + count); lanes without a window fly a copy of the first.
   void fly(const std::vector<ReplayWindow>& windows, std::size_t first, std::size_t count,
            const std::vector<int>& checkpoints, const RecordedState& recorded, Replayed* results) {
     for (std::size_t i = 0; i < kWindows; ++i) {
@@ -142,7 +142,8 @@ class ReplayBlock {
 
   enum class Wings { recorded, at_rest, kept };
 
-  /// Puts every torso where it was `step` steps after its window's start, having carried it for some steps.
+  /// Puts every torso to its record `step` steps after its window's start; `carried`: steps since it was last put
+  /// there.
   void put_back(const RecordedState& recorded, int step, Wings kind, Start start, int carried = 0) {
     for (std::size_t i = 0; i < kWindows; ++i) {
       FlapperState x = recorded(index_[i], start_s_[i] + step * options_.step_s);
@@ -154,7 +155,7 @@ class ReplayBlock {
           correct_strokes(seen, carried * options_.step_s, options_.stroke_share, x);
         }
       }
-      storage_of(batch_).put_state(i, x, start);  // what effects remember goes on
+      storage_of(batch_).put_state(i, x, start);  // the memory of effects is kept
     }
   }
 

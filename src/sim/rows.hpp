@@ -1,5 +1,5 @@
-// Between rows of numbers, one for each member of a struct, and structs of lanes. For files that are compiled once for
-// each instruction set.
+// Conversion between rows of numbers, one for each member of a struct, and structs of lanes. Included by files that are compiled once for each
+// instruction set.
 #pragma once
 
 #include "sim/lanes.hpp"
@@ -33,7 +33,7 @@ FLAPPY_INLINE S load_rows(const T (*rows)[lanes], int first) {
   return s;
 }
 
-/// Rows that follow one another `stride` numbers apart, of lanes of any width.
+/// For rows that follow one another `stride` numbers apart, in blocks of any width.
 template <class S, class T>
 FLAPPY_INLINE S load_rows_at(const T* rows, int stride) {
   S s;
@@ -49,8 +49,8 @@ FLAPPY_INLINE void store_rows_at(const S& s, T* rows, int stride) {
   for (std::size_t i = 0; i < sizeof(S) / sizeof(L); ++i) from[i].store(rows + static_cast<int>(i) * stride);
 }
 
-/// Rows to read from again and again: in place where lanes fill a row, a copy where they are part of one. In place they
-/// leave the stack, whose spills would otherwise collide with them in the cache: 4 % of the step.
+/// For rows that are read repeatedly: in place if lanes fill a row, else a copy. In place they do not use the stack,
+/// whose spills would otherwise collide with them in the cache, at a cost of 4 % of the step.
 template <class S, class T, int lanes>
 FLAPPY_INLINE decltype(auto) view_rows(const T (*rows)[lanes], int first) {
   if constexpr (kWidth<T> == lanes) return (*reinterpret_cast<const S*>(rows));

@@ -1,5 +1,5 @@
-// The main loop: what one block of flappers does from one control update to the next, stage by stage.
-// Compiled once for each instruction set (FLAPPY_ISA); the bits are the same on all of them.
+// The main loop: the steps of one block of flappers from one control update to the next. Compiled once for each instruction set (FLAPPY_ISA); the
+// bits are the same on all of them.
 #include "sim/step.hpp"
 
 #include <cstddef>
@@ -14,8 +14,8 @@ namespace {
 
 using namespace model;
 
-/// Driver: new voltages from the wing-beat signal, held until the next update; `held` where a flapper's are set directly, within
-/// what its motors take now.
+/// Driver: new voltages from the wing-beat signal, held until the next update. `held`: present voltages, which stay
+/// where they were set directly, clipped to the present limits of the motors.
 template <class T, class L>
 FLAPPY_INLINE Voltages<L> update_driver(Block<T>& block, const SideParameters<L>& left, const SideParameters<L>& right,
                                         const Voltages<L>& held, int first) {
@@ -44,7 +44,7 @@ FLAPPY_INLINE Voltages<L> update_driver(Block<T>& block, const SideParameters<L>
   return next;
 }
 
-/// Voltages that were recorded.
+/// Reads the next recorded voltages.
 template <class T, class L>
 FLAPPY_INLINE Voltages<L> next_recorded(const T*& voltages_V, int first) {
   const Voltages<L> v{L::load(voltages_V + first), L::load(voltages_V + kLanes<T> + first)};
@@ -52,15 +52,16 @@ FLAPPY_INLINE Voltages<L> next_recorded(const T*& voltages_V, int first) {
   return v;
 }
 
-/// What motors draw while the driver holds its voltage: V i over the steps is, as a stroke advances by h psi' of its end,
+/// Energy that motors draw while the driver holds its voltage. Every step advances a stroke by h psi' of the step's
+/// end, so the sum of V i h over the steps is
 ///   sum of V (V - K N psi')/R h = V (V T - K N (psi_end - psi_begin))/R
-/// without a look at the steps between.
+/// and needs only the strokes at the ends of the hold.
 template <class T, class L>
 class EnergyMeter {
  public:
   EnergyMeter(MotorRows<T>* motors, int first, const State<L>& x)
       : motors_(motors), first_(first), left_rad_(x.left.stroke_rad), right_rad_(x.right.stroke_rad) {}
-  /// After `seconds` at these voltages.
+  /// Adds the energy of the last `seconds`, in which the voltages were `u`.
   FLAPPY_INLINE void read(const State<L>& x, const Voltages<L>& u, double seconds) {
     if (motors_ == nullptr) return;
     const auto work = [&](int side, const L& volt, const L& turned_rad) {
@@ -73,7 +74,7 @@ class EnergyMeter {
     left_rad_ = x.left.stroke_rad;
     right_rad_ = x.right.stroke_rad;
   }
-  /// Of lanes that do not move it is no number that means anything.
+  /// Adds the energy of the lanes that move; the value of a frozen lane is undefined.
   FLAPPY_INLINE void add(const typename L::Mask& moves) const {
     for (int i = 0; motors_ != nullptr && i < kWidth<T>; ++i)
       if (moves.raw[i]) motors_->energy_J[first_ + i] += static_cast<double>(energy_J.raw[i]);
@@ -86,7 +87,7 @@ class EnergyMeter {
   L left_rad_, right_rad_;
 };
 
-/// Fetches memory into the second-level cache, a share of every part with every step.
+/// Prefetches memory into the second-level cache, an equal share of every part with every step.
 class Prefetch {
  public:
   Prefetch(const Ahead& ahead, int steps) {
@@ -112,9 +113,10 @@ class Prefetch {
   int count_ = 0;
 };
 
-/// Rows have positions and rates at one time. Within a block positions are half a step ahead: a step takes rates across the
-/// middle, where positions are, and positions with the rates at its end across the next middle (Verlet 1967, as leapfrog).
-/// A hinge that its stop holds stays there, and so both are exactly inverse to one another.
+/// Shifts positions by half a step. Rows have positions and rates at the same time, but within a block positions lead
+/// by half a step: a step advances rates across its middle, where positions are, and positions with the new rates to
+/// the next middle (Verlet 1967, as leapfrog). The backward shift leaves a hinge on its stop there, so both shifts are
+/// exact inverses.
 template <bool with_effects, class L>
 FLAPPY_INLINE void shift_positions(const Parameters<L>& p, const L& reach_rad, const L& time_s, State<L>& x,
                                    Vec3<L>& com_m) {
@@ -134,7 +136,7 @@ FLAPPY_INLINE void shift_positions(const Parameters<L>& p, const L& reach_rad, c
   x.attitude = rotated(x.attitude, L(0.5) * time_s * x.body_rate_rad_s);
 }
 
-/// Back from the centre of mass to the torso; contact, plausibility, rows.
+/// Computes the torso's position from the centre of mass; then contact events, freezing, and storing of rows.
 template <class T, class L>
 FLAPPY_INLINE void finish(State<L>& x, const Vec3<L>& com_m, const Voltages<L>& voltages,
                           const EnergyMeter<T, L>& meter, const Parameters<L>& p, const StepPlan& plan, Block<T>& block,
@@ -148,7 +150,7 @@ FLAPPY_INLINE void finish(State<L>& x, const Vec3<L>& com_m, const Voltages<L>& 
   store_rows(voltages, &block.drive[offsetof(Drive<L>, voltages) / sizeof(L)], first);
 }
 
-/// Effects and points of contact remember nothing of a frozen flapper: what they saw of it last is no number that means anything.
+/// Clears the memory of effects and points of contact of frozen flappers, because their last values are undefined.
 template <class T>
 FLAPPY_INLINE void forget_frozen(BlockEffects<T> effects, const Block<T>& block, int first) {
   for (int i = first; i < first + kWidth<T>; ++i) {
@@ -159,7 +161,7 @@ FLAPPY_INLINE void forget_frozen(BlockEffects<T> effects, const Block<T>& block,
   }
 }
 
-/// Says what points of contact have touched.
+/// Sets the status bits of contacts of the points.
 template <class T, class L>
 FLAPPY_INLINE void report_touched(const Touched<L>& touched, Block<T>& block, int first) {
   const auto mark = [&](const L& flag, std::uint32_t bit) {
@@ -218,7 +220,7 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
       if (in_force.motors != nullptr) effects.motors = in_force.motors->rows[0] + first;
       effects.energy_J = &meter.energy_J;
     }
-    int held = 0;  // steps since the meter was read
+    int held = 0;  // steps since the last reading of the meter
     const auto measure = [&] {
       meter.read(x, voltages, held * plan.step_s);
       held = 0;

@@ -3,16 +3,16 @@
 
 #include "flappy/vehicle.hpp"
 #include "flappy/world.hpp"
+#include "sim/beat_averaged_block.hpp"
 #include "sim/block.hpp"
-#include "sim/mean_block.hpp"
 
 namespace flappy::sim {
 
-/// Of vehicles with four angles a wing (jointed_block.hpp).
+/// Data of vehicles with articulated wings (jointed_block.hpp).
 template <class T>
 struct JointedRows;
 
-/// How a batch advances; the same for all of its blocks.
+/// Settings of a step; the same for all blocks of a batch.
 struct StepPlan {
   double step_s;
   int steps_per_update;  // physics steps between updates of the driver
@@ -23,48 +23,49 @@ struct StepPlan {
   std::size_t shape_count;
 };
 
-/// Points of contact of the flappers in a block: the same points, each flapper with figures and memory of its own.
+/// Points of contact of the flappers in a block. All flappers have the same points, with their own constants and
+/// memory.
 template <class T>
 struct ContactBlock {
   int points = 0;
-  const model::ContactPoint::Body* on = nullptr;  // the body that each is on
-  const T* rows = nullptr;                        // of model::ContactConstants, point after point
-  T* memory = nullptr;                            // of model::Bristle, point after point
-  int stride = 0;                                 // numbers of a row
+  const model::ContactPoint::Body* on = nullptr;  // body of each point
+  const T* rows = nullptr;                        // model::ContactConstants, point after point
+  T* memory = nullptr;                            // model::Bristle, point after point
+  int stride = 0;                                 // distance of two rows
 };
 
-/// What the motors of a block draw.
+/// Energy meter of the motors of a block.
 template <class T>
 struct alignas(64) MotorRows {
-  T rows[4][kLanes<T>];        // of left, then right: 1 / R, and N K / R, the back-EMF's current per stroke rate
-  double energy_J[kLanes<T>];  // of both, since a reset; no part of what moves
+  T rows[4][kLanes<T>];        // left, then right: 1 / R, and N K / R, the current of the back-EMF per stroke rate
+  double energy_J[kLanes<T>];  // of both motors, since a reset; does not influence motion
 };
 
-/// Effects in force in a block, and their parameters: rows as in the registry, kLanes wide.
+/// Effects in force in a block, and their parameters: rows as in the registry, kLanes wide; further inputs of a kernel.
 template <class T>
 struct BlockEffects {
-  std::uint64_t set = 0;  // bit i: entry i of the registry
+  std::uint64_t set = 0;  // bit i: effect i of the registry
   const T* rows = nullptr;
-  std::uint64_t kept = 0;  // effects whose memory the batch keeps: its rows follow one another in the registry's order
+  std::uint64_t kept = 0;  // effects with memory in the batch: their rows follow one another in the registry's order
   T* states = nullptr;
-  /// Voltages in place of the driver's, where there are any: two rows, left and right, for every update from the first on.
+  /// Voltages in place of the driver's, or null: two rows, left and right, for every driver update.
   const T* voltages_V = nullptr;
-  /// Where every step is to write what its motors drew, kMeterRows rows, if anywhere. Needs `rows`, whatever the set.
+  /// Every step writes kMeterRows rows here; null: none. Requires `rows`, for any set.
   T* meter = nullptr;
-  /// Where energy is metered, if it is.
+  /// Energy meter, or null.
   MotorRows<T>* motors = nullptr;
-  /// Of robots that touch the world with points. Needs `rows`, whatever the set.
+  /// Points of contact, if there are any. Requires `rows`, for any set.
   ContactBlock<T> contact;
-  /// Of robots that are known by the beat.
-  MeanRows<T> mean;
-  /// Of vehicles with four angles a wing.
+  /// Beat-averaged robots.
+  BeatAveragedRows<T> beat_averaged;
+  /// Vehicles with articulated wings.
   const JointedRows<T>* jointed = nullptr;
 };
 
-/// Rows of a meter: the source's voltage as a share of its nominal one, currents of the left and of the right motor, A.
+/// Rows of `meter`: the source's voltage as a share of its nominal one, currents of the left and of the right motor, A.
 inline constexpr int kMeterRows = 3;
 
-/// Memory that the next block will need, to be fetched while this one steps.
+/// Memory of the next block, which is prefetched during the steps of this one.
 struct Ahead {
   struct Part {
     const void* at;
@@ -72,7 +73,7 @@ struct Ahead {
   } parts[4] = {};
 };
 
-/// Advances all lanes of a block by `steps` physics steps, of which the first is number `first` of the batch.
+/// Advances all lanes of a block by `steps` physics steps. `first`: number of the first step, counted in the batch.
 template <class T>
 using StepBlock = void (*)(Block<T>&, BlockEffects<T>, const StepPlan&, std::int64_t first, int steps, const Ahead&);
 

@@ -1,4 +1,4 @@
-// What a Batch holds, for the rooms that work on its blocks.
+// Contents of a Batch, for the parts of the project that work on its blocks.
 #pragma once
 
 #include <bit>
@@ -39,19 +39,20 @@ std::uint64_t bits_of(T value) {
   else return std::bit_cast<std::uint64_t>(value);
 }
 
-/// Rows of robots that are known by the beat.
+/// Rows of beat-averaged robots.
 template <class T>
-struct Mean {
-  MeanProgram program;
+struct BeatAveragedStorage {
+  BeatAveragedProgram program;
   std::vector<T> rows, memory;  // [block][row][lane]
-  std::size_t slots = 0;        // inputs that are remembered
-  std::uint64_t effects = 0;    // of MeanEffects, that some robot has
+  std::size_t slots = 0;        // number of steps whose inputs are remembered
+  std::uint64_t effects = 0;    // bits of BeatAveragedEffects that any robot has
 
   std::size_t memory_rows() const { return 1 + program.actuators.size() + slots * program.inputs; }
-  /// Of one robot, a number each.
+  /// First number of a robot; the next ones follow kLanes apart.
   T* row_of(std::size_t i) { return &rows[i / kLanes<T> * program.rows() * kLanes<T> + i % kLanes<T>]; }
   T* memory_of(std::size_t i) { return &memory[i / kLanes<T> * memory_rows() * kLanes<T> + i % kLanes<T>]; }
-  /// Calls `use(number)` for all of it, past inputs from the newest on; `steps`: of the batch so far. Where they stand depends on that number.
+  /// Calls `use(number)` for the whole memory of a robot, past inputs from the newest on. `steps`: of the batch so far,
+  /// which determines the slots.
   void for_memory_by_age(std::size_t i, std::int64_t steps, const auto& use) {
     T* const own = memory_of(i);
     const std::size_t before = 1 + program.actuators.size();
@@ -61,8 +62,8 @@ struct Mean {
       for (std::size_t k = 0; k < program.inputs; ++k) use(own[(before + slot * program.inputs + k) * kLanes<T>]);
     }
   }
-  MeanRows<T> block(std::size_t b) {
-    const MeanProgram& p = program;
+  BeatAveragedRows<T> block(std::size_t b) {
+    const BeatAveragedProgram& p = program;
     return {row_of(b * kLanes<T>),
             memory_of(b * kLanes<T>),
             slots,
@@ -79,15 +80,15 @@ struct Mean {
             p.body_row(),
             p.effect_row()};
   }
-  /// Calls `use(number)` for each that moves a robot: past inputs of one that is late alone.
+  /// Calls `use(number)` for each number that influences motion: past inputs only if the robot has a delay.
   void for_memory(std::size_t i, const auto& use) {
-    const bool late = row_of(i)[(program.effect_row() - 1) * kLanes<T>] > 0;  // the last of MeanBody
+    const bool late = row_of(i)[(program.effect_row() - 1) * kLanes<T>] > 0;  // BeatAveragedBody::late_steps
     const std::size_t used = late ? memory_rows() : 1 + program.actuators.size();
     for (std::size_t k = 0; k < used; ++k) use(memory_of(i)[k * kLanes<T>]);
   }
 };
 
-/// Rows of vehicles with four angles a wing.
+/// Rows of vehicles with articulated wings.
 template <class T>
 struct JointedVehicles {
   struct alignas(64) Row {
@@ -99,7 +100,7 @@ struct JointedVehicles {
 
   static constexpr std::size_t kMemoryRows = model::kRows<JointedMemory>;
   std::size_t row_count() const { return static_cast<std::size_t>(program.shape.rows); }
-  /// Of one vehicle, a number each.
+  /// First number of a vehicle; the next ones follow kLanes apart.
   T* row_of(std::size_t i) { return rows[i / kLanes<T> * row_count()].lanes + i % kLanes<T>; }
   T* memory_of(std::size_t i) { return memory[i / kLanes<T> * kMemoryRows].lanes + i % kLanes<T>; }
   double* work_of(std::size_t i) { return &work_J[i / kLanes<T> * 2 * kLanes<T> + i % kLanes<T>]; }
@@ -123,15 +124,15 @@ struct Batch<T>::Storage {
   std::int64_t steps = 0;
   StepBlock<T> kernel = nullptr;
   std::vector<Block<T>> blocks;
-  std::vector<std::uint64_t> lane_effects;      // set of each lane; empty while no flapper has an effect
-  std::vector<std::uint64_t> block_effects;     // their union
-  std::vector<T> effect_rows;                   // [block][row][lane]
-  std::uint64_t effects_kept = 0;               // effects that some vehicle has named, whose memory is
-  std::vector<T> effect_states;                 // [block][row][lane]
-  std::vector<MotorRows<T>> motors;             // of each block, where energy is metered
-  std::unique_ptr<Mean<T>> mean;                // where robots are known by the beat
-  std::unique_ptr<JointedVehicles<T>> jointed;  // where wings have four angles
-  std::vector<model::ContactPoint> points;      // of contact; their names and bodies are those of the whole batch
+  std::vector<std::uint64_t> lane_effects;                // bits of each lane; empty while no flapper has an effect
+  std::vector<std::uint64_t> block_effects;               // their union
+  std::vector<T> effect_rows;                             // [block][row][lane]
+  std::uint64_t effects_kept = 0;                         // effects with memory, because some vehicle has named them
+  std::vector<T> effect_states;                           // [block][row][lane]
+  std::vector<MotorRows<T>> motors;                       // [block], if energy is metered
+  std::unique_ptr<BeatAveragedStorage<T>> beat_averaged;  // of beat-averaged robots
+  std::unique_ptr<JointedVehicles<T>> jointed;            // of articulated wings
+  std::vector<model::ContactPoint> points;  // points of contact; names and bodies are the same for the whole batch
   std::vector<model::ContactPoint::Body> points_on;
   std::vector<T> contact_rows, contact_memory;  // [block][point][row][lane]
 
@@ -161,7 +162,7 @@ struct Batch<T>::Storage {
       all = {block_effects[b], &effect_rows[b * model::kEffectRows * kLanes<T>], effects_kept,
              effect_states.data() + b * state_size()};
     if (!motors.empty()) all.motors = &motors[b];
-    if (mean) all.mean = mean->block(b);
+    if (beat_averaged) all.beat_averaged = beat_averaged->block(b);
     if (!points.empty())
       all.contact = {static_cast<int>(points.size()), points_on.data(), row_of_contact(b * kLanes<T>),
                      memory_of_contact(b * kLanes<T>), kLanes<T>};
@@ -170,22 +171,22 @@ struct Batch<T>::Storage {
   }
   static constexpr std::size_t kContactRows = model::kRows<model::ContactConstants>;
   static constexpr std::size_t kContactMemory = model::kRows<model::Bristle>;
-  /// Of flapper `i`, a number each kLanes.
+  /// First number of flapper `i`; the next ones follow kLanes apart.
   T* row_of_contact(std::size_t i) {
     return &contact_rows[i / kLanes<T> * points.size() * kContactRows * kLanes<T> + i % kLanes<T>];
   }
   T* memory_of_contact(std::size_t i) {
     return &contact_memory[i / kLanes<T> * points.size() * kContactMemory * kLanes<T> + i % kLanes<T>];
   }
-  /// Numbers of a block that points of contact remember.
+  /// Number of values of a block that points of contact remember.
   std::size_t contact_memory_size() const { return points.size() * kContactMemory * kLanes<T>; }
-  /// Calls `use(number)` for each that the points of contact of flapper `i` remember.
+  /// Calls `use(number)` for each value that the points of contact of flapper `i` remember.
   void for_contact_memory(std::size_t i, const auto& use) {
     for (std::size_t k = 0; k < points.size() * kContactMemory; ++k) use(memory_of_contact(i)[k * kLanes<T>]);
   }
-  /// Numbers of a block that effects remember.
+  /// Number of values of a block that effects remember.
   std::size_t state_size() const { return static_cast<std::size_t>(model::state_rows(effects_kept)) * kLanes<T>; }
-  /// Calls `use(number)` for each that the effects in `set` remember of flapper `i`.
+  /// Calls `use(number)` for each value that the effects in `set` remember of flapper `i`.
   void for_states(std::size_t i, std::uint64_t set, const auto& use) {
     if (effect_states.empty()) return;
     T* number = effect_states.data() + i / kLanes<T> * state_size() + i % kLanes<T>;
@@ -202,31 +203,33 @@ struct Batch<T>::Storage {
   }
 
   void put_vehicle(Block<T>& block, int lane, const model::Vehicle& v);
-  /// std::invalid_argument where it shares not the batch's inputs, actuators and expressions.
-  void put_mean(std::size_t i, const model::Vehicle& as_filed);
+  /// Throws std::invalid_argument unless it shares the batch's inputs, actuators and expressions.
+  void put_beat_averaged(std::size_t i, const model::Vehicle& as_filed);
   void keep_inputs(std::size_t slots);
-  /// Inputs of a vehicle without motors, as its controller has set them.
+  /// Inputs of a vehicle without motors, mixed from the controller's outputs that were set.
   std::vector<double> inputs_of(std::size_t i);
-  /// Rows and memory of a robot that is known by the beat, to be put to one of any batch; none otherwise.
-  std::pair<std::vector<T>, std::vector<T>> get_mean(std::size_t i) const;
-  void put_mean(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory);
-  /// The same of a vehicle with four angles a wing; std::invalid_argument where it shares not the batch's modes and inputs.
+  /// Rows and memory of a beat-averaged robot, for put_beat_averaged() into any batch; empty for other vehicles.
+  std::pair<std::vector<T>, std::vector<T>> get_beat_averaged(std::size_t i) const;
+  void put_beat_averaged(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory);
+  /// Counterparts for articulated wings. Throws std::invalid_argument unless it shares the batch's modes, harmonics,
+  /// strips and modulations.
   void put_jointed(std::size_t i, const model::Vehicle& v);
   std::pair<std::vector<T>, std::vector<T>> get_jointed(std::size_t i) const;
   void put_jointed(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory);
-  /// What a meter of flapper `i` needs to know of its motors, to be put to a flapper of any batch.
+  /// Motor constants for the energy meter of flapper `i`, for put_motors() into any batch; empty without a meter.
   std::vector<T> get_motors(std::size_t i) const;
   void put_motors(std::size_t i, const std::vector<T>& rows);
   void clear_energy(std::size_t i);
-  /// std::invalid_argument where its points are not those of the batch, or too stiff for the step.
+  /// Throws std::invalid_argument if its points differ from those of the batch, or are too stiff for the step.
   void put_contact(std::size_t i, const model::Vehicle& v);
-  /// Rows and memory of the points of contact of flapper `i`, to be put to one of any batch with the same points.
+  /// Constants and memory of the points of contact of flapper `i`, for put_contact() into any batch with the same
+  /// points.
   std::pair<std::vector<T>, std::vector<T>> get_contact(std::size_t i);
   void put_contact(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory);
   void put_effects(std::size_t i, const model::Vehicle& v);
   void put_effects_of_sensors(std::size_t i, const model::Vehicle& v);
   void put_effect_rows(std::size_t i, const model::Vehicle& v);
-  /// The effects of flapper `i` with their parameters and what they remember, to be put to a flapper of any batch.
+  /// The effects of flapper `i` with their parameters and memory, for put_effects() into any batch.
   std::uint64_t get_effects(std::size_t i, std::vector<T>& rows, std::vector<T>& states);
   void put_effects(std::size_t i, std::uint64_t set, const std::vector<T>& rows, const std::vector<T>& states);
   void keep_effects(std::uint64_t set);
@@ -234,7 +237,7 @@ struct Batch<T>::Storage {
   void put_state(std::size_t i, const FlapperState& state, Start start);
 };
 
-/// What a Batch, whose header is installed, shows to the project's own rooms alone.
+/// Access to the storage of a Batch, for the project only: the header of Batch is installed.
 struct StorageAccess {
   template <class T>
   static auto& of(Batch<T>& batch) {

@@ -1,5 +1,5 @@
-// The world presses on a vehicle's points of contact: which surfaces there are, where the points are, and what the vehicle feels of
-// it. For files that are compiled once for each instruction set; the law itself is model/contact.hpp.
+// Contact of a vehicle's points with the surfaces of the world: gaps, motion of the points, and loads on the vehicle. Included by files that are
+// compiled once for each instruction set; the contact law is model/contact.hpp.
 #pragma once
 
 #include "model/contact.hpp"
@@ -12,13 +12,13 @@ inline namespace FLAPPY_ISA {
 
 using namespace model;
 
-/// What was touched since the steps began, each 0 or 1 in its lanes; now: in the last of them.
+/// Contacts since the steps began, each 0 or 1 in its lanes; now: in the last step.
 template <class T>
 struct Touched {
   T ground{0.0}, ceiling{0.0}, wall{0.0}, shape{0.0}, now{0.0};
 };
 
-/// Of a point in W to a shape.
+/// Gap between a point `p` in W and a shape.
 template <class T>
 FLAPPY_INLINE Gap<T> gap_to(const Shape& shape, const Vec3<T>& p) {
   const Vec3<T> centre{T(shape.centre_m[0]), T(shape.centre_m[1]), T(shape.centre_m[2])};
@@ -34,7 +34,7 @@ FLAPPY_INLINE Gap<T> gap_to(const Shape& shape, const Vec3<T>& p) {
   return {gap.distance_m, R * gap.normal};
 }
 
-/// What all surfaces of the world do to a point at `p` that moves with `v`, both in W.
+/// Pressure of all surfaces of the world on a point at `p` with velocity `v`, both in W.
 template <class T>
 FLAPPY_INLINE Pressed<T> pressed_by(const StepPlan& world, const ContactConstants<T>& q, const Vec3<T>& p,
                                     const Vec3<T>& v, const T& step_s, Touched<T>& touched) {
@@ -54,19 +54,20 @@ FLAPPY_INLINE Pressed<T> pressed_by(const StepPlan& world, const ContactConstant
   return pressed;
 }
 
-/// Where a vehicle is, as its points need it: torso origin and its velocity in B.
+/// Pose and motion of a vehicle whose points touch.
 template <class T>
 struct TouchingVehicle {
   const Parameters<T>& p;
   const Sides<WingPose<T>>& pose;
   Matrix3<T> attitude;     // R_WB
-  Vec3<T> position_m;      // in W
-  Vec3<T> velocity_B_m_s;  // in B
+  Vec3<T> position_m;      // torso origin, in W
+  Vec3<T> velocity_B_m_s;  // velocity of the torso origin, in B
   Vec3<T> body_rate_rad_s;
-  Vec3<T> com_m;  // vehicle's centre of mass from the torso origin, in B
+  Vec3<T> com_m;  // the vehicle's centre of mass from the torso origin, in B
 };
 
-/// A point of a wing or leading edge, or of the torso: from the torso origin and its velocity, both in B; and from its shoulder, in L.
+/// Motion of a point of the torso, a wing or a leading edge: position from the torso origin and velocity, both in B;
+/// and the position from its shoulder, in L.
 template <class T>
 struct PointMotion {
   Vec3<T> arm_B_m, velocity_B_m_s, arm_L_m;
@@ -88,8 +89,8 @@ FLAPPY_INLINE PointMotion<T> point_on_wing(const TouchingVehicle<T>& s, const Si
           arm};
 }
 
-/// Adds what the points feel: a force on the body at each, and the torques that it has about the hinges between. A body that is `held`
-/// feels nothing.
+/// Adds the loads of the points: a force on the body at each, and its torques about the hinges between point and body.
+/// The body feels nothing in lanes that are `held`.
 template <class T>
 FLAPPY_INLINE void touch(const StepPlan& world, const ContactBlock<Element<T>>& contact, const TouchingVehicle<T>& s,
                          typename T::Mask held, const T& step_s, BodyLoad<T>& body, Sides<SideLoad<T>>& load,
@@ -115,7 +116,7 @@ FLAPPY_INLINE void touch(const StepPlan& world, const ContactBlock<Element<T>>& 
     store_rows_at(bristle, memory, contact.stride);
     const auto acts = bristle.state > T(0);
     touched.now = where(acts, T(1), touched.now);
-    // lanes that do not touch keep their bits: a sum with 0 would lose the sign of -0
+    // lanes that do not touch keep their bits: adding 0 would lose the sign of -0
     const auto moves = acts & !held;
     body.force_B = where(moves, body.force_B + force, body.force_B);
     body.moment_B = where(moves, body.moment_B + cross(at.arm_B_m - s.com_m, force), body.moment_B);

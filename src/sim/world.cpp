@@ -41,7 +41,7 @@ Shape cylinder(const double (&from_m)[3], const double (&to_m)[3], double radius
   s.half_m[2] = length / 2;
   if (!(length > 0)) return s;
   for (double& c : z) c /= length;
-  // the shortest turn that takes z of W there: (1 + z.a, z x a), of a cylinder that points down half a turn about x
+  // the shortest turn that takes z of W to the axis a: (1 + z.a, z x a); half a turn about x if the axis points down
   const double norm = std::sqrt(2 * (1 + z[2]));
   const bool down = !(norm > 1e-6);
   s.attitude[0] = down ? 0 : norm / 2;

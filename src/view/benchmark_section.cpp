@@ -1,4 +1,4 @@
-// A scored blind benchmark: what was said against what was so.
+// The section of a scored blind benchmark: verdicts against true causes.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -67,7 +67,7 @@ void add_parts(Section& section, const std::vector<Case>& cases) {
   section.add(f);
 }
 
-/// Cases with one effect, and those without: what was so by what was said.
+/// Adds the confusion matrix of the cases with one effect or none: true cause by verdict.
 void add_confusion(Section& section, const std::vector<Case>& cases) {
   std::vector<std::string> rows, columns;
   std::map<std::pair<std::string, std::string>, int> counts;
@@ -111,7 +111,7 @@ void add_confusion(Section& section, const std::vector<Case>& cases) {
       {"note", "Cases with one effect or none. Outlined: the truth. In parentheses: verdicts without an effect."}});
 }
 
-/// How often a claim of some probability is right, in bins of equal mass.
+/// Adds the reliability diagram: how often a claim is right over its probability, in bins with equally many cases.
 void add_reliability(Section& section, std::vector<Case> cases) {
   std::ranges::stable_sort(cases, {}, &Case::probability);
   Figure f{.id = "reliability",
@@ -150,15 +150,15 @@ void add_reliability(Section& section, std::vector<Case> cases) {
   section.add(f);
 }
 
-/// What was weighed of a case, where its prediction lies there.
+/// The most probable hypotheses of a case, where its prediction lies in `folder`.
 Json rivals_of(const fs::path& folder, const std::string& number) {
   Json rivals = Json::array();
   const fs::path file =
       folder / "predictions" / (std::string(number.size() < 4 ? 4 - number.size() : 0, '0') + number + ".json");
   if (!fs::exists(file)) return rivals;
   const Json json = read_results(file);
-  if (!json.contains("diagnosis")) return rivals;  // an older benchmark
-  std::map<std::string, double> by_name;           // with a remainder or without
+  if (!json.contains("diagnosis")) return rivals;  // the prediction is of an older benchmark
+  std::map<std::string, double> by_name;           // sums hypotheses with and without a remainder
   for (const gap::RankedHypothesis& h : gap::diagnosis_from(json.at("diagnosis"), file).hypotheses) {
     std::vector<std::string> words;
     for (const std::string& e : h.effects) words.push_back(spoken(e));

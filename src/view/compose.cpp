@@ -42,14 +42,14 @@ Kind recognised_json(const fs::path& path) {
   const Json json = read_results(path);
   const auto has = [&](const char* key) { return json.is_object() && json.contains(key); };
   if (has("verdict") && (has("hypotheses") || has("candidates")) && has("where"))
-    return Kind::diagnosis;  // "candidates": of schema 1
+    return Kind::diagnosis;  // "candidates" is the key in schema 1
   if (has("policy") && has("success_rate")) return Kind::evaluation;
   if (has("parameters") && has("total_error_after")) return Kind::identification;
   refuse(path, "is JSON of something else");
 }
 
-/// A folder of flight logs, as flappy-fly --log leaves for several, stands for the first of them, in the order of their names.
-/// `notes` says of those that are left out.
+/// Replaces a folder of flight logs, as flappy-fly --log leaves it for several flights, by its first kMaxFlights logs, in the order of
+/// their names. `notes` reports those that are left out.
 std::vector<fs::path> expanded(const std::vector<fs::path>& paths, std::string& notes) {
   std::vector<fs::path> all;
   for (const fs::path& path : paths) {
@@ -59,10 +59,10 @@ std::vector<fs::path> expanded(const std::vector<fs::path>& paths, std::string& 
       for (const auto& entry : fs::directory_iterator(path, error))
         if (fs::exists(entry.path() / "flight.toml", error)) flights.push_back(entry.path());
     std::ranges::sort(flights);
-    if (flights.size() > kMostFlights) {
+    if (flights.size() > kMaxFlights) {
       notes += "Of " + std::to_string(flights.size()) + " flights in " + path.string() + " the first " +
-               std::to_string(kMostFlights) + " are shown. ";
-      flights.resize(kMostFlights);
+               std::to_string(kMaxFlights) + " are shown. ";
+      flights.resize(kMaxFlights);
     }
     if (flights.empty()) flights.push_back(path);
     all.insert(all.end(), flights.begin(), flights.end());
@@ -94,7 +94,7 @@ std::vector<Section> composed(const std::vector<fs::path>& given, const FlightOp
         throw io::InputError(paths[i].string() + ": is given twice; accepted: each path once");
   }
   if (flights.empty() && (options.goal_m || !options.vehicle.empty()))
-    throw io::InputError("--goal and --vehicle are of flights, and none is given; accepted: a flight log beside them");
+    throw io::InputError("--goal and --vehicle describe flights, and no flight is given; accepted: a flight log, too");
   std::vector<Section> sections;
   bool flown = false;
   for (std::size_t i = 0; i < paths.size(); ++i) {

@@ -1,4 +1,4 @@
-// From paths of results to a report: what each is, and its section.
+// Composes a report from paths: recognises what each path holds, and makes its section.
 #pragma once
 
 #include <array>
@@ -14,11 +14,11 @@ namespace flappy::view {
 enum class Kind { flight, run, evaluation, diagnosis, identification, benchmark };
 
 /// What a path holds: a flight log; a run folder or a folder of runs; results of flappy-eval, flappy-gap diagnose (or its folder),
-/// flappy-identify forces or flappy-blind score (its folder, or score.csv). InputError where it is none of these.
+/// flappy-identify forces or flappy-blind score (its folder, or score.csv). Throws InputError where it is none of these.
 Kind recognised(const std::filesystem::path& path);
 
-/// A folder of flight logs stands for the first kMostFlights of them. Sections in the order of the paths; flights share the place of the first. A path that is given twice is refused, as whatever
-/// a section refuses.
+/// The sections in the order of the paths; all flights share one section, at the place of the first. Of a folder of flight logs, the first
+/// kMaxFlights are taken. Throws io::InputError for a path that is given twice, and for whatever a section refuses.
 std::vector<Section> composed(const std::vector<std::filesystem::path>& given, const FlightOptions& options,
                               Packing& packing);
 

@@ -19,21 +19,21 @@ namespace {
 using io::format;
 
 constexpr std::size_t kBars = 10, kShownRows = 6, kMaxWhere = 20;
-/// Smallest probability that is drawn, and that is listed in the text.
+/// Smallest probability that is drawn, and smallest that is listed in the text.
 constexpr double kMinShown = 5e-3, kMinListed = 0.05;
-/// More than any flights bring: what it is beside was ruled out.
+/// A difference of evidence that no flights bring: it means that a hypothesis was ruled out.
 constexpr double kRuledOut_nats = 1e8;
 constexpr std::size_t kLongName = 45;
-/// Ratio of residual to noise from which on a shade is the darkest.
+/// Ratio of residual to noise from which on the shade is the darkest.
 constexpr double kDarkest = 10;
 
 const char* place_of(const std::string& effect) {
   constexpr const char* kPlaces[] = {"the body",          "motors, gears and springs",
                                      "the wings' hinges", "the air at the wings",
                                      "loads on the body", "the sensors"};
-  // of one kind of vehicle or the other
+  // look among the effects of vehicles with wings, then of beat-averaged vehicles
   model::Vehicle vehicle;
-  const model::EffectEntry* entry = model::find_effect(vehicle, effect);
+  const model::CatalogueEffect* entry = model::find_effect(vehicle, effect);
   vehicle.beat_averaged.emplace();
   if (entry == nullptr) entry = model::find_effect(vehicle, effect);
   return entry == nullptr ? "" : kPlaces[static_cast<std::size_t>(entry->info.stage)];
@@ -41,7 +41,7 @@ const char* place_of(const std::string& effect) {
 
 double over_noise(const gap::ResidualLocation& l) { return l.noise_floor > 0 ? l.gap / l.noise_floor : 0; }
 
-/// A hypothesis with its words and its place in diagnosis.json.
+/// A hypothesis with its words and its JSON pointer in diagnosis.json.
 struct Rival {
   std::string name;
   const gap::RankedHypothesis* hypothesis;
@@ -49,7 +49,7 @@ struct Rival {
   bool effect() const { return hypothesis->kind == gap::HypothesisKind::effect; }
 };
 
-/// Effects joined by +, or a kind of hypothesis without one.
+/// The words of a hypothesis: effects joined by +, or a hypothesis without effects.
 std::string rival_words(const std::string& name) {
   if (name == "none") return "no gap";
   if (name == "parameters") return "parameters alone";
@@ -59,7 +59,7 @@ std::string rival_words(const std::string& name) {
   return words;
 }
 
-/// The most probable first.
+/// The hypotheses of a diagnosis, the most probable first.
 std::vector<Rival> rivals_of(const gap::Diagnosis& d) {
   std::vector<Rival> rivals;
   for (std::size_t i = 0; i < d.hypotheses.size(); ++i) {
@@ -74,7 +74,7 @@ std::vector<Rival> rivals_of(const gap::Diagnosis& d) {
   return rivals;
 }
 
-/// "right_flap velocity_y", a product -> "right flap × velocity y"; "cos heading" is one function.
+/// The words of a basis function: the product "right_flap velocity_y" -> "right flap × velocity y"; "cos heading" is one function.
 std::string function_words(const std::string& function) {
   std::string words;
   for (std::size_t at = 0; at < function.size();) {
@@ -86,7 +86,7 @@ std::string function_words(const std::string& function) {
   return words;
 }
 
-/// "height, middle third": where the thirds lie differs with the beats that a channel has.
+/// "height, middle third"; no bounds, because they differ between channels with the beats that these have.
 std::string third_words(const gap::Regime& r) {
   constexpr const char* kThirds[] = {"", ", low third", ", middle third", ", high third"};
   return r.quantity + kThirds[static_cast<int>(r.third)];
@@ -97,7 +97,7 @@ class DiagnosisSection {
  public:
   DiagnosisSection(const std::filesystem::path& file, const gap::Diagnosis& diagnosis)
       : diagnosis_(diagnosis), rivals_(rivals_of(diagnosis)), section_("diagnosis", "Diagnosis", file.string()) {
-    // vehicles with wings are tested by the harmonics of their beats
+    // only vehicles with wings are tested by the harmonics of the beat
     beat_averaged_ = diagnosis.validation ||
                      (!diagnosis.locations.empty() && of(gap::Stage::refit, gap::ResidualTest::phase).empty());
   }
@@ -225,7 +225,7 @@ class DiagnosisSection {
     add_regimes();
   }
 
-  /// Residual over noise: a row for each channel that stands out, a column for each place.
+  /// Adds a matrix of residual over noise: a row for each channel that exceeds noise, a column for each place.
   void add_heat(gap::ResidualTest test, const char* title, bool tilted, const char* note) {
     std::vector<std::string> channels, columns;
     std::set<std::string> off;
@@ -266,7 +266,7 @@ class DiagnosisSection {
                       {"note", note}});
   }
 
-  /// The channel that depends most on what the robot did, beside its noise.
+  /// Adds the figure of the channel whose residual depends most on the regime, next to its noise.
   void add_regimes() {
     const std::vector<const Location*> all = refitted(gap::ResidualTest::regime);
     std::map<std::string, std::map<std::string, std::pair<double, double>>> reach;  // [channel][quantity], over noise
@@ -340,7 +340,7 @@ class DiagnosisSection {
     add_parameters();
   }
 
-  /// What speaks for and against each.
+  /// Adds the table of what speaks for and against each hypothesis.
   void add_rivals() {
     const gap::RankedHypothesis* refit = parameters_alone();
     double best = -std::numeric_limits<double>::infinity();
@@ -362,7 +362,7 @@ class DiagnosisSection {
         con.push_back(format("closes nothing of what refitting leaves (%.0f %%)", 100 * h.closure->value));
       for (const gap::Estimate& e : h.parameters)
         if (e.low <= 0 && e.high >= 0)
-          con.push_back(size_words(e.name.substr(e.name.find('.') + 1), e.unit) + " may be 0");
+          con.push_back(magnitude_words(e.name.substr(e.name.find('.') + 1), e.unit) + " may be 0");
       std::set<std::string> at;
       for (const std::string& e : h.effects) at.insert(place_of(e));
       rows.push_back({r.name, cell(h.probability, r.pointer + "/probability"), spoken_list({at.begin(), at.end()}),
@@ -378,7 +378,7 @@ class DiagnosisSection {
       Json rows = Json::array();
       for (const gap::Estimate& e : r.hypothesis->parameters) {
         const std::string at = r.pointer + "/parameters/" + e.name;
-        rows.push_back({size_words(e.name, e.unit), cell(e.value, at + "/value"), cell(e.low, at + "/low"),
+        rows.push_back({magnitude_words(e.name, e.unit), cell(e.value, at + "/value"), cell(e.low, at + "/low"),
                         cell(e.high, at + "/high"), in_print(e.unit)});
       }
       if (rows.empty()) return;
@@ -389,7 +389,7 @@ class DiagnosisSection {
 
   void add_how_far() {
     ask("How far does the gap shrink?");
-    // only what was fitted has a closure
+    // only fitted hypotheses have a closure
     auto best = std::ranges::find_if(rivals_, [](const Rival& r) { return r.effect() && r.hypothesis->closure; });
     if (best == rivals_.end()) best = std::ranges::find_if(rivals_, &Rival::effect);
     const std::string with = best == rivals_.end() ? "best effect" : best->name;
@@ -480,7 +480,7 @@ class DiagnosisSection {
                          "The vehicle's file and the corrected one fly the recorded path under our controller."));
   }
 
-  /// How two rivals would fly the next experiment, in what differs most.
+  /// Adds figures of how two rivals would fly the next experiment, in the quantities that differ most.
   void add_courses(const gap::NextExperiment& next, const std::vector<std::string>& rivals) {
     for (std::size_t k = 0; k < std::min<std::size_t>(2, next.courses.size()); ++k) {
       const gap::Course& c = next.courses[k];
@@ -524,7 +524,7 @@ class DiagnosisSection {
       add_courses(next, rivals);
       section_.say("It is configs/gap/experiments/" + next.manoeuvre + ".toml. Diagnose old and new flights together.");
     } else if (beat_averaged_) {
-      // the experiments that are ready are flown in simulation, and nothing flies such a vehicle there
+      // the ready-made experiments are flown in simulation, which cannot fly a beat-averaged vehicle
       section_.say(corrected
                        ? "Predict with vehicle_corrected.toml, and see on new flights whether it holds: diagnose these "
                          "with the same --vehicle as now."
@@ -548,7 +548,7 @@ class DiagnosisSection {
       Json row = {channel_words(t.channel)};
       if (!beat_averaged_)
         row.push_back(t.harmonic == 0 ? "mean of the beat" : "harmonic " + std::to_string(t.harmonic));
-      row.insert(row.end(), {Json(function_words(t.function)), cell(t.times_usual, at + "/times_usual"),
+      row.insert(row.end(), {Json(function_words(t.function)), cell(t.times_prior_scale, at + "/times_prior_scale"),
                              cell(t.gain_nats, at + "/gain_nats")});
       rows.push_back(std::move(row));
     }

@@ -1,4 +1,4 @@
-// What flappy-eval found of a policy.
+// The section of results of flappy-eval.
 #include <cmath>
 
 #include "io/text.hpp"
@@ -45,7 +45,7 @@ void add_success(Section& section, const std::vector<Flown>& flown) {
   section.add(f);
 }
 
-/// Of all flights, by what they failed of; nothing where no flight failed.
+/// Adds the shares of flights that failed, by cause; nothing where no flight failed.
 void add_failures(Section& section, const std::vector<Flown>& flown) {
   Figure f{.id = "failures",
            .title = "Failures by cause",
@@ -75,7 +75,7 @@ void add_failures(Section& section, const std::vector<Flown>& flown) {
   if (!causes.empty()) section.add(f);
 }
 
-/// Median, with 10 and 90 %.
+/// Adds the median of a quantity, with its 10 % and 90 % quantiles.
 void add_quantity(Section& section, const std::vector<Flown>& flown, const std::string& id, const std::string& title,
                   const std::string& unit, const std::vector<std::pair<std::string, double>>& references) {
   Figure f{.id = id,
@@ -123,7 +123,7 @@ void add_table(Section& section, const std::vector<Flown>& flown) {
   section.add(table("In numbers", head, std::move(rows)));
 }
 
-void tell_flights(Section& section, const Json& json) {
+void add_flights(Section& section, const Json& json) {
   std::vector<Flown> flown = {{"policy", json, ""}};
   if (json.contains("pid")) flown.push_back({"PID alone", json.at("pid"), "/pid"});
   if (json.contains("arc")) flown.push_back({"ARC alone", json.at("arc"), "/arc"});
@@ -144,10 +144,10 @@ void tell_flights(Section& section, const Json& json) {
   add_table(section, flown);
 }
 
-void tell_effects(Section& section, const Json& json) {
+void add_effects(Section& section, const Json& json) {
   section.say(format("Without any effect the policy succeeds in %.1f %% of %.0f flights; below, with each effect of "
                      "the catalogue at "
-                     "0.5 to 2 times its typical size.",
+                     "0.5 to 2 times its typical magnitude.",
                      100 * number(json, "success_rate"), number(json, "episodes")),
               "lead");
   Json rows = Json::array(), values = Json::array(), texts = Json::array();
@@ -156,9 +156,9 @@ void tell_effects(Section& section, const Json& json) {
     Json v = Json::array(), t = Json::array();
     columns.clear();
     for (const Json& s : e.at("success")) {
-      columns.push_back(format("%g ×", s.at("size").get<double>()));
+      columns.push_back(format("%g ×", s.at("magnitude").get<double>()));
       const double rate = number(s, "rate");
-      // dark is what fails
+      // dark cells fail
       v.push_back(std::isfinite(rate) ? Json(1 - rate) : Json(nullptr));
       t.push_back(std::isfinite(rate) ? format("%.1f", 100 * rate) : "–");
     }
@@ -166,7 +166,7 @@ void tell_effects(Section& section, const Json& json) {
     values.push_back(v), texts.push_back(t);
   }
   section.add(Json{{"kind", "matrix"},
-                   {"title", "Success (%) by effect and size"},
+                   {"title", "Success (%) by effect and magnitude"},
                    {"rows", rows},
                    {"columns", columns},
                    {"values", values},
@@ -181,8 +181,8 @@ Section evaluation_section(const std::filesystem::path& file) {
   const Json json = read_results(file);
   return of_results(file, "flappy-eval", [&] {
     Section section("evaluation", "Evaluation of " + json.at("policy").get<std::string>(), file.string());
-    if (json.contains("effects")) tell_effects(section, json);
-    else tell_flights(section, json);
+    if (json.contains("effects")) add_effects(section, json);
+    else add_flights(section, json);
     return section;
   });
 }

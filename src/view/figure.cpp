@@ -17,7 +17,7 @@ constexpr double kColumn_cm = 8.8, kHigh_cm = 5.6, kCategory_cm = 0.42, kFrame_c
 
 const char* colour_of(const Series& s) { return kColours[static_cast<std::size_t>(s.colour)]; }
 
-/// Of a list that may have no value in places.
+/// A JSON list in which values that are not finite become null.
 Json numbers(const std::vector<double>& list) {
   Json json = Json::array();
   for (const double x : list) json.push_back(std::isfinite(x) ? Json(x) : Json(nullptr));
@@ -29,7 +29,7 @@ Json json_of(const Axis& axis) {
   return {{"title", axis.title}, {"log", axis.log}, {"low", number(axis.low)}, {"high", number(axis.high)}};
 }
 
-/// As gnuplot reads it, which substitutes nothing within these quotes.
+/// A string in gnuplot's single quotes, within which gnuplot substitutes nothing.
 std::string quoted(const std::string& text) {
   std::string q = "'";
   for (const char c : text)
@@ -38,7 +38,7 @@ std::string quoted(const std::string& text) {
   return q + "'";
 }
 
-/// A name in lines of about so many letters, as an expression of gnuplot's.
+/// Breaks a name into lines of about kLine letters, as an expression of gnuplot.
 constexpr std::size_t kLine = 40;
 std::vector<std::string> lines_of(const std::string& name) {
   std::vector<std::string> lines = {""};
@@ -62,7 +62,7 @@ std::size_t bars_of(const Figure& f) {
   return static_cast<std::size_t>(std::ranges::count(f.series, Draw::bars, &Series::draw));
 }
 
-/// Rows of a series: x, y, low, high.
+/// The rows of a series for gnuplot: x, y, low, high.
 std::string rows_of(const Figure& f, const Series& s) {
   const auto digits = [](double x) { return std::isfinite(x) ? io::shortest_digits(x) : std::string("NaN"); };
   const double base = f.x.log ? f.x.low.value_or(1) : 0;

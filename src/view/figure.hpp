@@ -9,53 +9,53 @@
 
 namespace flappy::view {
 
-/// What a series looks like. band: between low and high. interval: a point with a bar from low to high. bars: from the axis of
-/// the categories.
+/// How a series is drawn. band: area between low and high. interval: a point with a bar from low to high. bars: horizontal bars from
+/// the axis of the categories.
 enum class Draw { line, points, bars, band, interval };
 
-/// Of kColours, in this order.
+/// Indices of kColours.
 enum class Colour { blue, vermillion, green, purple, black, grey };
 
-/// NaN: no value there.
+/// A series of a figure; NaN means no value.
 struct Series {
   std::string name;
   Draw draw = Draw::line;
   Colour colour = Colour::blue;
-  std::vector<double> x, y;       ///< of bars x is the value, y the place of the category (as near_category() says)
-  std::vector<double> low, high;  ///< of a band along y, of an interval along x
+  std::vector<double> x, y;       ///< for bars, x is the value and y the place near its category (near_category())
+  std::vector<double> low, high;  ///< bounds along y for a band, along x for an interval
   bool dashed = false;
 };
 
 struct Axis {
-  std::string title;  ///< with its unit
+  std::string title;  ///< includes the unit
   bool log = false;
   std::optional<double> low, high;
 };
 
 struct Figure {
-  std::string id;     ///< of the file that holds it
-  std::string title;  ///< says what is to be seen
-  std::string note;   ///< how it was made
+  std::string id;     ///< name of the file on paper, without extension
+  std::string title;  ///< what the figure shows
+  std::string note;   ///< how the figure was made
   Axis x, y;
-  std::vector<std::string> categories;  ///< of y, from the top down; none: y is a number
+  std::vector<std::string> categories;  ///< names along y, from the top down; empty: y is numeric
   std::vector<Series> series;
 };
 
-/// Where bars of category `k` lie, the `i`-th of `of` beside each other; each is kBarWidth / of high.
+/// The y of bar `i` of `of` in category `k`, centred next to each other; each bar is kBarWidth / of high.
 double near_category(std::size_t k, std::size_t i = 0, std::size_t of = 1);
 inline constexpr double kBarWidth = 0.8;
 
-/// Okabe and Ito, "Color Universal Design", 2008, as far as they have a contrast of 3 to 1 on white: all forms of colour blindness
-/// tell them apart.
+/// Colours by Okabe and Ito, "Color Universal Design", 2008, which remain distinct in all forms of colour blindness; only those with
+/// a contrast of at least 3 to 1 on white.
 inline constexpr const char* kColours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#767676"};
 
-/// What web/chart.js draws.
+/// The JSON of a figure that web/chart.js draws.
 nlohmann::ordered_json json_of(const Figure& figure);
 
 enum class Paper { svg, pdf };
 
-/// Writes folder/id.svg or .pdf: as wide as a column of 88 mm, fonts embedded in a PDF. InputError where gnuplot is missing or
-/// fails, or the file cannot be written.
+/// Writes folder/id.svg or .pdf, as wide as a column of 88 mm, with fonts embedded in a PDF. Throws InputError where gnuplot is
+/// missing or fails, or the file cannot be written.
 void draw_on_paper(const std::filesystem::path& folder, const Figure& figure, Paper paper);
 
 }  // namespace flappy::view

@@ -6,8 +6,8 @@
 
 #include "flappy/batch.hpp"
 #include "flappy/vehicle_file.hpp"
+#include "flightlog/beat_averaged_motion.hpp"
 #include "flightlog/flight_log.hpp"
-#include "flightlog/mean_motion.hpp"
 #include "flightlog/readings.hpp"
 #include "io/installation.hpp"
 #include "sim/replay.hpp"
@@ -22,10 +22,10 @@ using flightlog::Column;
 using flightlog::FlightLog;
 
 constexpr double kDegrees = 180 / std::numbers::pi;
-constexpr double kWingsEvery_s = 2e-3, kHeld_s = 1e-3;  // fifteen pictures of a beat of 34 Hz; the driver's hold
+constexpr double kWingsEvery_s = 2e-3, kHeld_s = 1e-3;  // 15 samples per beat of 34 Hz; hold time of the driver
 constexpr std::size_t kPointsOnPaper = 1500;
 
-/// Steps of what a page shows.
+/// Resolutions of packed columns.
 namespace step {
 constexpr double kTime_s = 1e-6, kPlace_m = 1e-5, kQuaternion = 1e-5, kAngle_rad = 1e-3, kRate_rad_s = 1e-3,
                  kForce_m_s2 = 1e-2, kVoltage_V = 1e-3, kSplit = 1e-5, kCurrent_A = 1e-4;
@@ -43,9 +43,9 @@ Column thinned(const Column& values, std::size_t every) {
   return kept;
 }
 
-/// Every n-th sample of a stream that is longer than kMostSamples, and a note that says so.
+/// Packs a stream. Of a stream longer than kMaxSamples it takes every n-th sample, and adds a note.
 Json packed(const std::string& stream, const std::vector<NamedColumn>& columns, Packing& packing, Json& notes) {
-  const std::size_t every = (columns.front().values.size() + kMostSamples - 1) / kMostSamples;
+  const std::size_t every = (columns.front().values.size() + kMaxSamples - 1) / kMaxSamples;
   if (every > 1) notes.push_back(stream + ": one of " + std::to_string(every) + " samples is shown");
   Json json;
   for (const NamedColumn& c : columns)
@@ -53,7 +53,7 @@ Json packed(const std::string& stream, const std::vector<NamedColumn>& columns, 
   return json;
 }
 
-/// The vehicle that a log declares: beside it, as asked, or the shipped one of that name.
+/// The vehicle that a log declares: from the log's folder, else from `asked`, else the shipped vehicle of that name.
 model::Vehicle vehicle_of(const fs::path& folder, const FlightLog& log, const fs::path& asked) {
   std::error_code none;
   for (const fs::path& file :
@@ -63,8 +63,8 @@ model::Vehicle vehicle_of(const fs::path& folder, const FlightLog& log, const fs
                        " in the folder; accepted: --vehicle FILE, in Python vehicle=FILE");
 }
 
-/// The strokes and rotations that the recorded voltages make, the torso held as it is: its own motion changes them little, and
-/// a picture shows it less.
+/// Simulates the strokes and rotations that the recorded voltages cause, with the torso held fixed: its motion changes the angles little, less
+/// than a picture shows.
 flightlog::WingsStream derived_wings(const FlightLog& log, const model::Vehicle& vehicle) {
   const Column& t = log.command.t_s;
   const auto held = static_cast<std::size_t>(std::floor((t.back() - t.front()) / kHeld_s));
@@ -92,9 +92,10 @@ flightlog::WingsStream derived_wings(const FlightLog& log, const model::Vehicle&
   return stream;
 }
 
-/// Specific force of the path that motion capture saw, up to the vehicle's bandwidth.
+/// The specific force of the path that motion capture saw, up to the vehicle's bandwidth.
 flightlog::ImuStream force_of_path(const FlightLog& log, const model::Vehicle& vehicle, const fs::path& folder) {
-  const flightlog::MeanMotion m = flightlog::mean_motion(log, vehicle.beat_averaged->bandwidth_Hz, folder);
+  const flightlog::BeatAveragedMotion m =
+      flightlog::beat_averaged_motion(log, vehicle.beat_averaged->bandwidth_Hz, folder);
   flightlog::ImuStream stream;
   for (std::size_t i = 0; i < m.size(); ++i) {
     if (!m.seen[i]) continue;
@@ -106,20 +107,20 @@ flightlog::ImuStream force_of_path(const FlightLog& log, const model::Vehicle& v
   return stream;
 }
 
-/// A step well below what can be told of values of an unknown unit.
+/// A resolution for values of an unknown unit: 1e-5 of their largest magnitude, rounded up to a power of ten.
 double step_of(const Column& values) {
   double most = 0;
   for (const double x : values) most = std::max(most, std::abs(x));
   return most > 0 ? 1e-5 * std::pow(10, std::ceil(std::log10(most))) : 1;
 }
 
-/// Takes the poses out of a log whose markers were taken for others; where they were, as stretches from pose to pose.
+/// Removes the poses with swapped markers from a log. Returns the begin and end of each stretch of them; null where there is none.
 Json take_swapped(FlightLog& log, Packing& packing, Json& notes) {
   flightlog::MocapStream& m = log.mocap;
   std::vector<char> swapped = flightlog::swapped_poses(log);
   const std::size_t n = swapped.size();
   const std::array<Column*, 8> columns = {&m.t_s, &m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz};
-  for (std::size_t i = 1; i < n; ++i)  // what repeats such a pose is none either
+  for (std::size_t i = 1; i < n; ++i)  // a repetition of a swapped pose is swapped, too
     if (swapped[i - 1] &&
         std::ranges::all_of(columns, [&](const Column* c) { return c == &m.t_s || (*c)[i] == (*c)[i - 1]; }))
       swapped[i] = 1;
@@ -153,7 +154,7 @@ Json json_of(const flightlog::LogAmbient& a) {
   return json;
 }
 
-/// What lies between an instant and its sample's time, as declared.
+/// The declared latencies, from the instant of a sample to its time stamp.
 Json latency_of(const flightlog::FlightHeader& h) {
   Json json = {{"mocap", h.mocap.latency_s}, {"imu", h.imu.latency_s}};
   if (h.power) json["power"] = h.power->latency_s;
@@ -221,7 +222,7 @@ Json streams_of(const FlightLog& log, const std::optional<flightlog::WingsStream
   return json;
 }
 
-/// A column over the flight's own time, with no more points than paper shows.
+/// A column over the flight time, thinned to about kPointsOnPaper points.
 Series on_paper(const std::string& name, Colour colour, bool dashed, const Column& t, const Column& values,
                 double factor = 1) {
   Series s{.name = name, .colour = colour, .x = {}, .y = {}, .low = {}, .high = {}, .dashed = dashed};
@@ -233,7 +234,7 @@ Series on_paper(const std::string& name, Colour colour, bool dashed, const Colum
   return s;
 }
 
-/// Roll, pitch and yaw of R = Rz Ry Rx; angles go on beyond half a turn.
+/// Roll, pitch and yaw of R = Rz Ry Rx; the angles are continuous beyond half a turn.
 std::array<Column, 3> attitude_of(const flightlog::MocapStream& m) {
   std::array<Column, 3> angles;
   for (std::size_t i = 0; i < m.t_s.size(); ++i) {
@@ -288,7 +289,7 @@ void add_on_paper(Section& section, const std::vector<ShownFlight>& flights) {
   if (!inputs.series.empty()) section.add_on_paper(inputs);
 }
 
-/// The folder's own name; with that of the folder around it where another flight has the same.
+/// The name of a folder, preceded by that of its parent folder where another flight's folder has the same name.
 std::string name_among(const std::vector<fs::path>& folders, const fs::path& folder) {
   const auto whole = [](const fs::path& path) {
     const fs::path full = fs::absolute(path).lexically_normal();
@@ -301,9 +302,9 @@ std::string name_among(const std::vector<fs::path>& folders, const fs::path& fol
 }
 
 void check_count(std::size_t flights) {
-  if (flights > kMostFlights)
+  if (flights > kMaxFlights)
     throw io::InputError(std::to_string(flights) + " flights are more than one page shows; accepted: up to " +
-                         std::to_string(kMostFlights));
+                         std::to_string(kMaxFlights));
 }
 
 }  // namespace

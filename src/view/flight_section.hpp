@@ -1,13 +1,13 @@
-// Recorded flights as a page shows them: the robot in 3D and its streams, one beside the others.
+// The section of recorded flights: the robot in 3D next to plots of its streams.
 //
 // The block "flights": {"goal_m": [x, y, z] | null, "flights": [{"name", "flapping_Hz", "gravity_m_s2", "vehicle", "ambient",
 // "wings": "recorded" | "derived" | "still" | "none", "latency_s": {stream: declared}, "streams": {stream: {column: packed}},
 // "swapped": {"begin_s": packed, "end_s": packed} | null, "notes": [...]}]}.
-// Columns are those of the log (flightlog/flight_log.hpp), rounded well below any sensor's noise; no stream has more than kMostSamples, so
-// that flights of any length open. Declared inputs are the stream "declared" in place of "command". "vehicle" is its shape (shape.hpp). Flights
-// of one that is known by the beat have a stream "path": the specific force of the path that motion capture saw (flightlog/mean_motion.hpp),
-// at its instants. Poses whose markers were taken for others (flightlog/readings.hpp) are left out of "mocap"; "swapped" has the times of the
-// first and the last of each stretch of them. truth.csv is not read.
+// Columns are those of the log (flightlog/flight_log.hpp), rounded well below any sensor's noise. A stream has at most kMaxSamples samples, so
+// that flights of any length can be opened. Declared inputs form the stream "declared" instead of "command". "vehicle" is its drawn form
+// (shape.hpp). Flights of a beat-averaged vehicle have a stream "path": the specific force of the path that motion capture saw
+// (flightlog/beat_averaged_motion.hpp), at the times of that motion. Poses with swapped markers (flightlog/readings.hpp) are left out of "mocap";
+// "swapped" has the first and last time of each stretch of them. truth.csv is not read.
 #pragma once
 
 #include <array>
@@ -20,24 +20,24 @@
 
 namespace flappy::view {
 
-inline constexpr std::size_t kMostSamples = 600'000;  ///< of a stream: ten minutes of a driver's milliseconds
-inline constexpr std::size_t kMostFlights = 8;
+inline constexpr std::size_t kMaxSamples = 600'000;  ///< of a stream: ten minutes of a driver's milliseconds
+inline constexpr std::size_t kMaxFlights = 8;
 
 struct FlightOptions {
-  std::filesystem::path vehicle;  ///< of flights whose folder has none; empty: the shipped one of that name
+  std::filesystem::path vehicle;  ///< for flights whose folder has none; empty: the shipped vehicle of that name
   std::optional<std::array<double, 3>> goal_m;  ///< in W
 };
 
 struct ShownFlight {
   std::string name;
-  std::filesystem::path folder;  ///< where its vehicle is looked for first, and the source that is named
+  std::filesystem::path folder;  ///< first place to look for its vehicle, and the source that the page names
   flightlog::FlightLog log;
 };
 
-/// io::InputError of a vehicle that is nowhere, more than kMostFlights.
+/// Throws io::InputError where a vehicle is not found, and for more than kMaxFlights flights.
 Section flight_section(std::vector<ShownFlight> flights, const FlightOptions& options, Packing& packing);
 
-/// The same of folders, by their names; io::InputError of a log that cannot be read, too.
+/// Reads the logs in `folders` and names them by their folders. Also throws io::InputError for a log that cannot be read.
 Section flight_section(const std::vector<std::filesystem::path>& folders, const FlightOptions& options,
                        Packing& packing);
 

@@ -11,13 +11,13 @@
 namespace flappy::view {
 namespace {
 
-/// No page of ours asks anything of the network.
+/// Content-Security-Policy of a page: it loads nothing from the network.
 constexpr const char* kPolicy =
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:";
 constexpr const char* kLibraries[] = {"three.min.js", "chart.min.js"};
 constexpr std::string_view kEntry = "main.js", kStyle = "report.css";
 
-/// What stands in it cannot end it: JSON has no "<", base64 neither, and our own files no "</script", which page_test looks at.
+/// A script element. Its text cannot end it: JSON has no "<", nor has base64, and our own files have no "</script", which page_test checks.
 std::string script(const std::string& attributes, std::string_view text) {
   return "<script" + attributes + ">\n" + std::string(text) + "\n</script>\n";
 }

@@ -1,4 +1,4 @@
-// A report as one HTML file that needs nothing else: data, three.js, Chart.js and our own modules (web/) stand in it.
+// A report as one HTML file that needs no other file: it contains data, three.js, Chart.js and our own modules (web/).
 //
 // A page is a list of sections, a section a list of blocks, which web/ draws by their "kind":
 //   words       {"text", "style": "lead" | "plain" | "note"}
@@ -9,7 +9,7 @@
 //   matrix      {"title", "rows", "columns", "values": [[number or null]], "texts", "marked", "least", "most", "tilted", "note"}
 //   heading     {"text"}
 //   cases       sections.hpp
-// Text of others comes into the page as JSON in which no "<" stands, and becomes text nodes there, never markup.
+// Foreign text enters the page as JSON without any "<", and the page makes text nodes of it, so it is never interpreted as markup.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -28,9 +28,9 @@ class Section {
   Section(std::string kind, std::string title, std::string source);
 
   void say(const std::string& text, const char* style = "plain");
-  /// Nothing where it has no point.
+  /// Adds a figure; does nothing where it has no point.
   void add(const Figure& figure);
-  /// A figure for paper alone: the page has it in another form.
+  /// Adds a figure for paper only, because the page shows the same in another form.
   void add_on_paper(const Figure& figure) { figures_.push_back(figure); }
   void add(Json block) { blocks_.push_back(std::move(block)); }
 
@@ -45,18 +45,18 @@ class Section {
   std::vector<Figure> figures_;
 };
 
-/// A number with the digits that a reader wants, and where in the file of results it stands.
+/// A cell of a table: a number with `digits` significant digits, and its JSON pointer `at` in the file of results.
 Json cell(double value, const std::string& at, int digits = 3);
 Json table(const std::string& title, const std::vector<std::string>& head, Json rows, const std::string& note = "");
 
-/// The HTML text.
+/// The HTML text of a report.
 std::string page_text(const std::string& title, const std::vector<Section>& sections, const Packing& packing);
 
-/// JSON that can stand within <script>: "<", ">" and "&" become \u003c, \u003e, \u0026.
+/// JSON that is safe within <script>: "<", ">" and "&" become \u003c, \u003e, \u0026.
 std::string json_in_html(const Json& json);
-/// Text that can stand within an element or an attribute.
+/// Text that is safe within an element or an attribute.
 std::string text_in_html(std::string_view text);
-/// Our modules as one, each behind those that it imports, without their import lines and the word export.
+/// Our modules as one script: each after the modules that it imports, without import lines and the word export.
 std::string joined_modules();
 
 }  // namespace flappy::view

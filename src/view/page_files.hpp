@@ -1,4 +1,4 @@
-// What a page is made of, put into the program when it is built: src/view/web, three.js and Chart.js.
+// The files that a page contains, embedded in the program when it is built: src/view/web, three.js and Chart.js.
 #pragma once
 
 #include <map>
@@ -6,7 +6,7 @@
 
 namespace flappy::view {
 
-/// Text by the file's name.
+/// [file name] text of the file.
 extern const std::map<std::string_view, std::string_view> kPageFiles;
 
 }  // namespace flappy::view

@@ -14,7 +14,7 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-/// In words that need no manual.
+/// Words for channels that need no manual.
 const std::map<std::string, std::string> kChannelNames = {{"torque_x", "roll torque"},
                                                           {"torque_y", "pitch torque"},
                                                           {"torque_z", "yaw torque"},
@@ -50,7 +50,7 @@ Json read_results(const std::filesystem::path& file) {
 }
 
 void refuse_results(const std::filesystem::path& file, const char* writer, const std::string& what) {
-  // "[json.exception.out_of_range.403] key 'where' not found"
+  // `what` looks like "[json.exception.out_of_range.403] key 'where' not found"
   const std::size_t bracket = what.find("] ");
   throw io::InputError(file.string() + ": " + (bracket == std::string::npos ? what : what.substr(bracket + 2)) +
                        "; accepted: what " + writer + " wrote");
@@ -118,8 +118,8 @@ std::string in_print(std::string unit) {
   return unit;
 }
 
-std::string size_words(const std::string& name, const std::string& unit) {
-  // "1/s" is how "per_s" is written, "m/s^2" how "m_s2" is
+std::string magnitude_words(const std::string& name, const std::string& unit) {
+  // names write the unit "1/s" as "per_s", and "m/s^2" as "m_s2"
   std::string end = "_" + unit, words = spoken(name);
   if (end.starts_with("_1/")) end.replace(1, 1, "per");
   std::ranges::replace(end, '/', '_');

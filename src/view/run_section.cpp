@@ -1,4 +1,4 @@
-// What flappy-train left: one run, or one for each seed.
+// The section of flappy-train: one run, or one run for each seed.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -22,7 +22,7 @@ struct Run {
   std::string name;
   fs::path folder;
   learn::MetricsTable metrics, timing;
-  Json start, summary;  ///< run.json; summary.json, null while it is not at its end
+  Json start, summary;  ///< run.json; summary.json, null while the run is not at its end
 };
 
 Run read_run(const fs::path& folder) {
@@ -36,7 +36,7 @@ Run read_run(const fs::path& folder) {
   return run;
 }
 
-/// The run itself, or those of a folder of seeds, by their number.
+/// The folder itself if it is a run, else the runs in it, by the number of their seed.
 std::vector<fs::path> runs_in(const fs::path& folder) {
   if (fs::exists(folder / "run.json")) return {folder};
   std::vector<fs::path> runs;
@@ -49,7 +49,7 @@ std::vector<fs::path> runs_in(const fs::path& folder) {
   return runs;
 }
 
-/// A line for each run of one column over another; seeds share a colour.
+/// An empty figure for one line per run.
 Figure curves(const std::string& id, const std::string& title, const std::string& note, Axis x, Axis y) {
   return {.id = id, .title = title, .note = note, .x = std::move(x), .y = std::move(y), .categories = {}, .series = {}};
 }
@@ -59,7 +59,7 @@ constexpr Colour kSeedColours[] = {Colour::blue, Colour::vermillion, Colour::gre
 Series line(const Run& run, std::size_t k, std::vector<double> x, std::vector<double> y, double factor = 1) {
   for (double& value : y) value *= factor;
   Series s{.name = run.name, .colour = kSeedColours[k % 5], .x = {}, .y = {}, .low = {}, .high = {}, .dashed = k >= 5};
-  // evaluations are fewer than records
+  // there are fewer evaluations than records
   for (std::size_t i = 0; i < x.size() && i < y.size(); ++i)
     if (std::isfinite(y[i])) s.x.push_back(x[i]), s.y.push_back(y[i]);
   return s;
@@ -140,7 +140,7 @@ std::map<std::string, std::string> flattened(const std::string& text) {
   return keys;
 }
 
-/// What differs from the shipped configuration of the same task.
+/// Adds the table of keys that differ from the shipped configuration of the same task.
 void add_difference(Section& section, const Run& run) {
   const std::string task = run.start.at("task"), name = "train/" + task + ".toml";
   const fs::path shipped_file = io::config_path(name);

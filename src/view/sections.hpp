@@ -1,4 +1,4 @@
-// Results as sections of a page. Each reads what its program wrote, and is io::InputError where the file is something else.
+// Makes a section of a page from the results of each program. Throws io::InputError where the file is something else.
 #pragma once
 
 #include <filesystem>
@@ -8,27 +8,27 @@
 
 namespace flappy::view {
 
-/// Where the gap lies, which effect causes it, how far it shrinks, what to fly next; words first, then the picture. `file`:
-/// diagnosis.json.
+/// The section of a diagnosis: where the gap lies, which effect causes it, how far it shrinks, what to fly next; words first, then the
+/// picture. `file`: diagnosis.json.
 ///
-/// The block "anatomy": {"parts": [{"channel", "name", "short", "ratio", "text"}], "wings", "note"}: how far each channel's residual is
-/// above noise, and whether the robot is drawn with wings.
+/// The block "anatomy": {"parts": [{"channel", "name", "short", "ratio", "text"}], "wings", "note"}: the ratio of each channel's residual
+/// to its noise, and whether the robot is drawn with wings.
 Section diagnosis_section(const std::filesystem::path& file);
 
-/// Adds the validation of a diagnosis, which has one: flights held out, controls, and each flight alone.
+/// Adds the validation of a diagnosis that has one: held-out flights, controls, and fits to single flights.
 void add_validation(Section& section, const gap::Diagnosis& diagnosis);
 
-/// Of flappy-eval, with or without --effects.
+/// The section of results of flappy-eval, with or without --effects.
 Section evaluation_section(const std::filesystem::path& file);
 
-/// Of flappy-identify forces.
+/// The section of results of flappy-identify forces.
 Section identification_section(const std::filesystem::path& file);
 
-/// Of a run folder of flappy-train, or the folder of several that --seeds leaves.
+/// The section of a run folder of flappy-train, or of a folder of several runs, as --seeds leaves it.
 Section run_section(const std::filesystem::path& folder);
 
-/// Of a scored blind benchmark: its folder, or score.csv alone, as docs/blind_reported.csv. Predictions and sealed labels are
-/// read where they lie beside it.
+/// The section of a scored blind benchmark: its folder, or score.csv alone, such as docs/results/blind_reported.csv. Predictions and sealed labels
+/// are read where they lie next to it.
 ///
 /// The block "cases": {"cases": [{"number", "part", "truth", "verdict", "named", "probability", "right", "details": [[name, text]],
 /// "rivals": [[name, probability]]}]}.

@@ -10,15 +10,15 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kStations = 16;
 constexpr double kRoot = 0.05,
-                 kTip = 0.94;  // shares of the span where the membrane begins, and where its tip is rounded from
-constexpr double kProfileWing_m = 0.07;  // the wings that the profile is for
+                 kTip = 0.94;  // shares of the span at which the membrane begins, and from which the tip is rounded
+constexpr double kProfileWing_m = 0.07;  // wing length for which kProfile_m is drawn
 constexpr double kProfile_m[][2] = {{-0.04, 0},      {-0.03, 0.004},  {-0.016, 0.009}, {0, 0.0105},     {0.012, 0.0085},
                                     {0.022, 0.0045}, {0.026, 0.0062}, {0.031, 0.0068}, {0.036, 0.0048}, {0.0375, 0}};
 
-/// To a micrometre, that pages stay small.
+/// Rounds to a micrometre, to keep pages small.
 double rounded(double x_m) { return std::round(x_m * 1e6) / 1e6; }
 
-/// `strips`: of a wing that is known by them.
+/// `strips`: those of an articulated wing; empty: use the planform.
 Json wing_of(const model::Side& s, const std::vector<model::Jointed::Strip>& strips) {
   Json outline = Json::array();
   for (const model::Jointed::Strip& strip : strips) outline.push_back({rounded(strip.span_m), rounded(strip.chord_m)});

@@ -1,4 +1,4 @@
-// What a laboratory asks before it believes an effect, as words and figures.
+// The validation of a diagnosis in words and figures: held-out errors, controls, and agreement of single flights.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -15,9 +15,9 @@ using io::format;
 
 constexpr Colour kColourOf[] = {Colour::blue,   Colour::vermillion, Colour::green,
                                 Colour::purple, Colour::black,      Colour::grey};
-/// Nine in ten of a normal distribution lie within so many standard deviations.
+/// Half width of a 90 % interval of the normal distribution, in standard deviations.
 constexpr double kHalf90 = 1.645;
-/// Sizes of flights that are one number differ by more than this in one comparison of a hundred.
+/// Magnitudes fitted to single flights agree unless their p-value is below this.
 constexpr double kOneNumber = 0.01;
 
 const char* unit_of(const std::string& channel) { return channel.starts_with("torque") ? "rad/s²" : "m/s²"; }
@@ -56,7 +56,7 @@ class ValidationPart {
     for (const std::string& c : channels_) {
       const gap::HeldOutError& e = error(last, c);
       falls.push_back(
-          format("%s from %.3g to %.3g %s (90 %%: %.3g to %.3g; %.3g where all flights of a kind are held "
+          format("%s from %.3g to %.3g %s (90 %%: %.3g to %.3g; %.3g where all flights of a type are held "
                  "out)",
                  channel_words(c).c_str(), error(0, c).rms, e.rms, unit_of(c), e.low, e.high, e.by_type));
     }
@@ -65,7 +65,7 @@ class ValidationPart {
                                           : "There is one flight, and nothing could be held out. What is left in it "
                                             "goes, from the vehicle's file on to the last rung: ") +
                  spoken_list(falls) + ".");
-    // channels of one unit share their figures
+    // channels with the same unit share figures
     std::map<std::string, std::vector<std::string>> kinds;
     for (const std::string& c : channels_) kinds[c.substr(0, c.find('_'))].push_back(c);
     for (const auto& [kind, channels] : kinds) add_ladder(kind, channels);
@@ -73,7 +73,7 @@ class ValidationPart {
     std::vector<std::string> head = {"rung"};
     for (const std::string& c : channels_) {
       const std::string name = channel_words(c);
-      head.insert(head.end(), {name + " (" + unit_of(c) + ")", "90 % from", "to", "kinds held out"});
+      head.insert(head.end(), {name + " (" + unit_of(c) + ")", "90 % from", "to", "types held out"});
     }
     for (std::size_t i = 0; i < rungs_.size(); ++i) {
       Json row = {rungs_[i]};
@@ -88,7 +88,7 @@ class ValidationPart {
     section_.add(table("What is left, rung by rung (rms)", head, std::move(rows)));
   }
 
-  /// Each flight held out, and beside it each kind of flight, to the same scale.
+  /// Adds two figures on the same scale: errors with each flight held out, and with each type of flight held out.
   void add_ladder(const std::string& kind, const std::vector<std::string>& channels) {
     double most = 0;
     Figure each{.id = "ladder_" + kind,
@@ -102,10 +102,10 @@ class ValidationPart {
                 .series = {}};
     Figure kinds = each;
     kinds.id = "ladder_kinds_" + kind;
-    kinds.title = "The same with every kind of flight held out";
+    kinds.title = "The same with every type of flight held out";
     kinds.note =
-        "All flights of a kind, those whose names differ by a number, under the fit to the other kinds; "
-        "where all are of one kind, under the fit to all.";
+        "All flights of a type (their names differ by a number), under the fit to the other types; "
+        "where all are of one type, under the fit to all.";
     for (std::size_t k = 0; k < channels.size(); ++k) {
       Series s{.name = channel_words(channels[k]),
                .draw = Draw::interval,
@@ -136,7 +136,7 @@ class ValidationPart {
     Figure f{.id = "controls",
              .title = "What each effect takes away, and copies of it at other times",
              .note =
-                 "Share of the rms that an effect takes away beside all others, in the channel where it takes "
+                 "Share of the rms that an effect takes away, jointly with all others, in the channel where it takes "
                  "most, in flights held out. The grey bar is the best of the copies of its part that were shifted "
                  "in time, and should be 0.",
              .x = {.title = "taken off the rms (%)"},
@@ -170,7 +170,7 @@ class ValidationPart {
     section_.add(f);
   }
 
-  /// Of the fit to all flights; null: none.
+  /// The estimate of a parameter by the fit to all flights; null where there is none.
   const gap::Estimate* estimate(const std::string& name) const {
     const auto at = std::ranges::find(estimates_, name, &gap::Estimate::name);
     return at == estimates_.end() ? nullptr : &*at;
@@ -183,18 +183,18 @@ class ValidationPart {
     const std::vector<gap::Validation::Agreement>& list = validation_.agreements;
     std::vector<std::string> differ;
     std::vector<std::pair<std::string, std::vector<const gap::Validation::Agreement*>>>
-        groups;  // of one effect and unit
+        groups;  // agreements with the same effect and unit
     Json rows = Json::array();
     for (std::size_t i = 0; i < list.size(); ++i) {
       const gap::Validation::Agreement& a = list[i];
       const std::string &name = a.name, unit = unit_of_magnitude(name);
       const std::string at = "/validation/agreements/" + std::to_string(i);
-      const bool one = !(a.p_value < kOneNumber);  // NaN where a flight says nothing of it
-      if (!one) differ.push_back(size_words(name, unit));
+      const bool one = !(a.p_value < kOneNumber);  // NaN where a flight does not determine the magnitude
+      if (!one) differ.push_back(magnitude_words(name, unit));
       const std::vector<double>& values = a.value;
       const auto [least, most] = std::ranges::minmax_element(values);
       const auto place = [&](auto found) { return at + "/value/" + std::to_string(found - values.begin()); };
-      rows.push_back({size_words(name, unit), cell(*least, place(least)), cell(*most, place(most)), in_print(unit),
+      rows.push_back({magnitude_words(name, unit), cell(*least, place(least)), cell(*most, place(most)), in_print(unit),
                       std::isnan(a.p_value) ? Json("–") : cell(a.p_value, at + "/p_value", 2),
                       one ? "one number" : "differs"});
       const std::string group = name.substr(0, name.find('.')) + "|" + unit;
@@ -210,17 +210,17 @@ class ValidationPart {
                      list.size() - differ.size(), list.size(),
                      (spoken_list(differ) + (differ.size() == 1 ? " differs" : " differ")).c_str()));
     for (std::size_t g = 0; g < groups.size(); ++g) add_agreement(g, groups[g].second);
-    section_.add(
-        table("Sizes from flight to flight", {"magnitude", "least", "most", "unit", "p", "verdict"}, std::move(rows),
-              format("p: that magnitudes which are one number differ so much; below %g they are taken to differ.",
-                     kOneNumber)));
+    section_.add(table(
+        "Magnitudes from flight to flight", {"magnitude", "least", "most", "unit", "p", "verdict"}, std::move(rows),
+        format("p: that magnitudes which are one number differ so much; below %g they are taken to differ.",
+               kOneNumber)));
   }
 
   void add_agreement(std::size_t g, const std::vector<const gap::Validation::Agreement*>& magnitudes) {
     const std::string &first = magnitudes.front()->name, unit = unit_of_magnitude(first);
     const std::string effect = spoken(first.substr(0, first.find('.')));
     Figure f{.id = "agreement_" + std::to_string(g + 1),
-             .title = magnitudes.size() == 1 ? size_words(first, unit) + ", flight by flight"
+             .title = magnitudes.size() == 1 ? magnitude_words(first, unit) + ", flight by flight"
                                              : effect + ", flight by flight",
              .note = "What each flight alone says, with its 90 % interval; dashed: the fit to all flights.",
              .x = {.title = "magnitude (" + (unit.empty() ? "-" : in_print(unit)) + ")"},
@@ -229,7 +229,7 @@ class ValidationPart {
              .series = {}};
     for (std::size_t k = 0; k < magnitudes.size(); ++k) {
       const std::string& name = magnitudes[k]->name;
-      const std::string words = size_words(name.substr(name.find('.') + 1), unit);
+      const std::string words = magnitude_words(name.substr(name.find('.') + 1), unit);
       const std::vector<double>&value = magnitudes[k]->value, &sd = magnitudes[k]->sd;
       Series s{.name = words,
                .draw = Draw::interval,
@@ -260,7 +260,7 @@ class ValidationPart {
   const gap::Validation& validation_;
   std::size_t flights_;
   std::vector<std::string> names_, rungs_, effects_, channels_;
-  std::vector<gap::Estimate> estimates_;  ///< of the fit to all flights
+  std::vector<gap::Estimate> estimates_;  ///< estimates by the fit to all flights
 };
 
 }  // namespace

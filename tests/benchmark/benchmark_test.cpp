@@ -29,7 +29,7 @@ const std::string kConfigs = FLAPPY_SOURCE_DIR "/configs/";
 /// Every effect is detectable at 0.2, or these alone, but the tether; hover hides the ceiling.
 std::string detectability(const std::vector<std::string>& only = {}) {
   std::string text = "schema = 1\n";
-  for (const model::EffectEntry& e : model::effects()) {
+  for (const model::CatalogueEffect& e : model::effects()) {
     const std::string id = e.info.id;
     text += "[" + id + "]\n";
     const bool left_out = id == "tether" || (!only.empty() && std::ranges::count(only, id) == 0);
@@ -273,8 +273,8 @@ TEST_F(Benchmark, PlansEveryPart) {
     EXPECT_GE(c.seed, 10'000'000U);
     EXPECT_LT(c.seed, 15'000'000U);
     for (const blind::BlindEffect& e : c.effects) {
-      if (c.part.starts_with("singles") || c.part == "pairs") EXPECT_DOUBLE_EQ(e.size, 0.4) << e.id;
-      if (c.part == "typical") EXPECT_DOUBLE_EQ(e.size, 1) << e.id;
+      if (c.part.starts_with("singles") || c.part == "pairs") EXPECT_DOUBLE_EQ(e.magnitude, 0.4) << e.id;
+      if (c.part == "typical") EXPECT_DOUBLE_EQ(e.magnitude, 1) << e.id;
       if (c.part != "hover") EXPECT_NE(e.id, "tether") << "undetectable, in " << c.part;
       EXPECT_EQ(e.id.starts_with("outside_"), c.part == "outside") << e.id;
     }
@@ -283,9 +283,9 @@ TEST_F(Benchmark, PlansEveryPart) {
       EXPECT_NE(model::group_of(c.effects[0].id), model::group_of(c.effects[1].id));
     }
     const bool harmless =
-        c.part == "none" || c.part == "parameters" || c.part == "own_figures" || c.part == "conventions";
+        c.part == "none" || c.part == "parameters" || c.part == "own_parameters" || c.part == "conventions";
     EXPECT_EQ(c.effects.empty(), harmless);
-    EXPECT_EQ(c.own_figures, !harmless || c.part == "own_figures") << c.part;
+    EXPECT_EQ(c.own_parameters, !harmless || c.part == "own_parameters") << c.part;
     EXPECT_EQ(c.conventions, (!harmless && c.part != "redeclared") || c.part == "conventions") << c.part;
     EXPECT_EQ(c.published, c.part == "parameters");
     EXPECT_EQ(c.withheld.empty(), c.part != "withheld");
@@ -293,16 +293,16 @@ TEST_F(Benchmark, PlansEveryPart) {
       EXPECT_EQ(std::ranges::count(c.withheld, "tether"), 1) << "of its group";
     if (c.part == "outside") {
       EXPECT_NE(c.effects[0].id, "outside_slosh") << "undetectable";
-      EXPECT_DOUBLE_EQ(c.effects[0].size, c.effects[0].id == "outside_vortex_ring" ? 3 : 2) << c.effects[0].id;
+      EXPECT_DOUBLE_EQ(c.effects[0].magnitude, c.effects[0].id == "outside_vortex_ring" ? 3 : 2) << c.effects[0].id;
     }
     EXPECT_EQ(c.power, c.part == "singles_current");
     EXPECT_EQ(c.hover, c.part == "hover");
   }
   // 29 effects in turn, 9 outside, one that hover hides
   const std::map<std::string, std::size_t> expected = {
-      {"singles", 116},     {"singles_current", 116}, {"redeclared", 100}, {"typical", 116},
-      {"none", 100},        {"parameters", 100},      {"withheld", 58},    {"outside", 54},
-      {"own_figures", 100}, {"conventions", 100},     {"pairs", 100},      {"hover", 100}};
+      {"singles", 116},        {"singles_current", 116}, {"redeclared", 100}, {"typical", 116},
+      {"none", 100},           {"parameters", 100},      {"withheld", 58},    {"outside", 54},
+      {"own_parameters", 100}, {"conventions", 100},     {"pairs", 100},      {"hover", 100}};
   EXPECT_EQ(count, expected);
   EXPECT_EQ(numbers.size(), plan.size());
   EXPECT_EQ(*numbers.rbegin(), plan.size());
@@ -336,7 +336,7 @@ TEST_F(Benchmark, FamilyAHasTheCatalogue) {
   std::set<std::string> own, catalogue;
   for (const blind::FamilyEffect& e : family_named("a").effects())
     if (in_catalogue(e)) own.insert(e.id);
-  for (const model::EffectEntry& e : model::effects()) catalogue.insert(std::string(e.info.id));
+  for (const model::CatalogueEffect& e : model::effects()) catalogue.insert(std::string(e.info.id));
   EXPECT_EQ(own, catalogue);
 }
 
@@ -474,7 +474,7 @@ TEST_F(Benchmark, RefusesWhatThereIsNot) {
             "flight 3: there is none of this number; accepted: 0, 1 and 2");
 }
 
-TEST_F(Benchmark, RefusesATableOfSizesThatIsNone) {
+TEST_F(Benchmark, RefusesATableOfMagnitudesThatIsNone) {
   const fs::path file = root_ / "detectable.toml";
   io::write_atomically(file, detectability() + "[no_such_effect]\ndetectable = 1\n");
   EXPECT_NE(test::refusal([&] { read_detectability(file, family_named("a")); }).find("no_such_effect"),
@@ -482,8 +482,9 @@ TEST_F(Benchmark, RefusesATableOfSizesThatIsNone) {
   std::string text = detectability();
   text.replace(text.find("detectable = 0.2"), 16, "detectable = 2.1");
   io::write_atomically(file, text);
-  EXPECT_NE(test::refusal([&] { read_detectability(file, family_named("a")); }).find("twice that is beyond size 4"),
-            std::string::npos);
+  EXPECT_NE(
+      test::refusal([&] { read_detectability(file, family_named("a")); }).find("twice that is beyond magnitude 4"),
+      std::string::npos);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// How large effects have to be, the robot's reset predictions of its own flights, and true sizes.
+// How large effects have to be, the robot's reset predictions of its own flights, and true magnitudes.
 #include "benchmark/detectability.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ using namespace blind;
 namespace {
 
 Case flown(const std::vector<BlindEffect>& effects) {
-  Case c{.vehicle = test::identified(), .sizes = Sizes(effects), .seed = 11};
+  Case c{.vehicle = test::identified(), .magnitudes = Magnitudes(effects), .seed = 11};
   c.declared_density_kg_m3 = c.vehicle.air_density_kg_m3;
   return c;
 }
@@ -61,7 +61,7 @@ TEST(ResetPrediction, KnowsItsOwnFlight) {
                                                   {{"battery_sag", 4}}}) {  // empty by as much as the trim took
     const Case c = flown(effects);
     const gap::ResetPrediction flight = predicted(c, 0);
-    const auto with = left(flight, {c.vehicle, c.sizes, c.seed}), without = left(flight, {c.vehicle, {}, c.seed});
+    const auto with = left(flight, {c.vehicle, c.magnitudes, c.seed}), without = left(flight, {c.vehicle, {}, c.seed});
     const auto noise = mean_rms(flight, flight.declared_noise(1));
     double worst = 0;
     for (std::size_t s = 0; s < 6; ++s) {
@@ -85,7 +85,7 @@ TEST(TrueValues, SensorsDoNotChangeTheFlight) {
   for (std::size_t k = 0; k < 22; ++k) EXPECT_EQ(f.truth[k], plain.truth[k]) << k;
 }
 
-// Effects whose size both sides state in the same units: the entry comes out as what was put in. Poses
+// Effects whose magnitude both sides state in the same units: the entry comes out as what was put in. Poses
 // are jittered by as much as a tenth of the delay.
 TEST(TrueValues, FindsWhatWasPutIn) {
   const auto uncertain =
@@ -125,8 +125,8 @@ TEST(FamilyDetectability, MeasuresByTheWeightAndTheWaveform) {
   EXPECT_NEAR(s.share, 0.05, 1e-9);
   EXPECT_EQ(s.channel, 2U);
   EXPECT_EQ(s.order, 0U);
-  EXPECT_NEAR(detectable_size(c, 2), kShare / 0.05, 1e-6);
-  EXPECT_EQ(detectable_size(c, 0.2), std::numeric_limits<double>::infinity());
+  EXPECT_NEAR(detectable_magnitude(c, 2), kShare / 0.05, 1e-6);
+  EXPECT_EQ(detectable_magnitude(c, 0.2), std::numeric_limits<double>::infinity());
   // in y, which has no signal of its own, a harmonic is measured by the waveform: (0.4^2 + 0.3^2)/2 has the root 0.35355
   c = hovering();
   for (std::size_t b = 0; b < c.change.size(); ++b) {

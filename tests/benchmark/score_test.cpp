@@ -159,7 +159,7 @@ TEST(Score, FalseAlarmsAndUnknownTruths) {
   std::vector<ScoredCase> cases = {judged("none", {}, "none", {}, 0.9),
                                    judged("none", {}, "parameters", {}, 0.9),
                                    judged("parameters", {}, "parameters", {}, 0.9),
-                                   judged("own_figures", {}, "unknown", {}, 0.9),
+                                   judged("own_parameters", {}, "unknown", {}, 0.9),
                                    judged("conventions", {}, "remainder", {"wind"}, 0.6),
                                    judged("withheld", {"wind"}, "unknown", {}, 0.9),
                                    judged("withheld", {"wind"}, "effect", {"body_drag"}, 0.79),
@@ -167,7 +167,7 @@ TEST(Score, FalseAlarmsAndUnknownTruths) {
                                    judged("outside", {"outside_slosh"}, "unknown", {}, 0.95)};
   EXPECT_DOUBLE_EQ(*main_score(cases, "false_alarm_none").value, 0);
   EXPECT_DOUBLE_EQ(*main_score(cases, "false_alarm_parameters").value, 0);
-  EXPECT_DOUBLE_EQ(*main_score(cases, "false_alarm_own_figures").value, 1);
+  EXPECT_DOUBLE_EQ(*main_score(cases, "false_alarm_own_parameters").value, 1);
   EXPECT_DOUBLE_EQ(*main_score(cases, "false_alarm_conventions").value, 1);
   EXPECT_DOUBLE_EQ(*main_score(cases, "unknown").value, 0.5);
   EXPECT_DOUBLE_EQ(*main_score(cases, "unknown_wrong").value, 0.25);

@@ -111,7 +111,7 @@ constexpr std::size_t kAffected = 51;
 model::Vehicle affected(std::size_t id) {
   model::Vehicle v = test::identified();
   std::size_t index = id;
-  for (const model::EffectEntry& e : model::effects()) {
+  for (const model::CatalogueEffect& e : model::effects()) {
     if (++index % 4 == 0) continue;
     for (const model::EffectParameter& p : e.parameters) v.effects[e.info.id][p.name] = p.typical;
     const model::EffectParameter& size = e.parameters[0];

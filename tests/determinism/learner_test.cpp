@@ -41,7 +41,7 @@ std::uint64_t hash(const Learner<T>& learner) {
 }
 
 template <class T>
-void train(Learner<T>& learner, const Replay& replay, int updates, const Companion& beside = {}) {
+void train(Learner<T>& learner, const Replay& replay, int updates, const ParallelWork& beside = {}) {
   for (int i = 0; i < updates; ++i) learner.update(replay, 3e-4, 1e-3, beside);
 }
 

@@ -441,18 +441,17 @@ TEST(Voltages, HaveNoControllerBesideThem) {
   const auto refused = [](const std::string& text) { return test::refusal([&] { task(text); }); };
   EXPECT_EQ(refused(voltages_task()), "accepted");
   const auto with = [&](const std::string& line) { return refused(voltages_task().insert(0, line + "\n")); };
-  EXPECT_EQ(
-      with("base = \"trim\""),
-      "task.toml:1:8: base: is \"trim\", but an action of kind \"voltages\" has no controller beside it; accepted: "
-      "no base, or \"controller\"");
+  EXPECT_EQ(with("base = \"trim\""),
+            "task.toml:1:8: base: is \"trim\", but an action of kind \"voltages\" has no controller; accepted: "
+            "no base, or \"controller\"");
   EXPECT_EQ(with("hand_back = {at_s = 1.0}"),
-            "task.toml:1:13: hand_back: is given, but an action of kind \"voltages\" has no controller beside it; "
+            "task.toml:1:13: hand_back: is given, but an action of kind \"voltages\" has no controller; "
             "accepted: a task without it");
   EXPECT_NE(refused(voltages_task("\"wings\"", "kind = \"settled\"")).find("start.kind: is \"settled\", but"),
             std::string::npos);
   for (const char* part : {"trim", "beat_phase"})
     EXPECT_NE(refused(voltages_task("\"" + std::string(part) + "\""))
-                  .find("observation: " + std::string(part) + " is of a controller or a wing beat"),
+                  .find("observation: " + std::string(part) + " belongs to a controller or a wing beat"),
               std::string::npos);
   const auto replaced = [&](const std::string& from, const std::string& to) {
     std::string text = voltages_task();

@@ -305,7 +305,8 @@ TEST(FlightLog, RefusesFaultyColumns) {
       "difference_V, bias_V, split_cycle, phase_rad");
   files["command.csv"] = "t_s,left_voltage_V,right_voltage_V,amplitude_V,bias_V\n0,0,0,0,0\n1,0,0,0,0\n";
   EXPECT_EQ(message([&] { flightlog::parse_flight_log(files, "log"); }),
-            "log/command.csv:1: difference_V, split_cycle: missing beside other inputs of the wing beat; accepted: all "
+            "log/command.csv:1: difference_V, split_cycle: missing, while other inputs of the wing beat are given; "
+            "accepted: all "
             "four or none");
 }
 

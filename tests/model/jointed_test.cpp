@@ -175,7 +175,7 @@ TEST(JointedFile, RefusesWhatNoWingDoes) {
   EXPECT_EQ(refused("[left.planform]", "[effects.battery_sag]\n[left.planform]"),
             "effects.battery_sag: acts on wings and motors of another kind of vehicle; accepted: effects of sensors");
   EXPECT_EQ(refused("[left.planform]", "[left.aerodynamics]\nstrips_m = [[0.01, 0.01, 0.02, 0.0]]\n[left.planform]"),
-            "left.planform: beside strips says nothing; accepted: [planform] or [aerodynamics]");
+            "left.planform: has no use where strips are given; accepted: [planform] or [aerodynamics]");
   EXPECT_EQ(test::refusal([] {
               model::read_vehicle(test::source_path("configs/vehicles/hummingbird_driven.toml"));
             }).find("model: wings whose angles are driven have no motors; accepted:") != std::string::npos,

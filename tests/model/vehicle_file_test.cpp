@@ -22,7 +22,7 @@ using Figures = std::map<std::string, double>;
 
 std::string known_effects() {
   std::string list;
-  for (const EffectEntry& e : effects()) list += (list.empty() ? "" : ", ") + std::string(e.info.id);
+  for (const CatalogueEffect& e : effects()) list += (list.empty() ? "" : ", ") + std::string(e.info.id);
   return list;
 }
 
@@ -442,7 +442,7 @@ TEST_F(VehicleFile, FillsInEffects) {
   const std::map<std::string, Figures> expected = {{"body_drag", {{"drag_area_m2", 0.002}, {"centre_z_m", 0}}},
                                                    {"ground_effect", {{"gain", 0.15}, {"length_m", 0.06}}}};
   EXPECT_EQ(v.effects, expected);
-  for (const EffectEntry& e : effects())
+  for (const CatalogueEffect& e : effects())
     for (const EffectParameter& p : e.parameters) {
       EXPECT_LE(p.low, p.typical) << p.name;
       EXPECT_LE(p.typical, p.high) << p.name;

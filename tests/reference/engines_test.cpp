@@ -172,7 +172,7 @@ double our_mean_thrust_N(double step_s, double volts) {
   return (batch.held_impulse(0).force_N_s[2] - before) / 0.5;
 }
 
-TEST(MeanThrust, IsThatOfMujoco) {
+TEST(BeatAveragedThrust, IsThatOfMujoco) {
   constexpr double kStep_s = 1e-5;
   const std::pair<double, double> published[] = {
       {6, 0.052777}, {8, 0.087992}, {10, 0.126087}, {12, 0.166247}, {14, 0.207997}};
@@ -188,7 +188,7 @@ TEST(MeanThrust, IsThatOfMujoco) {
   }
 }
 
-TEST(MeanThrust, IsWhereDartTends) {
+TEST(BeatAveragedThrust, IsWhereDartTends) {
   // first order again: 0.07 % at 10 us, from which 20 us is as far as zero
   const auto dart = [](double step_s) {
     return mean_thrust_N(DartPeer(test::nominal(), {.step_s = step_s, .torso_welded = true}), step_s, 10);
@@ -198,7 +198,7 @@ TEST(MeanThrust, IsWhereDartTends) {
   EXPECT_NEAR((2 * fine - dart(2e-5)) / ours, 1, 2e-4);
 }
 
-TEST(MeanThrust, OfThePublishedDartIsItsSettings) {
+TEST(BeatAveragedThrust, OfThePublishedDartIsItsSettings) {
   constexpr double kStep_s = 1e-4;
   const PeerOptions welded{.step_s = kStep_s, .torso_welded = true};
   const io::CsvTable map = io::read_csv(test::source_path("tests/data/trajectories/force_map_dart.csv"));

@@ -101,10 +101,10 @@ TEST(Mujoco, FliesWithinItsReboundAfterwards) {
 // ---- torso welded
 
 /// Mean upward force, and moment about the vehicle's centre of mass with level wings, over 17 beats from 1 s.
-struct MeanWrench {
+struct BeatAveragedWrench {
   double thrust_N, roll_Nm, pitch_Nm, yaw_Nm;
 };
-MeanWrench mean_wrench(const sim::Input& input, double step_s) {
+BeatAveragedWrench mean_wrench(const sim::Input& input, double step_s) {
   const model::Vehicle v = test::nominal();
   double mass = v.torso.mass_kg;
   Vector c = {mass * v.torso.com_m.x, mass * v.torso.com_m.y, mass * v.torso.com_m.z};
@@ -134,7 +134,7 @@ MeanWrench mean_wrench(const sim::Input& input, double step_s) {
 
 constexpr double kDefaultStep_s = sim::kDefaultStep_s, kFineStep_s = 2e-5;
 
-TEST(Published, MeanThrust) {
+TEST(Published, BeatAveragedThrust) {
   // soft stops lift 0.2 % more than hard ones; our own step takes another 0.1 % at 100 us
   const std::pair<double, double> published[] = {
       {6, 0.052777}, {8, 0.087992}, {10, 0.126087}, {12, 0.166247}, {14, 0.207997}};
@@ -150,7 +150,7 @@ TEST(Published, MeanThrust) {
 TEST(Published, TorquePerInput) {
   // DART at 20 us. Its implicit spring damps by 0.93 % of thrust there, which is 0.4 to 0.8 % of these
   // torques.
-  const MeanWrench none = mean_wrench({.amplitude_V = 10}, kFineStep_s);
+  const BeatAveragedWrench none = mean_wrench({.amplitude_V = 10}, kFineStep_s);
   const double roll = mean_wrench({.amplitude_V = 10, .difference_V = 1}, kFineStep_s).roll_Nm - none.roll_Nm;
   const double pitch = mean_wrench({.amplitude_V = 10, .bias_V = 1}, kFineStep_s).pitch_Nm - none.pitch_Nm;
   const double yaw = mean_wrench({.amplitude_V = 10, .split_cycle = 0.1}, kFineStep_s).yaw_Nm - none.yaw_Nm;
@@ -204,7 +204,7 @@ TEST(Dart, MapsForcesAsWeDoButForItsDamping) {
   const auto at = [&](const char* column, std::size_t row) { return map.column(column)[row]; };
   for (std::size_t row = 0; row < map.column("amplitude_V").size(); ++row) {
     const sim::Input u{at("amplitude_V", row), at("difference_V", row), at("bias_V", row), at("split_cycle", row)};
-    const MeanWrench w = mean_wrench(u, kDefaultStep_s);
+    const BeatAveragedWrench w = mean_wrench(u, kDefaultStep_s);
     const auto ratio = [&](double ours, const char* column) { return ours / at(column, row); };
     EXPECT_NEAR(ratio(w.thrust_N, "thrust_N"), 1 + 0.0495 * std::sqrt(10 / u.amplitude_V), 0.003) << row;
     if (u.difference_V != 0) EXPECT_NEAR(ratio(w.roll_Nm, "roll_Nm"), 1.02, 0.01) << row;

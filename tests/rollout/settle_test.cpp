@@ -168,7 +168,7 @@ TEST(HandBack, PaysAtTheGoalAndOnceForArrivingAndForKeepingIt) {
 
 /// One that has every effect but the tether, whose line would be a kilometre long here.
 model::Vehicle affected(model::Vehicle v) {
-  for (const model::EffectEntry& e : model::effects())
+  for (const model::CatalogueEffect& e : model::effects())
     if (e.info.id != std::string_view("tether")) v.effects[e.info.id] = {};
   return v;
 }

@@ -40,17 +40,17 @@ endif()
 # A robot of a family, A by the interface that all have; what there is not.
 run(effects --family a)
 expect_match("effects of a family" "${out}" "^ground_effect +Hayden.*\noutside_mocap_lens +[^\n]+\n$")
-run(fly --family a --hover --own-figures --conventions --seed 1 --out ${WORK}/family --json ${WORK}/family.json)
+run(fly --family a --hover --own-parameters --conventions --seed 1 --out ${WORK}/family --json ${WORK}/family.json)
 expect_equal("exit code of fly --family: ${err}" "${code}" 0)
 expect_keys(${WORK}/family.json family=STRING seed=NUMBER draw=NUMBER crashes=ARRAY flights=ARRAY)
 expect_refused("--family d: no such family; accepted: a, b or c" fly --family d --seed 1 --out ${WORK}/c)
-expect_refused("--randomise: draws robots without --family; accepted: --own-figures"
+expect_refused("--randomise: draws robots without --family; accepted: --own-parameters"
   fly --family a --randomise x.toml --seed 1 --out ${WORK}/c)
-expect_refused("--own-figures, --conventions: are of a family; accepted: with --family" fly --conventions --seed 1 --out ${WORK}/c)
+expect_refused("--own-parameters, --conventions: are of a family; accepted: with --family" fly --conventions --seed 1 --out ${WORK}/c)
 
 expect_refused("--effect wnd: no such effect; accepted: what `flappy-blind effects` lists; did you mean \"wind\"?"
   ${fly} --effect wnd=1 --out ${WORK}/c)
-expect_refused("--effect wind: no size; accepted: ID=SIZE, as ground_effect=1" ${fly} --effect wind --out ${WORK}/c)
+expect_refused("--effect wind: no magnitude; accepted: ID=MAGNITUDE, as ground_effect=1" ${fly} --effect wind --out ${WORK}/c)
 file(GLOB left ${WORK}/c*)
 expect_equal("files left by a refusal" "${left}" "")
 file(WRITE ${WORK}/note.txt "")
@@ -79,7 +79,7 @@ expect_refused("oracle: has another name now; accepted: detectability" oracle --
 
 # Before hours of work, not after.
 expect_refused("--family d: no such family; accepted: a, b or c" make --family d --set development --out ${WORK}/c)
-expect_refused("flappy-blind: --part: nonsense not in {singles,singles_current,redeclared,typical,none,parameters,own_figures,conventions,withheld,outside,pairs,hover}; see flappy-blind --help"
+expect_refused("flappy-blind: --part: nonsense not in {singles,singles_current,redeclared,typical,none,parameters,own_parameters,conventions,withheld,outside,pairs,hover}; see flappy-blind --help"
   make --set development --part nonsense --out ${WORK}/c)
 expect_refused("${WORK}/gone/sizes.toml: cannot be written: No such file or directory"
   detectability --family a --vehicle ${vehicle} --out ${WORK}/gone/sizes.toml)

@@ -53,7 +53,7 @@ file(WRITE ${WORK}/flights/hummingbird_identified.toml "schema = 1\n")
 expect_refused("${WORK}/flights/0000/../hummingbird_identified.toml: is not the file that ${WORK}/flights/0000 was flown with (SHA-256); accepted: that file, or any by --vehicle"
   transitions ${flights})
 file(REMOVE ${WORK}/flights/hummingbird_identified.toml)
-expect_refused("${WORK}/flights/0000: its vehicle hummingbird_identified.toml is neither in it nor beside it; accepted: one of these, or --vehicle"
+expect_refused("${WORK}/flights/0000: its vehicle hummingbird_identified.toml is neither in it nor next to it; accepted: one of these, or --vehicle"
   transitions ${flights})
 run(transitions ${flights} --vehicle ${vehicles}/hummingbird_nominal.toml --every 50)
 expect_equal("another vehicle" "${code}" 0)

@@ -123,7 +123,7 @@ TEST(Composed, RefusesWhatDoesNotFit) {
               options.goal_m = {0, 0, 0};
               composed({diagnosis}, options, packing);
             }),
-            "--goal and --vehicle are of flights, and none is given; accepted: a flight log beside them");
+            "--goal and --vehicle describe flights, and no flight is given; accepted: a flight log, too");
   io::write_atomically(folder.path() / "half.json", R"({"schema": 2, "verdict": {}, "hypotheses": [], "where": []})");
   EXPECT_EQ(
       refusal([&] { composed({folder.path() / "half.json"}, {}, packing); }),
@@ -347,7 +347,7 @@ Json by_the_beat() {
                             {"harmonic", 0},
                             {"function", "right_flap velocity_y"},
                             {"regime", "velocity"},
-                            {"times_usual", 3.0},
+                            {"times_prior_scale", 3.0},
                             {"gain_nats", 7.0}}}}};
   json["closed_loop"] = Json::array();
   json["next_experiment"] = nullptr;
@@ -406,7 +406,7 @@ TEST(DiagnosisSection, TellsWhatALaboratoryAsks) {
   const std::string words = words_of(section);
   const auto says = [&](const std::string& text) { return words.find(text) != std::string::npos; };
   EXPECT_TRUE(
-      says("forward force from 2 to 0.5 m/s² (90 %: 0.45 to 0.55; 0.75 where all flights of a kind are held "
+      says("forward force from 2 to 0.5 m/s² (90 %: 0.45 to 0.55; 0.75 where all flights of a type are held "
            "out)"))
       << words;
   EXPECT_TRUE(says("each takes 75 % or more off the rms where it takes most, its shifted copies 1 % at best")) << words;
@@ -438,9 +438,9 @@ TEST(DiagnosisSection, DrawsNoBeatWhereNoneIsKnown) {
 }
 
 TEST(Words, AreWithoutUnits) {
-  EXPECT_EQ(size_words("stroke_plane_actuation.shift_m_s2", "m/s^2"), "stroke plane actuation (shift)");
-  EXPECT_EQ(size_words("translational_lift.gain_per_m", "1/m"), "translational lift (gain)");
-  EXPECT_EQ(size_words("battery_thrust.gain", ""), "battery thrust (gain)");
+  EXPECT_EQ(magnitude_words("stroke_plane_actuation.shift_m_s2", "m/s^2"), "stroke plane actuation (shift)");
+  EXPECT_EQ(magnitude_words("translational_lift.gain_per_m", "1/m"), "translational lift (gain)");
+  EXPECT_EQ(magnitude_words("battery_thrust.gain", ""), "battery thrust (gain)");
 }
 
 TEST(EvaluationSection, TellsWhatTheJsonHas) {

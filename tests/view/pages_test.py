@@ -415,9 +415,9 @@ def main() -> None:
         check_cases(browser)
         check_screen(browser, "benchmark")
 
-        browser.open(report("reported", SOURCE / "docs" / "blind_reported.csv"))
+        browser.open(report("reported", SOURCE / "docs/results/blind_reported.csv"))
         check_page(browser, "reported benchmark")
-        rows = len((SOURCE / "docs" / "blind_reported.csv").read_text().splitlines()) - 1
+        rows = len((SOURCE / "docs/results/blind_reported.csv").read_text().splitlines()) - 1
         told = browser.run("return document.querySelector('.cases').textContent")
         assert f"{rows} of {rows} cases" in told, told[:200]
 
@@ -431,7 +431,7 @@ def main() -> None:
         assert browser.run("return document.querySelectorAll('nav a').length") == 3
     for picture in (SOURCE / "docs" / "pictures").glob("*.png"):
         assert picture.stat().st_size <= 300_000, f"{picture} is too large"
-        assert any(f"pictures/{picture.name}" in text.read_text() for text in (SOURCE / "README.md", *(SOURCE / "docs").glob("*.md"))), f"{picture} is nowhere shown"
+        assert any(f"pictures/{picture.name}" in text.read_text() for text in (SOURCE / "README.md", *(SOURCE / "docs").rglob("*.md"))), f"{picture} is nowhere shown"
     print("all pages are as they should be")
 
 

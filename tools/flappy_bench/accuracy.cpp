@@ -15,7 +15,7 @@ sim::Batch<double> one_flapper(const model::Vehicle& vehicle, double step_s, sim
   return batch;
 }
 
-/// Rms of the difference of the angles of both wings.
+/// Rms difference of the angles of both wings.
 double apart_rad(const std::vector<std::array<double, 2>>& a, const std::vector<std::array<double, 2>>& b) {
   double sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i)
@@ -61,7 +61,7 @@ double mean_thrust_N(const model::Vehicle& vehicle, double step_s) {
 double distance_m(const Flight& a, const Flight& b) { return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m, a.z_m - b.z_m); }
 
 double turn_rad(const Flight& a, const Flight& b) {
-  double minus = 0, plus = 0;  // q and -q are one attitude
+  double minus = 0, plus = 0;  // q and -q are the same attitude
   for (std::size_t i = 0; i < 4; ++i) {
     minus += std::pow(a.attitude[i] - b.attitude[i], 2);
     plus += std::pow(a.attitude[i] + b.attitude[i], 2);

@@ -1,4 +1,4 @@
-// What a step costs in accuracy: our step, and the integrators it was chosen from.
+// Accuracy against step size, for our step and for the integrators that it was chosen from.
 #pragma once
 
 #include <array>
@@ -15,9 +15,9 @@ inline constexpr double kConvergedThrust_N = 0.1258;
 
 /// 0.3 s of free flight at 10 V from rest.
 struct Flight {
-  double x_m, y_m, z_m;                             // torso's centre of mass at its end, in W
-  std::array<double, 4> attitude;                   // at its end: w, x, y, z
-  std::vector<std::array<double, 2>> stroke_rad{};  // every millisecond, left and right; none of the other integrators
+  double x_m, y_m, z_m;                             // torso's centre of mass at the end, in W
+  std::array<double, 4> attitude;                   // at the end: w, x, y, z
+  std::vector<std::array<double, 2>> stroke_rad{};  // every millisecond, left and right; only of our step
   std::vector<std::array<double, 2>> rotation_rad{};
 };
 
@@ -25,12 +25,12 @@ Flight free_flight(const model::Vehicle& vehicle, double step_s);
 /// Mean upward aerodynamic force over 17 beats from 1 s, torso welded, 10 V, N.
 double mean_thrust_N(const model::Vehicle& vehicle, double step_s);
 double distance_m(const Flight& a, const Flight& b);
-/// Angle of the turn from one attitude to the other.
+/// Angle of the rotation between the final attitudes.
 double turn_rad(const Flight& a, const Flight& b);
 
 struct StepRow {
   double step_s, position_error_m, attitude_error_rad;
-  double stroke_error_rad, rotation_error_rad;  // of both wings, rms over the flight
+  double stroke_error_rad, rotation_error_rad;  // rms over both wings and the flight
   double thrust_N;
 };
 /// Our step from 500 to 5 us; errors against our own 5 us run.
@@ -39,7 +39,7 @@ std::vector<StepRow> step_study(const model::Vehicle& vehicle);
 struct IntegratorRow {
   std::string integrator;
   double step_s;
-  int evaluations;  // of the equations of motion in 0.3 s; those for the stops are not counted
+  int evaluations;  // of the equations of motion in 0.3 s, without those for the stops
   double position_error_m, attitude_error_rad;
 };
 /// Integrators at several steps; errors against our 1 us run.

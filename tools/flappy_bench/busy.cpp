@@ -24,14 +24,14 @@ double wall_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/// Of all threads of this process.
+/// Processor time of all threads of this process, s.
 double all_processor_seconds() {
   timespec t;
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-/// A process that never rests on each processor that this one may use.
+/// Runs a busy process on each processor that this process may use.
 class BusyLoops {
  public:
   BusyLoops() {
@@ -65,10 +65,10 @@ class BusyLoops {
 struct Part {
   std::string name, unit;
   int threads;
-  std::function<double()> work;  ///< does some, and says how much
+  std::function<double()> work;  ///< does some work and returns its amount
 };
 
-/// Physics alone: 4,096 flappers by control periods.
+/// Physics alone: 4,096 flappers, stepped by control periods.
 Part batch(const model::Vehicle& vehicle, int threads) {
   const sim::BatchOptions options{.threads = threads};
   const auto flock = std::make_shared<sim::Batch<float>>(4096, vehicle, options);
@@ -90,7 +90,7 @@ std::shared_ptr<flight::Fleet<float>> hovering_fleet(const model::Vehicle& vehic
   return std::make_shared<flight::Fleet<float>>(1024, vehicle, o);
 }
 
-/// As an evaluation flies.
+/// The closed loop, as in an evaluation.
 Part closed_loop(const model::Vehicle& vehicle, const std::string& configs, int threads) {
   return {"closed loop", "control steps", threads, [fleet = hovering_fleet(vehicle, configs, threads)] {
             for (int i = 0; i < 20; ++i) fleet->step();
@@ -98,7 +98,7 @@ Part closed_loop(const model::Vehicle& vehicle, const std::string& configs, int 
           }};
 }
 
-/// As configs/train/escape.toml has it: six updates while every flapper does an action of five control periods.
+/// Training as in configs/train/escape.toml: six updates while every flapper flies one action of five control periods.
 Part training(const model::Vehicle& vehicle, const std::string& configs, const learn::Replay& replay, int threads) {
   learn::LearnerOptions o = learner_options({128, 128}, 256, true);
   o.threads = io::thread_count(threads);

@@ -1,4 +1,4 @@
-// What others that hold the processors cost: work per second of processor time beside a busy loop on each, and without.
+// Cost of other processes: work per second of processor time with a busy loop on each processor, and without.
 #pragma once
 
 #include <functional>
@@ -13,9 +13,9 @@ namespace flappy::bench {
 struct BusyRow {
   std::string part, unit;
   int threads;                     ///< 0: automatic
-  Figure quiet_per_s, busy_per_s;  ///< second of processor time, all threads
+  Figure quiet_per_s, busy_per_s;  ///< work per second of processor time, summed over threads
   Figure processor_ratio,
-      wall_ratio;  ///< busy over quiet, pair by pair: work per second of processor time, and of time
+      wall_ratio;  ///< busy over quiet, pair by pair, for work per second of processor time and of wall time
 };
 
 /// `progress(done, total)` is called between measurements.

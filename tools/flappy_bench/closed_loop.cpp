@@ -10,7 +10,7 @@ constexpr double kControl_hz = 500;
 
 io::Table table(const std::string& path) { return io::Config::load(path).root(); }
 
-/// An actor of the usual size that does nothing: its weights are zero, its time is not.
+/// An actor of the usual size with zero weights: it costs its time and does not act.
 std::shared_ptr<const policy::Actor> idle_actor(const flight::Task& task) {
   auto actor = std::make_shared<policy::Actor>();
   const int inputs = static_cast<int>(task.observation().size());
@@ -29,9 +29,9 @@ class Loop {
        const std::string& controller, bool actor)
       : fleet_(kFlappers, vehicle, hovering(configs, sensors, controller)) {
     if (actor) fleet_.set_actor(idle_actor(fleet_.options().task));
-    for (int i = 0; i < 300; ++i) fleet_.step();  // 0.6 s: everyone is in the air
+    for (int i = 0; i < 300; ++i) fleet_.step();  // 0.6 s: all flappers are in the air
   }
-  /// Control steps per second over `seconds` of computing.
+  /// Control steps per second over `seconds` of processor time.
   double run(double seconds) {
     double spent = 0;
     long ticks = 0;

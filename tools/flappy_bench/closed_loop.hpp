@@ -16,15 +16,15 @@ struct LoopRow {
 };
 
 struct LoopReport {
-  std::vector<LoopRow> rows;                           ///< the first is what the figure is about
-  std::vector<std::pair<std::string, double>> shares;  ///< of each stage in the first row's time
-  std::size_t bytes_per_flapper = 0;                   ///< beyond those of the body
+  std::vector<LoopRow> rows;                           ///< the first is the reported one
+  std::vector<std::pair<std::string, double>> shares;  ///< share of each stage in the time of the first row
+  std::size_t bytes_per_flapper = 0;                   ///< memory in addition to the body's state
 };
 
-/// A fleet that hovers with sensors, task and controller of `configs`, on one thread.
+/// Options of a fleet that hovers with the sensors, task and controller of `configs`, on one thread.
 flight::FleetOptions hovering(const std::string& configs, const std::string& sensors, const std::string& controller);
 
-/// Hovering flappers with the sensors, task and controllers of `configs`; one core, float.
+/// Measures hovering flappers with the sensors, task and controllers of `configs`, on one core, in float.
 LoopReport measure_closed_loop(const model::Vehicle& vehicle, const std::string& configs, const SpeedOptions& options);
 
 }  // namespace flappy::bench

@@ -32,7 +32,7 @@ Job read_job(const std::filesystem::path& path, const std::vector<std::string>& 
   root.accept({"schema", "vehicle", "precision", "count", "seed", "duration_s", "input", "randomisation", "step_s",
                "threads", "world"});
   const model::Vehicle vehicle = model::read_flyable_vehicle(root.file("vehicle"));
-  // a vehicle without motors mixes any numbers
+  // a vehicle without motors has no voltage limits
   const bool undriven = vehicle.beat_averaged || vehicle.jointed;
   const model::Driver d = undriven ? model::Driver{0, 0, 1e6, 1e6, 1e6, 1e6} : vehicle.driver;
   Job job{vehicle,
@@ -70,7 +70,7 @@ nlohmann::ordered_json fly(const Job& job) {
     batch.set_vehicle(i, job.randomisation.sample({.seed = job.seed, .flapper = static_cast<std::uint32_t>(i)}));
     batch.set_input(i, job.input);
   }
-  constexpr int kPeriod = 20;  // plausibility and contact are looked at this often
+  constexpr int kPeriod = 20;  // steps between the checks of plausibility and contact
   const int steps = static_cast<int>(std::lround(job.duration_s / job.options.step_s));
   const auto start = std::chrono::steady_clock::now();
   for (int done = 0; done < steps; done += kPeriod) batch.step(std::min(kPeriod, steps - done));

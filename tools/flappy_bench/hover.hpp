@@ -1,4 +1,4 @@
-// A batch of flappers at one input for a while: the main job until there is training.
+// Flies a batch of flappers at one constant input.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,7 @@
 
 namespace flappy::bench {
 
-/// Flies the batch that `config` describes, prints a summary, and returns it.
+/// Flies the batch of `config`, prints a summary, and returns it.
 nlohmann::ordered_json fly_batch(const std::filesystem::path& config, const std::vector<std::string>& overrides);
 
 }  // namespace flappy::bench

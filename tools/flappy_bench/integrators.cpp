@@ -1,10 +1,10 @@
 // The integrators our step was chosen from, on the same equations of motion, in double:
-//   old rates  the same leapfrog, but what depends on rates is taken at those of the step's start
+//   old rates  the same leapfrog, but terms that depend on rates use the rates at the start of the step
 //   midpoint   Runge-Kutta of order 2, two evaluations a step
 //   RK4        the classical one, four evaluations a step
-// Within a Runge-Kutta step a hinge that its stop holds at the start stays, and the others know no stop; after it, a hinge
-// beyond its stop is put back and its rate taken away with the impulse that the coupled bodies feel. So an impact is up to
-// a step late, and no order shows there. Dry friction is that of an infinitesimal step.
+// Within a Runge-Kutta step, a hinge that its stop holds at the start stays there; the other hinges have no stop. After the step, a hinge
+// beyond its stop is put back, and its rate is removed by an impulse that also acts on the coupled bodies. An impact is therefore up to a
+// step late, which hides the order of the integrator. Dry friction is that of an infinitesimal step.
 #include <cmath>
 #include <cstdlib>
 #include <functional>
@@ -23,14 +23,14 @@ constexpr double kInstant_s = 1e-9;
 constexpr double kGravity_m_s2 = 9.81;
 constexpr double kOutOfReach_rad = 1e3;
 
-/// State with the centre of mass as position, so that all of it is integrated alike.
+/// State with the centre of mass as position, so that all its parts are integrated alike.
 struct Flapper {
   V com_m, com_velocity, body_rate;
   Quaternion<double> q;
   double angle[4], rate[4];  // psi left, right, theta left, right
 };
 
-/// Rates of everything: what a Runge-Kutta step adds up.
+/// Time derivative of a Flapper, which Runge-Kutta steps add up.
 struct Rates {
   V com_m, com_velocity, body_rate;
   Quaternion<double> q;
@@ -73,7 +73,7 @@ Result evaluate(const Parameters<double>& p, const Flapper& f, double volts, dou
           p.inverse_mass_1_kg * (R * drive.force) - V{0, 0, kGravity_m_s2}};
 }
 
-/// New hinge rates of a motion over `step_s`, as psi and theta.
+/// Hinge rates (psi, theta) after a motion over `step_s`.
 void hinge_rates(const Motion<double>& m, double step_s, double (&rate)[4]) {
   rate[0] = m.stroke_left / step_s, rate[1] = -m.stroke_right / step_s;
   rate[2] = m.rotation_left / step_s, rate[3] = m.rotation_right / step_s;
@@ -131,8 +131,8 @@ Parameters<double> with_stops(Parameters<double> p, const Stops& s) {
   return p;
 }
 
-/// What the stages of one step see: stops closed on the hinges that they hold, and out of reach of the others, because an
-/// infinitesimal step would throw back a stage beyond its stop at once.
+/// Parameters for the stages of one step: stops are closed on the hinges that they hold, and out of reach for the others, because an
+/// infinitesimal step would at once push back a stage beyond its stop.
 Parameters<double> within_step(const Parameters<double>& p, const Flapper& f, double volts) {
   Stops s = stops_of(p);
   double next[4];
@@ -145,7 +145,7 @@ Parameters<double> within_step(const Parameters<double>& p, const Flapper& f, do
   return with_stops(p, s);
 }
 
-/// Puts hinges back on their stops, with the impulse that takes their rate.
+/// Puts hinges back on their stops, with the impulse that removes their rate.
 void stop_hinges(const Parameters<double>& p, Flapper& f, double volts) {
   const Stops s = stops_of(p);
   bool hit = false;
@@ -205,7 +205,7 @@ Flight fly(const model::Vehicle& vehicle, const Integrator& integrate, const Par
 std::vector<IntegratorRow> integrator_study(const model::Vehicle& vehicle) {
   struct Candidate {
     const char* name;
-    Integrator integrate;  // none: our step itself
+    Integrator integrate;  // null: our step itself
     bool implicit_damping;
     int evaluations;
   };

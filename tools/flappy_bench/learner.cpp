@@ -17,21 +17,22 @@ using learn::LearnerOptions;
 using learn::Replay;
 
 constexpr learn::TransitionShape kShape{24, 4};
-constexpr std::size_t kTransitions = 200'000;  // more than the caches hold
+constexpr std::size_t kTransitions = 200'000;  // larger than the caches
 constexpr double kRate = 1e-4;
 
 double wall_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/// Weights between the layers of a network, biases included: what one sample's forward pass multiplies.
+/// Number of weights of a network with biases, which equals the multiply-adds of a forward pass of one sample.
 double weights(int inputs, const std::vector<int>& hidden, int outputs) {
   double sum = 0;
   for (const int w : hidden) sum += (inputs + 1.0) * w, inputs = w;
   return sum + (inputs + 1.0) * outputs;
 }
 
-/// A forward pass uses each weight once; gradients by weights once more; slopes by inputs again, but for a first layer.
+/// Each weight is used once in a forward pass, once for the gradient by weights, and, except in the first layer, once for the gradient
+/// by inputs.
 double multiply_adds(const LearnerOptions& o) {
   const int in = o.shape.observation, critic_in = in + o.shape.action, critics = o.twin ? 2 : 1;
   const double actor = weights(in, o.actor_hidden, o.shape.action), critic = weights(critic_in, o.critic_hidden, 1);

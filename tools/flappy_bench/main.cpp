@@ -1,4 +1,4 @@
-// flappy-bench: speed beside DART, MuJoCo and LibTorch, accuracy against step size, and a batch to look at.
+// flappy-bench: speed compared with DART, MuJoCo and LibTorch, accuracy against step size, and the flight of a batch.
 #include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -64,7 +64,7 @@ Json speed(const model::Vehicle& vehicle, const SpeedOptions& options) {
   for (const auto& size : report.sizes)
     std::printf("  %6zu flappers: %.2f ns per flapper and step [%.2f .. %.2f]\n", size.flappers,
                 size.ns_per_step.median, size.ns_per_step.low, size.ns_per_step.high);
-  if (report.frozen > 0) std::printf("  %zu flappers froze: figures are not to be trusted\n", report.frozen);
+  if (report.frozen > 0) std::printf("  %zu flappers froze: do not trust these results\n", report.frozen);
 
   const Operations ops = count_operations();
   const double peak = peak_multiply_adds_per_s(), roof = peak / static_cast<double>(ops.on_multiply_pipes());
@@ -156,11 +156,11 @@ Json convergence(const model::Vehicle& vehicle) {
     }
   }
   Json effects = Json::array();
-  std::printf("the same at 6 to 12 V with an effect of typical size, 64 vehicles\n");
+  std::printf("the same at 6 to 12 V with an effect of typical magnitude, 64 vehicles\n");
   std::printf("  %-24s %8s %10s %13s %10s\n", "", "step us", "torso mm", "attitude deg", "thrust");
-  for (const model::EffectEntry& effect : model::effects()) {
+  for (const model::CatalogueEffect& effect : model::effects()) {
     const std::vector<double> at = {sim::kDefaultStep_s, 100e-6};
-    // a delay is kept in steps, of which there are not enough for finer ones
+    // the memory of a delay has a fixed number of steps, too few for a finer step
     const double exact_step_s = effect.info.id == std::string("command_delay") ? 40e-6 : 5e-6;
     const std::vector<Errors> errors =
         errors_of(vehicle, {.flights = 64, .high_V = 12, .effect = effect.info.id, .exact_step_s = exact_step_s}, at);
@@ -189,7 +189,7 @@ Json convergence(const model::Vehicle& vehicle) {
   return {{"steps", steps}, {"many_flights", many}, {"effects", effects}, {"integrators", integrators}};
 }
 
-/// The fastest row of an engine that is near enough.
+/// The fastest row of an engine with an error of at most `enough_m`.
 std::optional<WorkPrecisionRow> fastest(const std::vector<WorkPrecisionRow>& rows, const std::string& engine,
                                         double enough_m) {
   std::optional<WorkPrecisionRow> best;
@@ -293,9 +293,8 @@ Json busy(const model::Vehicle& vehicle, const SpeedOptions& options) {
     progress.show(static_cast<double>(done) / total);
   });
   progress.clear();
-  std::printf(
-      "work per second of processor time beside a busy loop on each of %d processors, median of %d [range], %s\n",
-      io::processors(), options.rounds, sim::best_instruction_set().c_str());
+  std::printf("work per second of processor time with a busy loop on each of %d processors, median of %d [range], %s\n",
+              io::processors(), options.rounds, sim::best_instruction_set().c_str());
   std::printf("  %-12s %-14s %10s %12s %12s %24s %14s\n", "", "", "threads", "quiet", "busy", "busy / quiet",
               "in wall time");
   Json list = Json::array();
@@ -383,7 +382,7 @@ int main(int argc, char** argv) {
       app.command("convergence", "error against step size, and against work for other integrators");
   io::Command work_precision =
       app.command("work-precision", "error against processor time of our step, MuJoCo and DART");
-  io::Command learner = app.command("learner", "updates per second of the learner, beside LibTorch");
+  io::Command learner = app.command("learner", "updates per second of the learner, and of LibTorch");
   io::Command engines =
       app.command("engines", "training on lanes and on LibTorch: start, memory, updates/s, time to 90 %");
   int seeds = 5;
@@ -400,7 +399,7 @@ int main(int argc, char** argv) {
   std::vector<std::string> overrides;
   batch.option("config", config, "configuration of the batch").required();
   batch.option("--set", overrides, "override a key: a.b=c")
-      .one_at_a_time();  // or one given before it takes the config too
+      .one_at_a_time();  // otherwise a --set in front of the config would take it as a second value
   app.expect_commands(0, 1);
   return program.run(argc, argv, [&] {
     if (batch.given()) return program.write_json(bench::fly_batch(config, overrides));

@@ -20,7 +20,7 @@ namespace flappy::bench {
 namespace {
 
 constexpr double kFlight_s = 0.3, kSettles_s = 0.5;
-[[maybe_unused]] constexpr double kHold_s = 1e-3;  // by peers alone
+[[maybe_unused]] constexpr double kHold_s = 1e-3;  // used by peers only
 constexpr double kPeriod_s = 2e-3;
 constexpr int kBeats = 17;
 constexpr std::uint64_t kSeed = 9;
@@ -79,7 +79,7 @@ std::vector<Flight> free_flights(const std::vector<OwnFlight>& flights, double s
   return ends;
 }
 
-/// Mean over whole beats, welded.
+/// Mean thrust over whole beats, torso welded.
 std::vector<double> thrusts_N(const std::vector<OwnFlight>& flights, double step_s) {
   auto batch = batch_of<double>(flights, step_s, sim::Start::welded);
   advance(batch, kSettles_s, step_s);
@@ -92,7 +92,7 @@ std::vector<double> thrusts_N(const std::vector<OwnFlight>& flights, double step
   return thrust_N;
 }
 
-/// Of position, m, and of attitude, rad.
+/// Rms errors of position (m) and attitude (rad).
 std::array<double, 2> rms(const std::vector<Flight>& flights, const std::vector<Flight>& exact) {
   double position = 0, attitude = 0;
   for (std::size_t i = 0; i < flights.size(); ++i) {
@@ -103,7 +103,7 @@ std::array<double, 2> rms(const std::vector<Flight>& flights, const std::vector<
   return {std::sqrt(position / n), std::sqrt(attitude / n)};
 }
 
-/// Seconds of flight per second of one processor, in float, a control period of 2 ms at a time: the median of five goes.
+/// Seconds of flight per second of one processor, in float, in control periods of 2 ms; median of five runs.
 double flapper_s_per_cpu_s(const std::vector<OwnFlight>& few, double step_s) {
   std::vector<OwnFlight> flights;
   while (flights.size() < 1024) flights.insert(flights.end(), few.begin(), few.end());
@@ -118,7 +118,7 @@ double flapper_s_per_cpu_s(const std::vector<OwnFlight>& few, double step_s) {
 }
 
 #ifdef FLAPPY_HAVE_PEERS
-/// Voltages of the driver, held for a millisecond each, left and right.
+/// Voltages of the driver, each held for 1 ms: [flight][hold][side].
 std::vector<std::vector<std::array<double, 2>>> voltages_of(const std::vector<OwnFlight>& flights) {
   const double coarse_s = kHold_s / 2;
   auto batch = batch_of<double>(flights, coarse_s, sim::Start::welded);
@@ -139,7 +139,7 @@ struct PeerSettings {
   std::function<std::pair<Flight, double>(const OwnFlight&, const std::vector<std::array<double, 2>>&, double)> fly;
 };
 
-/// Where a peer ends at a step, and what that took of a processor.
+/// End of a peer's flight at a step size, and the processor time that it took, s.
 template <class Peer, class Settings>
 std::pair<Flight, double> fly_peer(const OwnFlight& own, const std::vector<std::array<double, 2>>& voltages,
                                    double step_s, const Settings& settings) {
@@ -157,7 +157,7 @@ std::pair<Flight, double> fly_peer(const OwnFlight& own, const std::vector<std::
   return {{s.p_WB_W_m[0], s.p_WB_W_m[1], s.p_WB_W_m[2], s.q_WB}, took_s};
 }
 
-/// Settings a user would try: integrators, solvers, and stops as MuJoCo has them or as hard as the step allows.
+/// Settings that a user would try: integrators, solvers, and stops with MuJoCo's defaults or as hard as the step allows.
 std::vector<PeerSettings> peer_settings() {
   std::vector<PeerSettings> all;
   for (const char* integrator : {"Euler", "implicit"})
@@ -177,7 +177,7 @@ std::vector<PeerSettings> peer_settings() {
   return all;
 }
 
-/// One row; as many flights as a minute has time for, all if it does.
+/// One row, from as many of the flights as fit into one minute.
 WorkPrecisionRow row_of(const PeerSettings& peer, double step_s, const std::vector<OwnFlight>& flights,
                         const std::vector<std::vector<std::array<double, 2>>>& voltages,
                         const std::vector<Flight>& exact) {
@@ -222,13 +222,13 @@ std::vector<WorkPrecisionRow> work_precision(const model::Vehicle& vehicle, [[ma
   const std::vector<OwnFlight> flights = draw(vehicle, kAboutHover);
   const std::vector<Flight> exact = free_flights(flights, kAboutHover.exact_step_s);
   std::vector<WorkPrecisionRow> rows;
-  const double most = peers ? 68 : 8;  // rows
-  const auto tell_of = [&](const std::string& engine, double us) {
+  const double most = peers ? 68 : 8;  // largest number of rows
+  const auto print_time = [&](const std::string& engine, double us) {
     tell(static_cast<double>(rows.size()) / most, engine + " at " + std::to_string(static_cast<int>(us)) + " us");
   };
   for (const double us : {500, 250, 200, 125, 100, 50, 25, 10}) {
     const double step_s = us * 1e-6;
-    tell_of("flappy", us);
+    print_time("flappy", us);
     const auto [position_m, attitude_rad] = rms(free_flights(flights, step_s), exact);
     rows.push_back({"flappy", "float", step_s, position_m, attitude_rad, flapper_s_per_cpu_s(flights, step_s)});
   }
@@ -237,7 +237,7 @@ std::vector<WorkPrecisionRow> work_precision(const model::Vehicle& vehicle, [[ma
   const auto voltages = voltages_of(flights);
   for (const PeerSettings& peer : peer_settings())
     for (const double us : {500, 250, 200, 125, 100, 50, 25, 20, 10, 5}) {
-      tell_of(peer.engine + ", " + peer.name, us);
+      print_time(peer.engine + ", " + peer.name, us);
       rows.push_back(row_of(peer, us * 1e-6, flights, voltages, exact));
       if (rows.back().position_error_m < enough_m / 2) break;
     }

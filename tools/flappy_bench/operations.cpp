@@ -1,4 +1,4 @@
-// Counts the arithmetic of a step by running it on a number that counts.
+// Counts the arithmetic of a step by running it with a number type that counts operations.
 #define FLAPPY_ISA counted
 #include "roof.hpp"
 #include "sim/physics_step.hpp"
@@ -24,7 +24,7 @@ struct Counted {
 };
 using C = Counted;
 
-/// As in lanes: a product that meets a sum is one fused multiply-add.
+/// A product; as in lanes, a product and a sum become one fused multiply-add.
 struct P {
   double a, b;
   operator C() const { return ++count.multiply, C(a * b); }
@@ -69,7 +69,7 @@ namespace flappy::bench {
 
 Operations count_operations() {
   using model::Counted;
-  // any numbers do, as long as no stroke reaches its stop: the step has no other branch
+  // the values do not matter as long as no stroke reaches its stop, which is the only branch of the step
   model::Parameters<Counted> p;
   Counted* row = reinterpret_cast<Counted*>(&p);
   for (std::size_t i = 0; i < sizeof p / sizeof *row; ++i) row[i] = 1e-3 * static_cast<double>(i + 1);

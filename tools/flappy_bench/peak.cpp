@@ -1,4 +1,4 @@
-// Built with contraction on: every line of the loop is one fused multiply-add.
+// Measures the core's peak rate. Built with contraction on, so that each assignment in the loop is one fused multiply-add.
 #include <algorithm>
 
 #include "roof.hpp"
@@ -14,7 +14,7 @@ __attribute__((target_clones("avx512f", "fma", "default"))) float multiply_add(f
   const Wide a = Wide{} + 0.999999f, b = Wide{} + 1e-6f;
   Wide c0 = b * seed, c1 = c0 + 1, c2 = c0 + 2, c3 = c0 + 3, c4 = c0 + 4, c5 = c0 + 5, c6 = c0 + 6, c7 = c0 + 7,
        c8 = c0 + 8, c9 = c0 + 9, c10 = c0 + 10,
-       c11 = c0 + 11;  // all different, or the compiler would make one chain of them
+       c11 = c0 + 11;  // all different; otherwise the compiler merges the chains
   for (int i = 0; i < times; ++i) {
     c0 = c0 * a + b, c1 = c1 * a + b, c2 = c2 * a + b, c3 = c3 * a + b;
     c4 = c4 * a + b, c5 = c5 * a + b, c6 = c6 * a + b, c7 = c7 * a + b;

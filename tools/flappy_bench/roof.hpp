@@ -1,5 +1,4 @@
-// How far the step is from what the core could do: its arithmetic, counted, against the core's peak,
-// measured.
+// Compares the counted arithmetic of a step with the measured peak rate of the core.
 #pragma once
 
 namespace flappy::bench {

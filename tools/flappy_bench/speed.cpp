@@ -19,9 +19,9 @@ namespace flappy::bench {
 namespace {
 
 constexpr double kStep_s = sim::kDefaultStep_s;
-const int kPeriod = static_cast<int>(std::lround(2e-3 / kStep_s));  // physics steps in a control period
+const int kPeriod = static_cast<int>(std::lround(2e-3 / kStep_s));  // physics steps per control period
 constexpr std::size_t kDistinctVehicles = 1024;
-/// Flights are no longer than this: without a controller a flapper then tumbles, which is not what anyone simulates.
+/// Longest flight: without a controller a flapper tumbles later, which is not representative.
 constexpr double kFlight_s = 0.2;
 const int kFlightPeriods = static_cast<int>(kFlight_s / (kPeriod * kStep_s));
 
@@ -39,8 +39,8 @@ class Flock {
     for (std::size_t i = 0; i < count; ++i) batch_.set_vehicle(i, vehicles[i % vehicles.size()]);
   }
 
-  /// Flies for about `seconds`, at least a control period, from a fresh start every kFlight_s; seconds per flapper and
-  /// step on the given clock.
+  /// Flies for about `seconds`, at least one control period, with a new start every kFlight_s. Returns seconds per
+  /// flapper and step on the given clock.
   double run(double seconds, double (*clock)()) {
     double spent = 0;
     std::int64_t periods = 0;
@@ -65,7 +65,7 @@ class Flock {
 };
 
 #ifdef FLAPPY_HAVE_PEERS
-/// Steps per second of one peer in the same flights at 10 V, voltage held for 1 ms.
+/// Steps per second of one peer in flights of the same duration at 10 V, with voltages held for 1 ms.
 template <class Peer>
 double peer_steps_per_s(Peer& peer, double flapping_Hz, double seconds) {
   double spent = 0;

@@ -1,4 +1,4 @@
-// Steps per second, ours and the peers', measured in turn within one run.
+// Steps per second of our simulator and of its peers, measured alternately within one run.
 #pragma once
 
 #include <functional>
@@ -14,10 +14,10 @@ struct Figure {
   double median = 0, low = 0, high = 0;
 };
 
-/// Processor time of this thread.
+/// Processor time of this thread, s.
 double processor_seconds();
 
-/// Median and range of one figure over rounds.
+/// Median and range of a quantity over rounds.
 Figure summary(std::vector<double> values);
 
 struct SpeedReport {
@@ -26,13 +26,13 @@ struct SpeedReport {
     Figure steps_per_s;
   };
   std::vector<Row> rows;      // one core
-  Figure two_thread_scaling;  // wall time, pair by pair
+  Figure two_thread_scaling;  // speed-up of wall time, pair by pair
   struct Size {
     std::size_t flappers;
     Figure ns_per_step;  // per flapper and step, one core
   };
   std::vector<Size> sizes;
-  std::size_t frozen = 0;  // must stay 0: a frozen flapper would still be counted as work
+  std::size_t frozen = 0;  // must stay 0: steps of a frozen flapper would be counted as work
 
   std::optional<double> median(const std::string& name) const;
 };

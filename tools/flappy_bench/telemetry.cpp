@@ -16,7 +16,7 @@ namespace flappy::bench {
 namespace {
 
 constexpr double kRate_hz = 500;
-constexpr int kDomain = 99;  // nobody's
+constexpr int kDomain = 99;  // a DDS domain that nothing else uses
 
 io::DdsConfig config_of(std::size_t flappers) {
   io::DdsConfig c;
@@ -32,7 +32,7 @@ struct Heard {
   double median_s, p99_s, most_s;
 };
 
-/// Reads all topics until nothing comes for a second, and tells how late poses were by their stamps.
+/// Reads all topics until nothing arrives for 1 s; measures the latency of poses by their stamps.
 Heard listen(std::size_t flappers) {
   using namespace server;
   const io::DdsConfig c = config_of(flappers);
@@ -92,7 +92,7 @@ TelemetryCost measure_telemetry(std::size_t flappers, double duration_s) {
   cost.flappers = flappers;
   {
     server::Telemetry telemetry(config_of(flappers), {});
-    io::sleep_until(io::steady_seconds() + 2);  // the two find each other
+    io::sleep_until(io::steady_seconds() + 2);  // until both processes have discovered each other
     const double cpu_before_s = cpu_seconds(), start_s = io::steady_seconds();
     const auto periods = static_cast<std::uint64_t>(duration_s * kRate_hz);
     for (std::uint64_t tick = 1; tick <= periods; ++tick) {

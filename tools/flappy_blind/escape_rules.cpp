@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A trained actor as it is on disk, or a policy from elsewhere.
+/// A trained actor evaluated from its weights, or a policy in TorchScript or a C header.
 ObservationPolicy policy_of(const fs::path& path, const rollout::FlyConfig& config) {
   if (const auto& actor = config.actor) {
     return [actor, task = config.fleet.task.constants](const std::vector<double>& observation) {
@@ -46,17 +46,17 @@ ObservationPolicy policy_of(const fs::path& path, const rollout::FlyConfig& conf
   };
 }
 
-/// In m, m/s and rad/s: beyond what any robot does.
+/// Bound in m, m/s and rad/s that no robot exceeds.
 constexpr double kUnbounded = 1e3;
 
-/// A limit whose cosine is -2 is none.
+/// Angle of a limit given by its cosine; -2, no limit, becomes pi, which no angle exceeds.
 double angle(double cosine) { return std::acos(std::max(-1.0, cosine)); }
 
 }  // namespace
 
 EscapeRules read_escape_rules(const fs::path& policy, const fs::path& config_file) {
   const std::string kind = policy.extension().string();
-  io::read_text(policy);  // or a complaint that names it
+  io::read_text(policy);  // throws an error with the file's name
   if (kind != ".json" && kind != ".pt" && kind != ".h")
     throw io::InputError(policy.string() +
                          ": is no policy; accepted: an actor (.json), TorchScript (.pt) or a C header (.h)");

@@ -1,4 +1,4 @@
-// The escape that a policy was trained for, as robots of all families fly it.
+// Reads the escape that a policy was trained for, in the form in which robots of all families fly it.
 #pragma once
 
 #include <filesystem>
@@ -9,14 +9,15 @@
 
 namespace flappy::blind {
 
-/// Of a policy (an actor, TorchScript or a C header) and the configuration of flappy-fly that it was trained with. InputError where
-/// there is no such policy, or the configuration is nothing that a blind robot can fly.
+/// `policy`: an actor, TorchScript or a C header. `config`: the configuration of flappy-fly that it was trained with. Throws InputError
+/// if the policy cannot be read, or a blind robot cannot fly the configuration.
 EscapeRules read_escape_rules(const std::filesystem::path& policy, const std::filesystem::path& config);
 
-/// In place of the escape, hover at its goal without a policy, as good as it has to be after the escape.
+/// Replaces the escape by hover at its goal without a policy, to be judged by the bounds that hold after the escape.
 EscapeRules hover_rules(EscapeRules rules);
 
-/// The same for robots of a family. They know no other hand-back than by distance, speeds, attitude and time, and no end.
+/// Converts the rules for the interface of all families, which supports hand-back by distance, speeds, attitude and time only, and no
+/// termination.
 EscapeAssignment escape_assignment(const EscapeRules& rules);
 
 rollout::Outcome outcome_of(const Escape& escape);

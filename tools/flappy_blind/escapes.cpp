@@ -32,7 +32,7 @@ Json fly_escapes(const EscapeOptions& o) {
       const std::scoped_lock lock(mutex);
       progress.show(static_cast<double>(++done) / static_cast<double>(o.count));
     });
-  } catch (const std::exception& e) {  // of the policy
+  } catch (const std::exception& e) {  // thrown by the policy
     throw io::InputError(o.policy + ": " + e.what() + "; accepted: a policy for every observation");
   }
   progress.clear();

@@ -1,4 +1,4 @@
-// flappy-blind escape: flies a policy's manoeuvre many times over and says how well, as flappy-eval does.
+// flappy-blind escape: flies a policy's manoeuvre many times and reports its success, as flappy-eval does.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -25,10 +25,10 @@ using Json = nlohmann::ordered_json;
 /// Policies that every robot flies, in this order.
 constexpr const char* kPolicies[] = {"as_shipped", "file", "corrected"};
 
-/// Of a benchmark: robots with something wrong, each once, diagnosed from rich flight.
+/// Parts of a benchmark whose robots have an effect and are diagnosed from rich flights. Each robot occurs once in them.
 constexpr std::string_view kParts[] = {"singles", "typical", "withheld", "outside", "pairs"};
 
-/// A scored benchmark.
+/// A scored benchmark. The constructor checks the hashes of its predictions and opens the labels.
 struct Scored {
   explicit Scored(const fs::path& at) : folder(at), manifest(benchmark::read_manifest(at)) {
     benchmark::check_predictions(folder, manifest);
@@ -43,14 +43,14 @@ struct Scored {
   }
   fs::path folder;
   benchmark::Manifest manifest;
-  std::map<std::size_t, benchmark::Label> labels;  ///< by number
+  std::map<std::size_t, benchmark::Label> labels;  ///< by the case's number
 };
 
 struct Robot {
   const Scored* of;
   const benchmark::Label* label;
   benchmark::Prediction said;
-  fs::path own;  ///< its folder
+  fs::path own;  ///< folder of this robot's results
 };
 
 class Loop {
@@ -72,7 +72,7 @@ class Loop {
                            command.out / fs::path(s.manifest.family + "_" + benchmark::number_text(number))});
       }
       if (s.labels.empty())
-        throw io::InputError(folder + ": no robot with something wrong and rich flights; accepted: a benchmark with " +
+        throw io::InputError(folder + ": no robot with an effect and rich flights; accepted: a benchmark with " +
                              io::joined({std::begin(kParts), std::end(kParts)}));
     }
   }
@@ -91,7 +91,7 @@ class Loop {
   static fs::path result_of(const Robot& r) { return r.own / "result.json"; }
   fs::path without() const { return fs::path(command_.out) / "file"; }
 
-  /// By what was predicted alone.
+  /// Trains by the predictions alone, without the labels' effects.
   bool train() {
     io::stop_on_interrupt();
     const fs::path declared = scored_.front()->manifest.vehicle;
@@ -102,7 +102,7 @@ class Loop {
     std::vector<const Robot*> open;
     for (const Robot& r : robots_) {
       io::make_folder(r.own);
-      if (r.said.corrected.empty()) continue;  // its flights had faults
+      if (r.said.corrected.empty()) continue;  // no corrected vehicle: its logs were faulty
       io::write_atomically(r.own / "vehicle_corrected.toml", r.said.corrected);
       open.push_back(&r);
     }
@@ -111,7 +111,7 @@ class Loop {
     });
   }
 
-  /// Goes on with what is there; false where it was interrupted.
+  /// Resumes an unfinished run in the folder; false if it was interrupted.
   bool train_on(const fs::path& vehicle, const fs::path& folder, int threads) const {
     std::vector<std::string> overrides = command_.overrides;
     overrides.push_back("vehicle=" + io::toml_string(fs::absolute(vehicle).string()));
@@ -154,7 +154,7 @@ class Loop {
     io::write_atomically(result_of(r), json.dump(1) + "\n");
   }
 
-  /// Whether an escape of this number succeeds.
+  /// A function that flies the escape of a number and returns whether it succeeds.
   static std::function<bool(std::size_t)> escapes_of(const std::string& family, const Assignment& a,
                                                      const EscapeRules& rules) {
     if (family == "a")
@@ -220,7 +220,7 @@ class Loop {
   const LoopCommand& command_;
   std::vector<std::unique_ptr<Scored>> scored_;
   std::vector<Robot> robots_;
-  std::map<std::string, std::size_t> unsteady_;  ///< by family, how many do not hover as the escape's end wants it
+  std::map<std::string, std::size_t> unsteady_;  ///< by family: robots that fail hover_rules()
   std::shared_ptr<const learn::TrainInit> start_;
 };
 

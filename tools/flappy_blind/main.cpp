@@ -1,4 +1,4 @@
-// flappy-blind: flies a robot of another making, with or without something wrong, and writes what it logged.
+// flappy-blind: flies robots of independent simulators, with or without effects, and writes their logs; makes and scores benchmarks.
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -23,19 +23,19 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct FamilyOptions {
-  std::string family;  ///< empty: A as its own options have it
-  bool hover = false, own_figures = false, conventions = false;
+  std::string family;  ///< empty: family A with its own options
+  bool hover = false, own_parameters = false, conventions = false;
 };
 
-/// As fly_case, of a family's robot.
+/// Flies a robot through the interface of all families; fly_case() is the counterpart with family A's own options.
 Json fly_family(const RobotOptions& o, const FamilyOptions& f) {
   const Family& family = benchmark::family_named(f.family);
   if (o.randomise != "none")
-    throw io::InputError("--randomise: draws robots without --family; accepted: --own-figures");
+    throw io::InputError("--randomise: draws robots without --family; accepted: --own-parameters");
   Assignment a;
   a.vehicle_file = o.vehicle;
-  for (const BlindEffect& e : effects_of(o.effects)) a.effects.emplace_back(e.id, e.size);
-  a.hover = f.hover, a.own_figures = f.own_figures, a.conventions = f.conventions;
+  for (const BlindEffect& e : effects_of(o.effects)) a.effects.emplace_back(e.id, e.magnitude);
+  a.hover = f.hover, a.own_parameters = f.own_parameters, a.conventions = f.conventions;
   a.power = o.power, a.wings = o.wings;
   const benchmark::FlownRobot robot = benchmark::fly_drawn(family, a, o.seed);
   for (std::size_t draw = 0; draw < robot.lost.size(); ++draw)
@@ -79,10 +79,11 @@ Json fly_case(const RobotOptions& o, Programme programme) {
 
 int main(int argc, char** argv) {
   using namespace flappy;
-  io::Program program("flappy-blind", "A robot of another making, for a diagnosis to be tried on.", {});
-  io::Command list = program.app().command("effects", "lists what may be wrong with it");
+  io::Program program("flappy-blind", "Robots of independent simulators A, B and C: flies, diagnoses and scores them.",
+                      {});
+  io::Command list = program.app().command("effects", "lists the effects that a robot may have");
   blind::FamilyOptions of;
-  constexpr const char* kFamily = "a, b or c (docs/blind.md); none: a as its own options have it";
+  constexpr const char* kFamily = "a, b or c; none: a with the options of this command";
   list.option("--family", of.family, kFamily);
   io::Command fly = program.app().command("fly", "flies three times and writes the logs");
   blind::RobotOptions robot;
@@ -93,8 +94,8 @@ int main(int argc, char** argv) {
       .shows_default();
   fly.option("--family", of.family, kFamily);
   fly.flag("--hover", of.hover, "as --programme hover");
-  fly.flag("--own-figures", of.own_figures, "of a family: every figure of every body drawn apart");
-  fly.flag("--conventions", of.conventions, "of a family: sensors and declarations drawn as laboratories have them");
+  fly.flag("--own-parameters", of.own_parameters, "of a family: draw the parameters of each body");
+  fly.flag("--conventions", of.conventions, "of a family: draw sensors and declarations as laboratories have them");
   fly.option("--out", robot.out, "folder for flight_1, flight_2, flight_3").required();
   io::Command escape = program.app().command("escape", "flies a policy's manoeuvre many times over");
   blind::EscapeOptions escapes{.robot = {}, .policy = {}, .config = io::config_path("fly/escape.toml")};
@@ -116,7 +117,7 @@ int main(int argc, char** argv) {
       .shows_default();
   detectability.option("--out", command.out, "file for what is found").required();
   detectability.option("--threads", command.threads, "0: one for each processor").range(0, 1024);
-  const io::Command oracle = program.app().hidden_command("oracle");  // its name until now
+  const io::Command oracle = program.app().hidden_command("oracle");  // former name, refused with a hint
   io::Command make = program.app().command("make", "flies the cases of a benchmark and seals what they are");
   benchmark::MakeCommand made;
   std::string set;
@@ -193,8 +194,8 @@ int main(int argc, char** argv) {
     else if (detectability.given()) program.write_json(benchmark::run_detectability(command));
     else {
       of.hover = of.hover || programme == "hover";
-      if (of.family.empty() && (of.own_figures || of.conventions))
-        throw io::InputError("--own-figures, --conventions: are of a family; accepted: with --family");
+      if (of.family.empty() && (of.own_parameters || of.conventions))
+        throw io::InputError("--own-parameters, --conventions: are of a family; accepted: with --family");
       program.write_json(of.family.empty() ? blind::fly_case(robot, of.hover ? Programme::hover : Programme::rich)
                                            : blind::fly_family(robot, of));
       std::printf("%s\n", io::shown_by(robot.out).c_str());

@@ -1,4 +1,4 @@
-// Which robot flies: what the commands of flappy-blind share.
+// Options that choose a robot of family A, shared by the commands of flappy-blind.
 #pragma once
 
 #include <string>
@@ -17,12 +17,12 @@ struct RobotOptions {
   bool power = false, wings = false, no_truth = false;
 };
 
-/// "ID=SIZE". InputError where there is no size.
+/// Parses texts of the form "ID=MAGNITUDE". Throws InputError if the number is missing.
 std::vector<BlindEffect> effects_of(const std::vector<std::string>& texts);
 
 void add_robot_options(const io::Command& command, RobotOptions& o);
 
-/// The robots of a seed.
+/// The robots that a seed draws.
 class Robots {
  public:
   explicit Robots(const RobotOptions& o);

@@ -1,4 +1,4 @@
-// flappy-eval: flies a policy on thousands of randomised vehicles and says how well, beside PID and ARC alone.
+// flappy-eval: scores a policy on thousands of randomised vehicles, next to PID and ARC alone.
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -29,7 +29,7 @@ using rollout::Summary;
 using Number = std::optional<double>;
 
 constexpr std::size_t kNominalFlights = 20;
-constexpr double kHummingbird_s = 0.25;  // the escape of the bird, as the study of the manoeuvre reports it
+constexpr double kHummingbird_s = 0.25;  // duration of the bird's escape, from the study of the manoeuvre
 constexpr double kOptimum_s = 0.248;     // direct optimisation on the exact physics, without noise
 constexpr const char* kPolicies = "a run folder, an actor (.json), TorchScript (.pt) or a C header (.h)";
 
@@ -47,7 +47,7 @@ std::string file_override(const char* key, const fs::path& path) {
   return std::string(key) + "=" + io::toml_string(fs::absolute(path).string());
 }
 
-/// What is flown: the configuration of the run that the policy is or lies in, or --config with the policy in it.
+/// The configuration to fly: that of the run that the policy is or lies in, or --config with the policy in it.
 FlyConfig read_config(const Request& r) {
   const fs::path policy = r.policy;
   const fs::path of_run = fs::absolute(policy).parent_path() / "config" / "fly.toml";
@@ -74,7 +74,7 @@ FlyConfig read_config(const Request& r) {
   return c;
 }
 
-/// Whoever flies, and how that went.
+/// A column of the table: who flies, and the results.
 struct Column {
   const char* name;
   std::size_t asked = 0;
@@ -95,7 +95,7 @@ class Evaluation {
 
   Column fly_policy(const rollout::Agent& agent) { return fly("policy", evaluator_, nominal_, agent); }
 
-  /// The vehicles of the policy, hovering under this controller and flown by it alone.
+  /// Flies the policy's vehicles by a controller alone, which also holds the hover before.
   Column fly_alone(const char* name, const Controller& controller) {
     if (controller.kind == config_.fleet.controller.kind) return fly(name, evaluator_, nominal_, {});
     FlyConfig other = rollout::unwatched(config_);
@@ -142,7 +142,7 @@ Number times(Number x, double factor) { return finite(x) ? Number(*x * factor) :
 Number if_flown(const Summary& s, double x) { return s.flights > 0 ? Number(x) : std::nullopt; }
 constexpr double kDegrees = 180 / std::numbers::pi;
 
-/// One row of the table.
+/// Prints one row of the table.
 void print_row(const std::string& name, const std::vector<Column>& columns, int digits, const auto& number) {
   std::printf("  %-34s", name.c_str());
   for (const Column& c : columns) {
@@ -206,7 +206,7 @@ void print(const Request& request, const FlyConfig& config, const std::vector<Co
   print_quantiles("overshoot, mm", columns, 1, &Summary::overshoot_m, 1000);
   print_quantiles("final position error, mm", columns, 1, &Summary::position_error_m, 1000);
   print_quantiles("final heading error, deg", columns, 1, &Summary::heading_error_rad, kDegrees);
-  if (const auto& muscles = config.vehicle.jointed) {  // small, and of what moves wings
+  if (const auto& muscles = config.vehicle.jointed) {  // these are small, and belong to the wings' muscles
     print_quantiles("muscles' work in the manoeuvre, mJ", columns, 3, &Summary::energy_J, 1e3);
     print_quantiles("mean muscle power, mW", columns, 3, &Summary::power_W, 1e3);
     if (muscles->muscle_mass_kg > 0)
@@ -237,7 +237,7 @@ void put_quantiles(Json& json, const std::string& name, const std::string& unit,
   json[name + "_p90_" + unit] = or_null(times(s.p90, factor));
 }
 
-/// Figures of one column; no wall-clock time, so that they are the same bytes again.
+/// The results of one column; without wall-clock time, so that the same run gives the same bytes.
 Json json_of(const Column& c) {
   const Summary& s = c.flights;
   const auto figure = [&](double x) { return or_null(if_flown(s, x)); };
@@ -251,7 +251,7 @@ Json json_of(const Column& c) {
   json["strict_rate"] = figure(s.strict.value);
   put_quantiles(json, "time_to_strict", "s", s.strict_s);
   put_quantiles(json, "overshoot", "mm", s.overshoot_m, 1000);
-  // medians, under the name that says what they are of
+  // these keys hold medians
   json["final_position_error_mm"] = or_null(times(s.position_error_m.median, 1000));
   json["final_position_error_p90_mm"] = or_null(times(s.position_error_m.p90, 1000));
   json["final_heading_error_deg"] = or_null(times(s.heading_error_rad.median, kDegrees));
@@ -292,34 +292,34 @@ Json json_of(const Request& request, const FlyConfig& config, const std::vector<
   return json;
 }
 
-/// The controller of this name: the one that is flown with where it is of that kind.
+/// The controller of this name: that of the configuration where it is of this type, else the shipped one.
 Controller controller_named(const std::string& name, const FlyConfig& config) {
   if (config.fleet.controller.kind == flight::controller_kind(name)) return config.fleet.controller;
   return flight::read_controller(io::Config::load(io::config_path("controllers/" + name + ".toml")).root());
 }
 
-/// Sizes of an effect, of its typical one.
-constexpr double kSizes[] = {0.5, 1, 1.5, 2};
+/// Magnitudes of an effect to evaluate, in units of its typical magnitude.
+constexpr double kMagnitudes[] = {0.5, 1, 1.5, 2};
 
-/// The vehicle with one entry of the catalogue: its sizes as given, of the typical ones, within what a vehicle file accepts.
-FlyConfig with_effect(FlyConfig config, const model::EffectEntry& effect, double size) {
+/// The configuration with one effect of the catalogue at `magnitude` times its typical magnitudes, clamped to what a vehicle file accepts.
+FlyConfig with_effect(FlyConfig config, const model::CatalogueEffect& effect, double magnitude) {
   auto& values = config.added_effects[effect.info.id];
-  for (int i = 0; i < effect.info.sizes; ++i) {
+  for (int i = 0; i < effect.info.magnitudes; ++i) {
     const model::EffectParameter& p = effect.parameters[static_cast<std::size_t>(i)];
-    values[p.name] = std::clamp(size * p.typical, p.low, p.high);
+    values[p.name] = std::clamp(magnitude * p.typical, p.low, p.high);
   }
   config.vehicle.effects[effect.info.id] = values;
   return config;
 }
 
-/// What the policy survives: its success with each effect, by size.
+/// Evaluates the success of the policy with each effect, by magnitude.
 void evaluate_effects(const Request& request, const FlyConfig& config, const rollout::Agent& agent,
                       const io::Program& program) {
   const auto stream = request.stream == "test" ? rollout::kTestFlappers : rollout::kValidationFlappers;
   const rollout::EvaluationOptions options{.count = request.episodes, .first_flapper = stream, .ranks = request.ranks};
   io::ProgressLine progress("effects flown");
   double done = 0;
-  bool over = false;  // on all ranks alike
+  bool over = false;  // the same on all ranks
   const auto fly = [&](const FlyConfig& flown) -> std::optional<Summary> {
     const rollout::Evaluation e = rollout::Evaluator(flown, options).fly(agent, rollout::Detail::success, [](double) {
       return !io::interrupted();
@@ -328,7 +328,7 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
     if (e.stopped) return std::nullopt;
     return rollout::summarise(e.flights);
   };
-  const double all = static_cast<double>(model::catalogue_of(config.vehicle).size() * std::size(kSizes)) + 1;
+  const double all = static_cast<double>(model::catalogue_of(config.vehicle).size() * std::size(kMagnitudes)) + 1;
   const auto without = fly(config);
   progress.show(++done / all);
   Json list = Json::array();
@@ -338,26 +338,26 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
     std::snprintf(text, sizeof text, "%8.1f", flown ? 100 * flown->success.value : 0);
     return flown ? std::string(text) : "       -";
   };
-  for (const model::EffectEntry& effect : model::catalogue_of(config.vehicle)) {
+  for (const model::CatalogueEffect& effect : model::catalogue_of(config.vehicle)) {
     std::string row;
     Json json = {{"effect", effect.info.id}, {"typical", Json::object()}, {"success", Json::array()}};
-    for (int i = 0; i < effect.info.sizes; ++i) {
+    for (int i = 0; i < effect.info.magnitudes; ++i) {
       const model::EffectParameter& p = effect.parameters[static_cast<std::size_t>(i)];
       json["typical"][p.name] = p.typical;
     }
-    for (const double size : kSizes) {
+    for (const double magnitude : kMagnitudes) {
       std::optional<Summary> flown;
       if (!over) try {
-          const FlyConfig with = with_effect(config, effect, size);
-          const flight::Fleet<float> one(1, with.vehicle, with.fleet);  // on all ranks, whatever their shares
+          const FlyConfig with = with_effect(config, effect, magnitude);
+          const flight::Fleet<float> one(1, with.vehicle, with.fleet);  // throws on all ranks alike
           flown = fly(with);
-        } catch (const std::invalid_argument& refused) {  // a delay that the sensors do not allow
+        } catch (const std::invalid_argument& refused) {  // the sensors do not allow such a delay
           json["refused"] = refused.what();
         }
       progress.show(++done / all);
       row += percent(flown);
       const auto figure = [&](auto value) { return flown ? Json(value()) : Json(nullptr); };
-      json["success"].push_back({{"size", size},
+      json["success"].push_back({{"magnitude", magnitude},
                                  {"rate", figure([&] { return flown->success.value; })},
                                  {"low", figure([&] { return flown->success.low; })},
                                  {"high", figure([&] { return flown->success.high; })},
@@ -370,11 +370,12 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
   }
   progress.clear();
   std::printf(
-      "%s%zu flights each, task %s, seed %llu, %s vehicles: success, %%, by size of an effect, of its typical one\n",
+      "%s%zu flights each, task %s, seed %llu, %s vehicles: success, %%, by magnitude of an effect in units of its "
+      "typical one\n",
       over ? "stopped; " : "", request.episodes, config.fleet.task.name.c_str(),
       static_cast<unsigned long long>(request.seed), request.stream.c_str());
   std::printf("  %-28s", "");
-  for (const double size : kSizes) std::printf("%8g", size);
+  for (const double magnitude : kMagnitudes) std::printf("%8g", magnitude);
   std::printf("\n  %-28s%s\n", "none", percent(without).c_str());
   for (const std::string& row : rows) std::printf("%s\n", row.c_str());
   program.write_shown_json({{"policy", request.policy},
@@ -394,7 +395,7 @@ void evaluate(Request request, io::Program& program) {
   const std::string kind = path.extension().string();
   std::error_code ignored;
   if (!fs::is_directory(path, ignored)) {
-    io::read_text(path);  // or a complaint that names it
+    io::read_text(path);  // throws where the file is missing
     if (kind != ".json" && kind != ".pt" && kind != ".h")
       throw io::InputError(request.policy + ": is no policy; accepted: " + kPolicies);
   }
@@ -414,7 +415,7 @@ void evaluate(Request request, io::Program& program) {
     return evaluate_effects(request, config, {policy ? nullptr : config.actor, policy.get()}, program);
   }
   std::vector<std::pair<const char*, Controller>> alone;
-  // to voltages no controller can add, and those of the project are tuned to its own flappers
+  // a controller cannot add to voltages, and the project's controllers are tuned to its own flappers
   if (!request.no_baselines && !task.sets_voltages() && !config.vehicle.beat_averaged && !config.vehicle.jointed)
     alone = {{"PID alone", controller_named("pid", config)}, {"ARC alone", controller_named("arc", config)}};
 
@@ -433,7 +434,7 @@ void evaluate(Request request, io::Program& program) {
 
 int main(int argc, char** argv) {
   using namespace flappy;
-  io::Program program("flappy-eval", "Flies a policy on randomised vehicles, scored beside PID and ARC alone.",
+  io::Program program("flappy-eval", "Flies a policy on randomised vehicles, and flies PID and ARC for comparison.",
                       {"instruction set " + sim::best_instruction_set(),
                        std::string("TorchScript ") + (policy::reads_torch_script() ? "yes" : "no")});
   const io::Command& app = program.app();
@@ -456,6 +457,6 @@ int main(int argc, char** argv) {
   app.flag("--no-baselines", r.no_baselines, "without PID and ARC");
   program.takes_ranks();
   app.flag("--effects", r.effects,
-           "instead: success with each effect of the catalogue, at 0.5 to 2 times its typical size");
+           "instead: success with each effect of the catalogue, at 0.5 to 2 times its typical magnitude");
   return program.run(argc, argv, [&] { eval::evaluate(r, program); });
 }

@@ -1,4 +1,4 @@
-// flappy-export: a finished run as TorchScript and as C headers that prove themselves.
+// flappy-export: exports a finished run as TorchScript and as C headers that test themselves.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 using policy::PolicyVectors;
 
-/// Flights whose observations become test vectors, those that the headers are proven on, and those that 8 bits are fitted to.
+/// Numbers of flights and vectors: for test vectors and proofs of the headers, and for the fit of 8-bit scales.
 constexpr std::size_t kProofFlights = 64, kFitFlights = 512;
 constexpr std::size_t kTestVectors = 24, kProofVectors = 1000, kFitVectors = 10000;
 
@@ -30,14 +30,14 @@ struct Request {
   bool int8 = false, prove = false;
 };
 
-/// What an export consists of, in memory until all of it is proven.
+/// The files of an export, kept in memory until all of them are proven.
 struct Export {
   std::map<std::string, std::string> files;
-  std::map<std::string, PolicyVectors> proofs;  ///< of each policy header: what has to come out
+  std::map<std::string, PolicyVectors> proofs;  ///< [policy header] vectors with the actions that it has to compute
   PolicyVectors flown;
 };
 
-/// With the rows that its self-test runs.
+/// Adds a policy header with the vectors of its self-test, and the vectors of its proof.
 template <class Network>
 void add_header(Export& e, const std::string& name, const learn::FinishedRun& run, const Network& network,
                 const PolicyVectors& tests) {
@@ -49,7 +49,7 @@ void add_header(Export& e, const std::string& name, const learn::FinishedRun& ru
   e.proofs[name] = own;
 }
 
-/// Largest and root-mean-square difference of each output, of its range.
+/// The largest and the root-mean-square difference of each output, as shares of its range.
 struct OutputError {
   std::vector<double> largest, rms;
 };
@@ -77,7 +77,7 @@ void print(const char* what, const OutputError& e, const std::vector<flight::Sig
 
 Json json_of(const OutputError& e) { return {{"largest", e.largest}, {"rms", e.rms}}; }
 
-/// All or nothing, but for a power failure between two renames; nothing of an earlier export stays beside it.
+/// Writes all files or none, except for a power failure between two renames. Removes files of an earlier export.
 void write_all(const fs::path& folder, const std::string& prefix, const std::map<std::string, std::string>& files) {
   std::vector<std::unique_ptr<io::AtomicFile>> written;
   for (const auto& [name, text] : files) {

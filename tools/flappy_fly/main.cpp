@@ -1,4 +1,4 @@
-// flappy-fly: flies a configuration, once or many times over, and says how far off it was; writes flight logs.
+// flappy-fly: flies a configuration in closed loop, once or many times, reports the errors, and writes flight logs.
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -20,7 +20,7 @@ constexpr const char* kAxes[6] = {"roll", "pitch", "yaw", "x", "y", "z"};
 constexpr const char* kEnds[6] = {"time_out", "contact", "not_finite", "out_of_bounds", "heading_late", "arrival_late"};
 constexpr const char* kKeys[6] = {"rms_roll_deg", "rms_pitch_deg", "rms_yaw_deg", "rms_x_mm", "rms_y_mm", "rms_z_mm"};
 
-/// Degrees and millimetres.
+/// Converts errors to degrees and millimetres.
 rollout::Errors shown(rollout::Errors e) {
   for (std::size_t k = 0; k < e.size(); ++k) e[k] *= k < 3 ? 180 / std::numbers::pi : 1000;
   return e;
@@ -96,7 +96,7 @@ void print(const rollout::FlyConfig& config, const rollout::FlyOptions& options,
 Json json_of(const rollout::FlyConfig& config, const rollout::FlyOptions& options, const rollout::FlyResult& r) {
   const rollout::FlightSummary& s = r.summary;
   Json json;
-  const rollout::Errors settled = shown(s.settled), takeoff = shown(s.takeoff);  // not a number becomes null
+  const rollout::Errors settled = shown(s.settled), takeoff = shown(s.takeoff);  // JSON writes NaN as null
   for (std::size_t k = 0; k < 6; ++k) json[kKeys[k]] = settled[k];
   for (std::size_t k = 0; k < 6; ++k) json[std::string(kKeys[k]) + "_takeoff"] = takeoff[k];
   json["crashed"] = s.crashed;

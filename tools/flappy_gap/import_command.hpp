@@ -1,4 +1,4 @@
-// flappy-gap import: what others recorded, as a flight log.
+// flappy-gap import: converts recordings of other programs into a flight log.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,7 @@ struct ImportCommand {
   std::vector<std::string> overrides;
 };
 
-/// Writes the flight log and prints what came late, twice or never; InputError before anything is written.
+/// Writes the flight log and prints the messages that came late, twice or never. Throws InputError before it writes anything.
 nlohmann::ordered_json run_import(const ImportCommand& command);
 
 }  // namespace flappy::gap

@@ -1,4 +1,4 @@
-// flappy-gap: what a flight log says, and whether it can be believed.
+// flappy-gap: checks, imports and diagnoses flight logs.
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -9,6 +9,7 @@
 #include "import_command.hpp"
 #include "io/config.hpp"
 #include "io/program.hpp"
+#include "model/effects/registry.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -39,7 +40,7 @@ void print(const flightlog::StreamStatistics& s) {
   std::printf(" %10.3f\n", 1e3 * s.jitter_s);
 }
 
-/// What was found out of one flight.
+/// The results of checking one flight.
 struct Checked {
   flightlog::FlightHeader header;
   flightlog::CheckReport report;
@@ -111,6 +112,43 @@ Json check(const std::vector<std::string>& folders) {
   return {{"flights", flights}, {"faults", faults}, {"warnings", warnings}, {"not_tested", not_tested}};
 }
 
+const char* name_of(model::Stage stage) {
+  constexpr const char* kNames[] = {"body", "drive", "wing", "air", "world", "sensor"};
+  return kNames[static_cast<std::size_t>(stage)];
+}
+
+/// Prints the catalogue of effects as a Markdown table, one row a parameter, and returns it as JSON.
+Json list_effects(bool beat_averaged) {
+  model::Vehicle vehicle;
+  if (beat_averaged) vehicle.beat_averaged.emplace();
+  Json all = Json::array();
+  std::printf("| effect | stage | parameter | role | typical | accepted | 90 %% of the prior | group | source |\n");
+  std::printf("|---|---|---|---|---|---|---|---|---|\n");
+  for (const model::CatalogueEffect& e : model::catalogue_of(vehicle)) {
+    Json parameters = Json::array();
+    const std::string group = *e.info.group == '\0' ? "-" : e.info.group;
+    for (std::size_t k = 0; k < e.parameters.size(); ++k) {
+      const model::EffectParameter& p = e.parameters[k];
+      const char* role = static_cast<int>(k) < e.info.magnitudes ? "magnitude" : "shape";
+      std::printf("| %s | %s | `%s` | %s | %g | %g to %g | %g to %g | %s | %s |\n", e.info.id, name_of(e.info.stage),
+                  p.name, role, p.typical, p.low, p.high, p.prior_low, p.prior_high, group.c_str(), e.info.source);
+      parameters.push_back({{"name", p.name},
+                            {"role", role},
+                            {"typical", p.typical},
+                            {"low", p.low},
+                            {"high", p.high},
+                            {"prior_low", p.prior_low},
+                            {"prior_high", p.prior_high}});
+    }
+    all.push_back({{"effect", e.info.id},
+                   {"stage", name_of(e.info.stage)},
+                   {"group", e.info.group},
+                   {"source", e.info.source},
+                   {"parameters", parameters}});
+  }
+  return {{"effects", all}};
+}
+
 }  // namespace
 }  // namespace flappy::gap
 
@@ -143,7 +181,7 @@ int main(int argc, char** argv) {
   diagnose.option("--manoeuvre", command.settings.manoeuvre,
                   "what was flown, as a configuration of flappy-fly; else the recorded paths, under its hover's");
   diagnose.option("--channels", command.settings.channels, "of a beat-averaged vehicle: only these, as force_x");
-  diagnose.option("--withhold", command.settings.withheld, "entries that the catalogue is to lack");
+  diagnose.option("--withhold", command.settings.withheld, "effects to leave out of the catalogue");
   diagnose.option("--out", command.out, "folder for diagnosis.json, the corrected vehicle, tables and figures");
   diagnose.option("--threads", command.settings.threads, "0: one for each processor").range(0, 1024);
   io::Command learn = program.app().command(
@@ -157,7 +195,10 @@ int main(int argc, char** argv) {
   learn.option("--discrepancy", lessons.discrepancy, "to begin with").shows_default();
   learn.option("--out", lessons.out, "file for what is learnt").required();
   learn.option("--threads", lessons.threads, "0: one for each processor").range(0, 1024);
-  const io::Command blind = program.app().hidden_command("blind");  // where the benchmark was until now
+  io::Command effects = program.app().command("effects", "lists the catalogue of effects: parameters, ranges, sources");
+  bool beat_averaged = false;
+  effects.flag("--beat-averaged", beat_averaged, "of a beat-averaged vehicle");
+  const io::Command blind = program.app().hidden_command("blind");  // the benchmark's old place
   program.app().expect_commands(1, 1);
   bool faulty = false;
   const int code = program.run(argc, argv, [&] {
@@ -168,6 +209,8 @@ int main(int argc, char** argv) {
       const nlohmann::ordered_json found = gap::check(folders);
       faulty = found["faults"] > 0;
       program.write_json(found);
+    } else if (effects.given()) {
+      program.write_json(gap::list_effects(beat_averaged));
     } else if (import.given()) {
       program.write_json(gap::run_import(import_command));
     } else if (learn.given()) {

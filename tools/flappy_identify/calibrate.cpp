@@ -1,5 +1,5 @@
-// flappy-identify calibrate: are the intervals of a fit as wide as they should be? Fits noisy maps of a vehicle that is
-// known, and counts how often its parameters lie in their intervals.
+// flappy-identify calibrate: tests the coverage of a fit's intervals. Fits noisy maps of a known vehicle, and counts how often its true
+// parameters are inside the intervals.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -33,7 +33,8 @@ Json run(const CalibrationSettings& s, io::Program& program) {
   const std::vector<sim::Input> inputs = s.inputs.empty() ? default_inputs() : read_inputs(s.inputs, vehicle.driver);
   const std::vector<sim::Input> held =
       s.held_out.empty() ? std::vector<sim::Input>{} : read_inputs(s.held_out, vehicle.driver);
-  // of each seed: whether it was done, the largest errors, and of each parameter whether it was seen, and inside its interval
+  // for each seed: done or not, total error, error on held-out inputs; then for each parameter whether it was seen, and
+  // whether the truth is inside its interval
   const std::size_t width = 3 + 2 * config.parameters.size();
   std::vector<double> found(width * s.seeds, 0);
   io::Ranks* const ranks = program.ranks("work: calibrate, " + std::to_string(s.seeds) + " seeds of " +

@@ -10,11 +10,11 @@ namespace flappy::identify {
 
 using Json = nlohmann::ordered_json;
 
-/// A subcommand, and what it does once its options are parsed: prints, writes its files, returns what --json asks for.
+/// A subcommand. `run` is called when its options are parsed; it prints, writes its files, and returns the output for --json.
 struct Command {
   io::Command app;
   std::function<Json()> run;
-  bool shown = false;  ///< by flappy-report
+  bool shown = false;  ///< whether flappy-report can show the output
 };
 
 Command add_forces(const io::Command& program);

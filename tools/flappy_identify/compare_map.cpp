@@ -1,4 +1,4 @@
-// flappy-identify compare-map: a vehicle's force map beside the lines published for the real robot.
+// flappy-identify compare-map: compares a vehicle's force map with the lines published for the real robot.
 #include <cstdio>
 #include <memory>
 
@@ -16,7 +16,8 @@ Command add_compare_map(const io::Command& program) {
   };
   const auto s = std::make_shared<Settings>();
   s->source.moment_point = "com";
-  io::Command app = program.command("compare-map", "a vehicle's force map beside that published for the real robot");
+  io::Command app =
+      program.command("compare-map", "compares a vehicle's force map with that published for the real robot");
   s->source.add(app, "vehicle to simulate");
   app.option("--published", s->published, "slopes and offsets of the real robot").shows_default();
   return {app, [s] {

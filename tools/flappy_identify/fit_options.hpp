@@ -1,4 +1,4 @@
-// Options of a fit, for the subcommands that make one.
+// Options of a fit, shared by the subcommands that fit.
 #pragma once
 
 #include <string>

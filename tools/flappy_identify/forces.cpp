@@ -150,7 +150,7 @@ Json json_of(const ForceFit& f, const MeasuredMap& measured, const std::optional
           {"ends", ends}};
 }
 
-/// The measured map, and what the vehicle made of it before and after the fit: [channel][row].
+/// The measured map, and the vehicle's map before and after the fit: [channel][row].
 Json map_of(const MeasuredMap& measured, const model::Vehicle& before, const model::Vehicle& after,
             const MapOptions& options) {
   const auto by_channel = [](const std::vector<Wrench>& wrenches) {
@@ -171,7 +171,7 @@ Json map_of(const MeasuredMap& measured, const model::Vehicle& before, const mod
           {"after", by_channel(force_map<double>(std::span(&after, 1), measured.inputs, options))}};
 }
 
-/// The fitted vehicle's file, saying how it came about; no time and no path, so the same fit is the same bytes.
+/// Text of the fitted vehicle's file, with the fit's provenance. It has no time and no path, so equal fits give equal bytes.
 std::string vehicle_file(const ForceSettings& s, const ForceFit& f, const std::string& from,
                          const std::string& measured_sha256) {
   char line[160];
@@ -187,7 +187,7 @@ std::string vehicle_file(const ForceSettings& s, const ForceFit& f, const std::s
       f.ends.empty()
           ? "population " + std::to_string(s.fit.population) + ", generations " + std::to_string(s.fit.generations)
           : std::to_string(f.starts_agreed) + " of " + std::to_string(f.ends.size()) + " starts agree";
-  model::Vehicle without_posterior = f.vehicle;  // that of the file before is of other figures
+  model::Vehicle without_posterior = f.vehicle;  // the old file's posterior belongs to other parameter values
   without_posterior.posterior.reset();
   return "# Fitted to a measured force map by flappy-identify, commit " + io::commit() + ", method " + s.fit.method +
          "\n# from vehicle " + from + "\n# measured file's sha256 " + measured_sha256 + "\n" + line +

@@ -1,4 +1,4 @@
-// flappy-identify gait: Fourier coefficients of measured wing angles, for a vehicle file.
+// flappy-identify gait: fits Fourier coefficients to measured wing angles, for a vehicle file.
 #include <cmath>
 #include <cstdio>
 #include <memory>

@@ -1,4 +1,4 @@
-// flappy-identify kinematics: measured wings beside simulated ones, on one beat.
+// flappy-identify kinematics: compares measured with simulated wing angles over one beat.
 #include "identify/kinematics.hpp"
 
 #include <cstdio>
@@ -22,7 +22,7 @@ struct KinematicsSettings {
   double from_s = -std::numeric_limits<double>::infinity(), to_s = std::numeric_limits<double>::infinity();
 };
 
-Json figures(const BeatFigures& f) {
+Json figures(const BeatParameters& f) {
   return {{"amplitude_rad", f.amplitude_rad}, {"bias_rad", f.bias_rad}, {"phase_rad", f.phase_rad}};
 }
 
@@ -42,7 +42,7 @@ Json run(const KinematicsSettings& s) {
   const WingComparison c = compare_wings(vehicle, input, samples, s.source.options(vehicle));
   if (!s.csv.empty()) write_beat_csv(s.csv, c);
   if (!s.svg.empty()) write_beat_svg(s.svg, c);
-  std::printf("%s at %g V, %zu samples; t_s = 0 is at %.1f deg of the beat; all figures in degrees\n",
+  std::printf("%s at %g V, %zu samples; t_s = 0 is at %.1f deg of the beat; all angles in degrees\n",
               vehicle.name.c_str(), input.amplitude_V, samples.t_s.size(), c.shift_rad / kDegree);
   std::printf("%-18s %20s %20s %8s %8s %9s\n", "", "amplitude meas. sim.", "bias meas. sim.", "phase", "rms",
               "scatter");
@@ -66,7 +66,7 @@ Json run(const KinematicsSettings& s) {
 
 Command add_kinematics(const io::Command& program) {
   const auto s = std::make_shared<KinematicsSettings>();
-  io::Command app = program.command("kinematics", "measured strokes and rotations beside simulated ones");
+  io::Command app = program.command("kinematics", "compares measured with simulated strokes and rotations");
   app.option("measured", s->measured, "table of wing angles, as a flight log's wings.csv").required();
   s->source.add(app, "vehicle to simulate, welded");
   s->amplitude = app.option("--amplitude", s->input.amplitude_V, "input in V, in place of the table's columns");

@@ -1,4 +1,4 @@
-// flappy-identify: fits a vehicle to what was measured of it, and says how far measurement and model agree.
+// flappy-identify: fits a vehicle to measurements, and reports the agreement of model and measurements.
 #include "command.hpp"
 #include "io/program.hpp"
 

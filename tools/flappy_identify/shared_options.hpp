@@ -1,4 +1,4 @@
-// Options that several subcommands have.
+// Options that several subcommands share.
 #pragma once
 
 #include <string>
@@ -8,18 +8,18 @@
 
 namespace flappy::identify {
 
-/// Which vehicle, and how its map is simulated.
+/// The vehicle, and the settings for simulating its map.
 struct MapSource {
   std::string vehicle, moment_point = "0,0,0";
   int threads = 0;
 
   void add(const io::Command& app, const std::string& vehicle_help);
   model::Vehicle read_vehicle() const;
-  /// The point is "x,y,z" in metres, or "com": the centre of mass of `vehicle`.
+  /// moment_point is "x,y,z" in metres, or "com": the centre of mass of `vehicle`. Throws InputError otherwise.
   MapOptions options(const model::Vehicle& vehicle) const;
 };
 
-/// No seed is a negative number, which would wrap.
+/// Upper limit of seeds, which rejects negative numbers: they would wrap to larger values.
 inline constexpr std::uint64_t kLargestSeed = INT64_MAX;
 
 }  // namespace flappy::identify

@@ -1,4 +1,4 @@
-// flappy-identify simulate-forces: the force map that a laboratory would measure of a vehicle.
+// flappy-identify simulate-forces: simulates the force map that a laboratory would measure of a vehicle.
 #include <cstdio>
 #include <memory>
 

@@ -1,4 +1,4 @@
-// flappy-identify transitions: the open-loop test of recorded flights.
+// flappy-identify transitions: open-loop test of a vehicle on recorded flights.
 #include "identify/transitions.hpp"
 
 #include <chrono>
@@ -22,7 +22,7 @@ struct Request {
   TransitionOptions options;
 };
 
-/// Given, or of the name that the log has, in the log's folder or beside it.
+/// The requested vehicle file, or the one that the log names, searched in the log's folder and in its parent.
 fs::path vehicle_path(const Request& request, const fs::path& folder, const flightlog::FlightHeader& header) {
   if (!request.vehicle.empty()) return request.vehicle;
   for (const fs::path& place : {folder / header.vehicle, folder / ".." / header.vehicle}) {
@@ -33,10 +33,10 @@ fs::path vehicle_path(const Request& request, const fs::path& folder, const flig
     return place;
   }
   throw io::InputError(folder.string() + ": its vehicle " + header.vehicle +
-                       " is neither in it nor beside it; accepted: one of these, or --vehicle");
+                       " is neither in it nor next to it; accepted: one of these, or --vehicle");
 }
 
-/// As people read it: millimetres, degrees.
+/// Scale and unit for printing a state: millimetres, degrees.
 struct Shown {
   double scale;
   const char* unit;
@@ -77,7 +77,7 @@ void print(const Request& request, const TransitionReport& r, double wall_s) {
       "  paper  after one beat under 5 %%, angles under 1 deg, position about 1 mm; more in pitch and vx after two\n");
 }
 
-/// Infinite ones, of samples that diverged, become null.
+/// Values by names of states; infinite values, of diverged samples, become null.
 Json by_state(const StateVector& values, const char* unit) {
   Json json = {{"unit", unit}};
   for (std::size_t k = 0; k < values.size(); ++k) json[kStateNames[k]] = values[k];
@@ -126,7 +126,7 @@ Command add_transitions(const io::Command& program) {
   io::Command sub = program.command("transitions", "replays recorded voltages from recorded states, one and two beats");
   const auto request = std::make_shared<Request>();
   sub.option("flight", request->flights, "folders of flight logs").required();
-  sub.option("--vehicle", request->vehicle, "vehicle file; otherwise that of the log, in its folder or beside it");
+  sub.option("--vehicle", request->vehicle, "vehicle file; otherwise that of the log, in its folder or next to it");
   io::Option samples = sub.option("--samples", request->options.samples, "samples to start from, evenly chosen")
                            .range(1, 10'000'000)
                            .shows_default();

@@ -1,4 +1,4 @@
-// flappy-job: asks a flappy-server, on this machine or another, to run jobs.
+// flappy-job: sends commands to a flappy-server, on this machine or another.
 #include <cstdio>
 #include <nlohmann/json.hpp>
 

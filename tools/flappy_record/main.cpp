@@ -1,4 +1,4 @@
-// flappy-record: a robot's ROS 2 topics to a flight log, and the messages as they came to an MCAP file beside it.
+// flappy-record: records a robot's ROS 2 topics into a flight log, and the unchanged messages into an MCAP file next to it.
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -9,7 +9,7 @@
 
 int main(int argc, char** argv) {
   using namespace flappy;
-  io::Program program("flappy-record", "Records a robot's ROS 2 topics as a flight log, and as MCAP beside it.", {});
+  io::Program program("flappy-record", "Records a robot's ROS 2 topics as a flight log, and as MCAP.", {});
   const io::Command& app = program.app();
   std::string mapping_name, out;
   std::vector<std::string> overrides;

@@ -1,4 +1,4 @@
-// flappy-report: results as one page that opens anywhere, and their figures for a paper.
+// flappy-report: shows results as one page that opens anywhere, and writes their figures for a paper.
 #include <cstdio>
 
 #include "io/files.hpp"
@@ -20,7 +20,7 @@ struct Request {
   bool open = false;
 };
 
-/// Figures of all sections; where two share a name, the later ones get their section's number.
+/// Writes the figures of all sections; where two have the same name, the later one gets its section's number.
 std::vector<fs::path> draw_all(const std::vector<Section>& sections, const fs::path& folder, Paper paper) {
   io::make_folder(folder);
   std::vector<std::string> taken;

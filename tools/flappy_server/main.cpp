@@ -1,4 +1,4 @@
-// flappy-server: a queue of jobs, each a child process, and a dashboard to look at them.
+// flappy-server: runs a queue of jobs, each in a process of its own, and serves a dashboard.
 #include <cstdio>
 #include <optional>
 
@@ -9,12 +9,12 @@
 #include "server/commands/command_server.hpp"
 #include "server/http/dashboard.hpp"
 #include "server/jobs/commands.hpp"
-#include "server/jobs/minder.hpp"
 #include "server/jobs/runner.hpp"
+#include "server/jobs/supervisor.hpp"
 
 int main(int argc, char** argv) {
   using namespace flappy;
-  server::mind_if_asked(argc, argv);  // a job's minder, which is no server
+  server::supervise_if_asked(argc, argv);  // does not return if this process is a job's supervisor
 
   io::Program program("flappy-server", "Runs a queue of jobs: trainings, evaluations, exports, diagnoses.", {});
   std::string config_name, listen;
@@ -30,7 +30,7 @@ int main(int argc, char** argv) {
     io::log_into(config.jobs.folders.output);
     server::Runner runner(queue, {config.jobs, io::beside_program("bin/flappy-server"), io::beside_program("bin")});
     server::Commands commands(queue, config, io::beside_program("bin"));
-    server::Watched watched;
+    server::LiveState watched;
     std::optional<server::Dashboard> dashboard;
     if (!config.http.listen.empty()) {
       dashboard.emplace(queue, watched, config);

@@ -1,4 +1,4 @@
-// flappy-sitl: the simulator as the robot of an autopilot that speaks ROS 2 or DDS.
+// flappy-sitl: software in the loop, with the simulator as the robot of an autopilot that communicates by ROS 2 or DDS.
 #include <cstdio>
 #include <nlohmann/json.hpp>
 

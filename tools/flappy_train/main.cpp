@@ -1,4 +1,4 @@
-// flappy-train: trains a policy, and leaves a run folder.
+// flappy-train: trains a policy and writes a run folder.
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -26,7 +26,7 @@ using namespace learn;
 
 const auto started = std::chrono::steady_clock::now();
 
-/// "3", "0-4"
+/// Parses seeds: "3" or "0-4".
 std::vector<std::uint64_t> seeds_of(const std::string& text) {
   std::array<std::uint64_t, 2> ends{};
   const char *at = text.data(), *end = at + text.size();
@@ -75,7 +75,7 @@ void print(const fs::path& folder, const TrainSummary& s) {
   std::printf("%s\n", io::shown_by(folder.string()).c_str());
 }
 
-/// The configuration that a run was started with.
+/// The configuration file that a run was started with.
 fs::path config_of(const fs::path& run) {
   fs::path config = run / "config" / "train.toml";
   if (!fs::is_regular_file(config))
@@ -117,7 +117,7 @@ TrainSummary train_one(TrainConfig config, TrainOptions options) {
   return summary;
 }
 
-/// Runs of several seeds, shared out among the ranks; what is there already goes on, or is done. Then their learning curve.
+/// Trains runs of several seeds, dealt out to the ranks; resumes unfinished runs and skips finished ones. Then writes their learning curve.
 void train_seeds(io::Program& program, const std::vector<std::uint64_t>& seeds, const fs::path& folder,
                  TrainOptions options, const std::function<TrainConfig(std::uint64_t)>& config_of) {
   const auto folder_of = [&](std::uint64_t seed) { return folder / ("seed_" + std::to_string(seed)); };
@@ -193,11 +193,11 @@ int main(int argc, char** argv) {
     options.commit = io::commit();
     options.started = train::started;
     const auto train_it = [&](const learn::TrainConfig& config) {
-      if (!options.from) learn::refuse_run_in(options.folder);  // on all ranks, before they meet
+      if (!options.from) learn::refuse_run_in(options.folder);  // refuse on all ranks, before they meet
       std::string agreed =
           "configuration: " + config.sha256 + "\ninit: " + (options.init ? options.init->sha256 : "") + "\n";
       if (options.from) agreed += "checkpoint: " + learn::Checkpoint(*options.from).payload_sha256() + "\n";
-      // LibTorch's replicas step each on their own
+      // with LibTorch each rank steps its own replica, so the processors must compute the same
       if (config.engine == learn::EngineKind::libtorch) agreed += "processor: " + learn::processor() + "\n";
       options.ranks = program.ranks(agreed);
       program.write_json(learn::json_of(train::train_one(config, options)));

@@ -1,4 +1,4 @@
-// flappy-tune: finds better gains for a controller on many flights at once, and writes its file.
+// flappy-tune: optimises the gains of a controller on many flights at once, and writes the controller's file.
 #include <chrono>
 #include <cstdio>
 #include <nlohmann/json.hpp>

@@ -1,29 +1,29 @@
-/* What a board has to do for the loop. hal_simulated.c does it over a byte stream; write your own beside it. */
+/* Functions that a board has to provide for the loop. hal_simulated.c provides them over a byte stream; add your own next to it. */
 #ifndef HAL
 #define HAL 1
 
 #include "onboard.h"
 
-/* Clocks, sensors and motor drivers begin to work, motors at 0 V. */
+/* Starts clocks, sensors and motor drivers, with the motors at 0 V. */
 void hal_start(void);
 
-/* Microseconds of the clock that also stamps the samples; it may wrap. */
+/* Time in us, by the clock that also stamps the samples; it may wrap. */
 uint32_t hal_now_us(void);
 
-/* Returns at that time, or at once if it has passed. 0: there is nothing to go on for, which no robot says. */
+/* Waits until that time; returns at once if it has passed. Returns 0 if the loop shall end, which happens in simulation only. */
 int hal_wait_us(uint32_t until_us);
 
-/* The oldest sample that has arrived and not been taken; 0 if there is none. */
+/* Takes the oldest sample that has arrived and was not taken; returns 0 if there is none. */
 int hal_imu(onboard_imu_sample *sample);
 int hal_pose(onboard_pose_sample *sample);
 
-/* What the pilot wishes, once. */
+/* Returns the pilot's wish; each wish is returned once. */
 onboard_wish hal_wish(void);
 
-/* Holds until the next call. */
+/* Sets the motors' voltages, which hold until the next call. */
 void hal_motors(float left_V, float right_V);
 
-/* After each tick. */
+/* Called after each tick. */
 void hal_telemetry(const onboard *o);
 
 #endif

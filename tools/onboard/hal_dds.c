@@ -1,7 +1,7 @@
-/* A board at the end of a network: flappy-sitl is its clock, its sensors and its motors. Messages of ROS 2 by Cyclone DDS.
+/* HAL over a network: flappy-sitl provides clock, sensors and motors. Messages of ROS 2 by Cyclone DDS.
 
-   In every control period flappy-sitl sends a tick that says how many samples have arrived since the start. The loop takes those,
-   runs until the next tick is due, and answers with the inputs of the wing beat. */
+   In every control period flappy-sitl sends a tick with the number of samples that it has sent since the start. The loop takes these
+      samples, runs until the next tick is due, and answers with the inputs of the wing beat. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -11,7 +11,7 @@
 #include "ros2_msgs.h"
 
 #define OVER 255
-#define RING 64U /* samples between two ticks; more are lost, as on a board */
+#define RING 64U /* largest number of samples between two ticks; older ones are lost, as on a board */
 
 typedef flappy_msgs_msg_dds__Tick_ tick_message;
 typedef sensor_msgs_msg_dds__Imu_ imu_message;
@@ -38,7 +38,7 @@ static dds_entity_t made(dds_entity_t entity, const char *what) {
   return entity;
 }
 
-/* Microseconds of the flight, which wrap as the clock of a board does. */
+/* Time of the flight in us; it wraps like the clock of a board. */
 static uint32_t microseconds(const builtin_interfaces_msg_dds__Time_ *t) {
   return (uint32_t)t->sec * 1000000U + (t->nanosec + 500U) / 1000U;
 }
@@ -63,7 +63,7 @@ static dds_entity_t reader(const dds_topic_descriptor_t *type, const char *name)
   return r;
 }
 
-/* ROS_DOMAIN_ID and CYCLONEDDS_URI say where flappy-sitl is. */
+/* ROS_DOMAIN_ID and CYCLONEDDS_URI select the network of flappy-sitl. */
 static void connect_to_simulator(void) {
   const char *domain = getenv("ROS_DOMAIN_ID");
   participant = made(dds_create_participant(domain != NULL ? (dds_domainid_t)atoi(domain) : 0U, NULL, NULL), "no participant");
@@ -109,7 +109,7 @@ static void take_samples(void) {
 
 static int before(uint32_t a, uint32_t b) { return (int32_t)(a - b) < 0; }
 
-/* The newest tick, and the samples that it counts. */
+/* Waits for the newest tick and for all samples that it counts. */
 static void receive(void) {
   int has_tick = 0;
   while (!has_tick || before(imu_count, tick.imu) || before(pose_count, tick.poses)) {
@@ -156,7 +156,7 @@ int hal_wait_us(uint32_t until_us) {
     if (code < 0) fail("an input cannot be sent", code);
     receive();
   }
-  if (!goes_on) dds_delete(participant); /* the simulator need not wait for us */
+  if (!goes_on) dds_delete(participant); /* at once, so that the simulator does not wait for this loop */
   return goes_on;
 }
 

@@ -1,4 +1,4 @@
-/* A board at the end of a byte stream (board.h): the simulator is its clock, its sensors and its motors. */
+/* HAL over a byte stream (board.h): the simulator provides clock, sensors and motors. */
 #include "hal_simulated.h"
 
 #include "board.h"

@@ -1,6 +1,6 @@
-/* What the simulator and the loop tell each other, in lock-step: the simulator sends a loop_input; the loop runs until
-   until_us on its clock, answers with a loop_output, and waits for the next one. Both are of one size, all members of four
-   bytes, lowest first, so there is no padding. The loop ends with the input, or upon wish = -1. */
+/* Messages between the simulator and the loop, in lock-step. The simulator sends a loop_input; the loop runs until until_us on its
+   clock, answers with a loop_output, and waits for the next input. Each message has a fixed size; all members have four bytes, lowest
+   first, so there is no padding. The loop ends at the end of the input stream, or upon wish = -1. */
 #ifndef HAL_SIMULATED
 #define HAL_SIMULATED 1
 
@@ -9,7 +9,7 @@
 enum { LOOP_IMU = 4, LOOP_POSES = 2, LOOP_DRIVES = 4 };
 
 typedef struct {
-  uint32_t now_us, until_us; /* now: later than the until before where the loop was late */
+  uint32_t now_us, until_us; /* now_us is later than the previous until_us if the loop was late */
   int32_t wish;              /* an onboard_wish */
   uint32_t imu_count, pose_count;
   struct {
@@ -23,10 +23,10 @@ typedef struct {
 } loop_input;
 
 typedef struct {
-  uint32_t state, flags; /* an onboard_state, and what has happened */
-  float input[4];        /* of the wing beat, as of the last tick: V, V, V, split cycle; 0 with the motors off */
+  uint32_t state, flags; /* an onboard_state, and the ONBOARD_ flags */
+  float input[4];        /* inputs of the wing beat at the last tick: V, V, V, split cycle; 0 with the motors off */
   uint32_t drive_count;
-  float volts[LOOP_DRIVES][2]; /* left, right; each until the next */
+  float volts[LOOP_DRIVES][2]; /* left, right; each holds until the next */
 } loop_output;
 
 #endif

@@ -1,4 +1,4 @@
-/* The main loop: 500 Hz from sensors to inputs of the wing beat, and a voltage every FLAPPY_CONTROLLER_DRIVE_US. */
+/* Main loop: at 500 Hz from sensors to inputs of the wing beat; motor voltages every FLAPPY_CONTROLLER_DRIVE_US. */
 #include "hal.h"
 
 static onboard vehicle;
@@ -30,7 +30,7 @@ int main(void) {
   uint32_t next_us;
   hal_start();
   onboard_begin(&vehicle, hal_now_us());
-  vehicle.tick_us = vehicle.drive_us = hal_now_us(); /* the self-tests took their time */
+  vehicle.tick_us = vehicle.drive_us = hal_now_us(); /* the self-tests have taken time */
   do {
     const uint32_t now_us = hal_now_us();
     if (onboard_due(vehicle.tick_us, now_us)) {

@@ -17,10 +17,10 @@ void onboard_begin(onboard *o, uint32_t now_us) {
 
 /* Samples. */
 
-/* One stamp from the future would have all good samples refused until the clock has caught up. */
+/* After a sample with a stamp in the future, all good samples would be refused until the clock has caught up. */
 static int in_time(uint32_t now_us, uint32_t taken_us) { return !flappy_after(taken_us, now_us + ONBOARD_LATE_US); }
 
-/* When a sample would have arrived with the latency of the training; not after now. */
+/* Time at which a sample would have arrived with the latency of the training, but not after `now_us`. */
 static uint32_t due_us_of(uint32_t now_us, uint32_t taken_us, uint32_t latency_us) {
   return flappy_after(taken_us + latency_us, now_us) ? now_us : taken_us + latency_us;
 }
@@ -28,7 +28,7 @@ static uint32_t due_us_of(uint32_t now_us, uint32_t taken_us, uint32_t latency_u
 void onboard_imu(onboard *o, uint32_t now_us, const onboard_imu_sample *s) {
   if (!in_time(now_us, s->taken_us) || !flappy_plausible_imu(s->gyro_rad_s, s->accel_m_s2)) return;
   if (onboard_flies(o)) {
-    o->controller.now_us = now_us; /* by which it judges times; the last tick may be long ago */
+    o->controller.now_us = now_us; /* the controller judges stamps by it, and the last tick may be long ago */
     if (!flappy_controller_imu(&o->controller, s->taken_us, s->gyro_rad_s, s->accel_m_s2)) return;
   }
   o->has_imu = 1;
@@ -64,7 +64,7 @@ static void turn_off(onboard *o, uint32_t why) {
   o->state = ONBOARD_OFF;
 }
 
-/* The policy acts no more, now or later; feedback stays here, for the goal may be further away than it can leap. */
+/* Ends the policy for good. Feedback control stays at this place, as the goal may be too far away for it. */
 static void drop_policy(onboard *o, uint32_t why) {
   o->flags |= why;
   if (o->state != ONBOARD_ACTING) return;
@@ -80,13 +80,13 @@ static void watch_sensors(onboard *o, uint32_t now_us) {
   if (pose_age_us > ONBOARD_POSE_LOST_US) turn_off(o, ONBOARD_POSE_LOST);
 }
 
-/* Before the flight: what is stale is forgotten, for after a turn of the clock it would look fresh. */
+/* Before the flight: forgets stale samples, which would look fresh after the clock has wrapped. */
 static void forget_stale(onboard *o, uint32_t now_us) {
   if (now_us - o->imu_us > ONBOARD_IMU_STALE_US) o->has_imu = 0;
   if (now_us - o->pose_us > ONBOARD_POSE_STALE_US) o->has_pose = 0;
 }
 
-/* A NaN would be clipped to full voltage, so it has to be seen before. */
+/* A NaN would be clipped to full voltage, so it has to be detected before. */
 static void watch_numbers(onboard *o) {
   const flappy_controller *c = &o->controller;
   if (!flappy_all_finite((const float *)&c->estimate, (uint32_t)sizeof c->estimate) ||
@@ -104,7 +104,7 @@ static void take_off(onboard *o, uint32_t now_us) {
   o->state = ONBOARD_HOVERING;
 }
 
-/* Whether it is where the task begins, and faces whereto. */
+/* Whether the vehicle is at the place and heading at which the task begins. */
 static int at_place(const flappy_controller *c) {
   const flappy_matrix R = flappy_rotation_matrix(c->estimate.attitude);
   const flappy_sin_cos is = flappy_heading(&R), wanted = c->hover_heading;
@@ -114,7 +114,7 @@ static int at_place(const flappy_controller *c) {
          flappy_abs(rotation_rad) <= ONBOARD_HEADING_RAD;
 }
 
-/* Counts no further than it has to: a hover may outlast the clock. */
+/* Counts the time at the place up to ONBOARD_HOVER_US only: a longer hover would make the counter wrap. */
 static void settle(onboard *o, uint32_t passed_us) {
   if (!at_place(&o->controller)) {
     o->settled_us = 0;
@@ -153,7 +153,7 @@ void onboard_tick(onboard *o, uint32_t now_us) {
   const onboard_wish wish = o->wish;
   const uint32_t passed_us = now_us - o->ticked_us;
   o->ticked_us = now_us;
-  o->tick_us += (late_us / ONBOARD_CONTROL_US + 1U) * ONBOARD_CONTROL_US; /* what was missed stays missed */
+  o->tick_us += (late_us / ONBOARD_CONTROL_US + 1U) * ONBOARD_CONTROL_US; /* missed ticks are not made up for */
   o->wish = ONBOARD_NOTHING;
 
   if (onboard_flies(o)) {
@@ -183,7 +183,7 @@ void onboard_tick(onboard *o, uint32_t now_us) {
 static float clamped(onboard *o, float volts) {
   if (flappy_abs(volts) <= ONBOARD_LIMIT_V) return volts;
   o->flags |= ONBOARD_CLAMPED;
-  return volts > 0.0F ? ONBOARD_LIMIT_V : volts < 0.0F ? -ONBOARD_LIMIT_V : 0.0F; /* NaN is neither */
+  return volts > 0.0F ? ONBOARD_LIMIT_V : volts < 0.0F ? -ONBOARD_LIMIT_V : 0.0F; /* NaN gives 0 V */
 }
 
 void onboard_drive(onboard *o, uint32_t now_us, float *left_V, float *right_V) {
@@ -191,7 +191,7 @@ void onboard_drive(onboard *o, uint32_t now_us, float *left_V, float *right_V) {
   o->drive_us += (missed + 1U) * FLAPPY_CONTROLLER_DRIVE_US;
   *left_V = *right_V = 0.0F;
   if (!onboard_flies(o)) return;
-  o->controller.phase += missed * FLAPPY_CONTROLLER_PHASE_STEP; /* the beat keeps its time */
+  o->controller.phase += missed * FLAPPY_CONTROLLER_PHASE_STEP; /* the beat's phase follows time, also over missed updates */
   flappy_controller_drive(&o->controller, left_V, right_V);
   *left_V = clamped(o, *left_V);
   *right_V = clamped(o, *right_V);

@@ -1,20 +1,19 @@
-/* The flight logic around the two exported headers: from sensor samples to motor voltages, with what watches over it. It
-   knows no hardware and no clock but the times it is given: microseconds that may wrap.
+/* Flight logic around the two exported headers: from sensor samples to motor voltages, with safety checks. It is independent of the
+   hardware and has no clock: all times are arguments, in microseconds that may wrap.
 
-     onboard_begin     self-tests: REFUSED, or WAITING
-     WAITING           motors off; fresh samples and a wish to hover: HOVERING
-     HOVERING          feedback alone, where the task begins; the trim is learnt; a wish for the manoeuvre: ACTING
-     ACTING            the policy acts until the controller hands back, or something is wrong: RETURNED
-     RETURNED          feedback alone, at the goal or where it went wrong; the policy never acts again
-     OFF               motors off for good: without the IMU, without motion capture for too long, without an estimate, or
-                       by wish */
+     onboard_begin     runs the self-tests: to REFUSED or WAITING
+     WAITING           motors off; to HOVERING by the wish to hover, if samples are fresh
+     HOVERING          feedback control at the start of the task, which learns the trim; to ACTING by the wish for the manoeuvre
+     ACTING            the policy acts; to RETURNED when the controller hands back, or at a fault
+     RETURNED          feedback control at the goal, or at the place of the fault; the policy never acts again
+     OFF               motors off for good: IMU lost, motion capture lost for too long, estimate not finite, or by wish */
 #ifndef ONBOARD
 #define ONBOARD 1
 
 #include "flappy_controller.h"
 #include "flappy_policy.h"
 
-/* What this loop was written for. */
+/* Format and control period that this loop requires of the headers. */
 #define ONBOARD_FORMAT 1
 #define ONBOARD_CONTROL_US 2000U
 
@@ -32,20 +31,20 @@
 #error "flappy_policy.h does not take what flappy_controller.h shows, or does not give four numbers"
 #endif
 
-/* Limits; each may be set by the compiler. A sample is as old as its arrival, or as its stamp and the latency of the training
-   make it, whichever is more. */
+/* Limits; each may be defined on the compiler's command line. The age of a sample counts from the time at which it would have arrived
+   with the latency of the training, but not from later than its real arrival. */
 
-/* Five control periods: an IMU of 500 Hz has then missed five samples, which is no jitter. The policy has never flown on an
-   estimate that is extrapolated further. */
+/* Five control periods: an IMU of 500 Hz has then missed five samples, which is more than jitter. In training the policy never flew on
+   an estimate that was extrapolated further. */
 #ifndef ONBOARD_IMU_STALE_US
 #define ONBOARD_IMU_STALE_US 10000U
 #endif
-/* A flapper is unstable: in the simulator it leans by 0.1 to 0.4 rad this long after the last sample, and has turned over
-   in twice the time. */
+/* A flapper is unstable: in the simulator it leans by 0.1 to 0.4 rad at this age of the last sample, and has turned over after twice
+   the time. */
 #ifndef ONBOARD_IMU_LOST_US
 #define ONBOARD_IMU_LOST_US 50000U
 #endif
-/* Seven frames of 150 Hz. The estimate is still good then, but the policy was trained on a better one. */
+/* Seven frames at 150 Hz. The estimate is still good then, but the policy was trained on a better one. */
 #ifndef ONBOARD_POSE_STALE_US
 #define ONBOARD_POSE_STALE_US 50000U
 #endif
@@ -53,28 +52,28 @@
 #ifndef ONBOARD_POSE_LOST_US
 #define ONBOARD_POSE_LOST_US 1500000U
 #endif
-/* Half a period: what the policy sees then belongs to the next tick rather than to this one. Samples from further ahead are
-   dropped. */
+/* Half a period: beyond it, the policy's observation belongs to the next tick rather than to this one. Samples whose stamps are further
+   in the future are dropped. */
 #ifndef ONBOARD_LATE_US
 #define ONBOARD_LATE_US 1000U
 #endif
-/* Three times as long as an escape. A task that never hands back wants more. */
+/* Longest action of the policy: three times as long as an escape. A task that never hands back needs more. */
 #ifndef ONBOARD_ACTING_US
 #define ONBOARD_ACTING_US 1000000U
 #endif
-/* So long at its place: the integrators have settled. */
+/* Time of hover at its place after which the integrators have settled. */
 #ifndef ONBOARD_HOVER_US
 #define ONBOARD_HOVER_US 1000000U
 #endif
-/* Along each axis from where the task begins, for the policy to begin: twice what it was trained from. */
+/* Largest distance along each axis from the start of the task at which the policy may begin: twice the range of its training. */
 #ifndef ONBOARD_PLACE_M
 #define ONBOARD_PLACE_M 0.1F
 #endif
-/* From the heading with which it begins: twice what the escape was trained from. */
+/* Largest error of the heading at which the policy may begin: twice the range of the escape's training. */
 #ifndef ONBOARD_HEADING_RAD
 #define ONBOARD_HEADING_RAD 0.4F
 #endif
-/* What the motors may ever get, whatever was computed: theirs is 18 V. */
+/* Limit of the motor voltages, whatever was computed; the motors are rated for 18 V. */
 #ifndef ONBOARD_LIMIT_V
 #define ONBOARD_LIMIT_V 18.0F
 #endif
@@ -88,20 +87,20 @@ typedef enum {
   ONBOARD_OFF
 } onboard_state;
 
-/* What has happened since the start, as bits. */
-#define ONBOARD_BAD_POLICY 1U     /* its self-test fails */
-#define ONBOARD_BAD_CONTROLLER 2U /* its self-test fails */
-#define ONBOARD_HANDED_BACK 4U    /* by the controller, as the task has it */
-#define ONBOARD_UNREADY 8U        /* a manoeuvre was wished for and not begun */
-#define ONBOARD_IMU_STALE 16U     /* from here on: faults, after which the policy does not act */
+/* Events since the start, as bits. */
+#define ONBOARD_BAD_POLICY 1U     /* the policy's self-test failed */
+#define ONBOARD_BAD_CONTROLLER 2U /* the controller's self-test failed */
+#define ONBOARD_HANDED_BACK 4U    /* by the controller, at the task's condition */
+#define ONBOARD_UNREADY 8U        /* a wished manoeuvre did not begin */
+#define ONBOARD_IMU_STALE 16U     /* this and all that follow are faults, after which the policy does not act */
 #define ONBOARD_IMU_LOST 32U
 #define ONBOARD_POSE_STALE 64U
 #define ONBOARD_POSE_LOST 128U
-#define ONBOARD_LATE 256U             /* a tick */
-#define ONBOARD_POLICY_REFUSED 512U   /* the observation had a NaN in it */
+#define ONBOARD_LATE 256U             /* a tick was late by more than ONBOARD_LATE_US */
+#define ONBOARD_POLICY_REFUSED 512U   /* the observation contained a NaN */
 #define ONBOARD_POLICY_TOO_LONG 1024U /* it acted longer than ONBOARD_ACTING_US */
 #define ONBOARD_CLAMPED 2048U         /* a voltage was above its limit, or NaN */
-#define ONBOARD_NOT_FINITE 4096U      /* estimate or inputs: motors off */
+#define ONBOARD_NOT_FINITE 4096U      /* estimate or inputs are not finite: motors off */
 #define ONBOARD_STOPPED 8192U         /* by wish */
 #define ONBOARD_FAULTS (~15U)
 
@@ -115,7 +114,7 @@ typedef struct {
   uint32_t valid; /* 0: the tracker did not see the vehicle */
   flappy_vector position_m;
   flappy_quaternion attitude;
-} onboard_pose_sample; /* of the torso's origin in W, where the task has its goal */
+} onboard_pose_sample; /* pose of the torso's origin in W, the frame of the task's goal */
 
 typedef enum { ONBOARD_NOTHING, ONBOARD_HOVER, ONBOARD_MANOEUVRE, ONBOARD_STOP } onboard_wish;
 
@@ -124,39 +123,39 @@ typedef struct {
   onboard_state state;
   uint32_t flags;
   onboard_wish wish;
-  uint32_t tick_us, drive_us; /* when onboard_tick() and onboard_drive() are due next */
-  uint32_t ticked_us;         /* when the last tick was */
-  uint32_t imu_us, pose_us;   /* when the last good sample arrived, or should have */
-  uint32_t settled_us;        /* for so long it has been at its place, up to ONBOARD_HOVER_US */
-  uint32_t act_us;            /* when that began */
-  onboard_pose_sample pose;   /* the last good one */
+  uint32_t tick_us, drive_us; /* times at which onboard_tick() and onboard_drive() are due next */
+  uint32_t ticked_us;         /* time of the last tick */
+  uint32_t imu_us, pose_us;   /* time at which the last good sample arrived, or should have */
+  uint32_t settled_us;        /* duration of the hover at its place, up to ONBOARD_HOVER_US */
+  uint32_t act_us;            /* time at which the policy began to act */
+  onboard_pose_sample pose;   /* the last good sample */
   int has_imu, has_pose;
 } onboard;
 
-/* Tests both headers; `now_us`: when the first tick is due. */
+/* Runs the self-tests of both headers. `now_us`: time at which the first tick is due. */
 void onboard_begin(onboard *o, uint32_t now_us);
 
-/* Samples as they arrive, oldest first, before the tick. What is no sample (NaN, beyond what a sensor shows, too old, from the
-   future, a quaternion not of length 1) is dropped. */
+/* Pass samples as they arrive, oldest first, before the tick. Invalid samples are dropped: NaN, outside a sensor's range, too old, from
+   the future, a quaternion that has not length 1. */
 void onboard_imu(onboard *o, uint32_t now_us, const onboard_imu_sample *sample);
 void onboard_pose(onboard *o, uint32_t now_us, const onboard_pose_sample *sample);
 
-/* Wishes of whoever flies, looked at in the next tick: the last one, but nothing undoes a stop. A manoeuvre begins only from a
-   hover of ONBOARD_HOVER_US at its place and heading, without a fault; otherwise nothing changes. */
+/* The pilot's wishes. The next tick obeys the last one; nothing undoes a stop. A manoeuvre begins only after a hover of ONBOARD_HOVER_US
+   at its place and heading without a fault; otherwise it sets ONBOARD_UNREADY. */
 void onboard_hover(onboard *o);
 void onboard_manoeuvre(onboard *o);
 void onboard_stop(onboard *o);
 
-/* Every control period. */
+/* Call every control period. */
 void onboard_tick(onboard *o, uint32_t now_us);
 
-/* Every FLAPPY_CONTROLLER_DRIVE_US: what the motors get until the next one. */
+/* Call every FLAPPY_CONTROLLER_DRIVE_US; returns the motors' voltages until the next call. */
 void onboard_drive(onboard *o, uint32_t now_us, float *left_V, float *right_V);
 
 /* Whether the motors may turn. */
 int onboard_flies(const onboard *o);
 
-/* `due_us` has come. */
+/* Whether the time `due_us` has come. */
 int onboard_due(uint32_t due_us, uint32_t now_us);
 
 #endif

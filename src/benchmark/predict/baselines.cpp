@@ -12,15 +12,15 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Of the largest residual, in units of the noise, below which it is none.
+/// largest_residual names an effect if the largest residual is at least this, in units of the noise.
 constexpr double kStandsOut = 2;
-/// Least rms contribution of a column, in units of the noise.
+/// Thresholds to choose from: least rms contribution of a column, in units of the noise.
 constexpr double kThresholds[] = {0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1};
 constexpr int kRounds = 10;
-/// Against columns that are alike, of their own sums.
+/// Ridge on normalised columns, for columns may be nearly the same.
 constexpr double kRidge = 1e-6;
 
-/// Sums of squares of residuals by group, in units of the noise, and rows that were counted.
+/// Sums of squares of rows by group, in units of the noise variance, and the number of rows.
 struct Energy {
   std::vector<double> sum = std::vector<double>(gap::kGroups, 0), rows = std::vector<double>(gap::kGroups, 0);
   double rms(std::size_t g) const { return rows[g] > 0 ? std::sqrt(sum[g] / rows[g]) : 0; }
@@ -49,7 +49,7 @@ Energy energy(const gap::Flights& flights, const std::vector<double>& noise_sd, 
   return e;
 }
 
-/// Names by figure, the largest first, each once.
+/// Names by their number, the largest first; each name once, without "".
 std::vector<std::string> ranked(std::vector<std::pair<double, std::string>> list) {
   std::ranges::stable_sort(list, std::greater{}, &std::pair<double, std::string>::first);
   std::vector<std::string> names;
@@ -157,7 +157,7 @@ std::vector<double> features(const gap::Flights& flights, const gap::Inference& 
   std::vector<std::vector<gap::RegimeFunction>> functions;
   for (const auto& f : flights) functions.push_back(f->functions());
   const auto count = static_cast<Index>(functions.front().size());
-  // sums over beats of 1, r, r^2 and, of each function b, of b, b^2 and b r
+  // sums over beats: of 1, r, r^2; and for each function b, of b, b^2, b r
   MatrixXd own = MatrixXd::Zero(gap::kGroups, 3), sum = MatrixXd::Zero(gap::kGroups, count), square = sum,
            product = sum;
   for (std::size_t f = 0; f < flights.size(); ++f)

@@ -25,7 +25,7 @@ Prediction predict(const Question& q) {
   if (!q.experiments.empty() && abstains(d.result.verdict)) propose_experiment(request, d);
   Prediction p;
   if (d.corrected) {
-    d.corrected->posterior.reset();  // long, and not used here
+    d.corrected->posterior.reset();  // long, and not scored
     p.corrected = model::vehicle_text(*d.corrected);
     if (q.baselines) {
       p.baselines = baselines(d.flights, *d.uncertain, d.inference, q.withheld, settings.threads);

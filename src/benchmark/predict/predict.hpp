@@ -1,4 +1,4 @@
-// The diagnosing side of the blind benchmark: all that it gets is a question.
+// The diagnosing side of the blind benchmark. It gets a Question and nothing else of a case.
 #pragma once
 
 #include <filesystem>
@@ -11,31 +11,31 @@
 
 namespace flappy::benchmark {
 
-/// The answer of a simpler method.
+/// The answer of a baseline.
 struct Baseline {
-  std::vector<std::string> named;    ///< none: parameters
-  std::vector<std::string> ranking;  ///< all that it can rank, the most likely first
+  std::vector<std::string> named;    ///< effects; empty: the parameters explain the flights
+  std::vector<std::string> ranking;  ///< all effects that it ranks, the most likely first
 };
 
 inline constexpr const char* kBaselines[] = {"largest_residual", "best_rmse", "stlsq", "black_box"};
 
-/// What was said of a case before its label was opened.
+/// The prediction of a case, made before its label is opened.
 struct Prediction {
   gap::Diagnosis diagnosis;
-  std::map<std::string, Baseline> baselines;  ///< by kBaselines
-  std::vector<double> features;               ///< of the residuals, for the black box (baselines.hpp)
-  std::string corrected;                      ///< text of the corrected vehicle file; none: the data are at fault
-  bool crashed = false;                       ///< the robot crashed in the flight that was to be diagnosed
+  std::map<std::string, Baseline> baselines;  ///< by name (kBaselines)
+  std::vector<double> features;               ///< features of the residuals, for the black box (baselines.hpp)
+  std::string corrected;                      ///< text of the corrected vehicle file; empty: the data are faulty
+  bool crashed = false;                       ///< the robot crashed in the flight to be diagnosed
 };
-/// Whether a verdict names no one answer as more likely than not: `group`, or less than one half.
+/// Whether a verdict states no single answer as more probable than not: a group, or a probability below one half.
 bool abstains(const gap::Verdict& verdict);
 
 struct Question {
   std::vector<std::filesystem::path> flights;  ///< folders of logs
   std::filesystem::path vehicle, priors, discrepancy, verdict;
-  std::vector<std::string> withheld;  ///< effects that the catalogue is to lack
+  std::vector<std::string> withheld;  ///< effects to leave out of the catalogue
   bool baselines = true;
-  std::filesystem::path experiments;  ///< manoeuvres to propose one of, where the verdict abstains; empty: none
+  std::filesystem::path experiments;  ///< manoeuvres, one of which is proposed if the verdict abstains; empty: none
 };
 using Predictor = std::function<Prediction(const Question&)>;
 

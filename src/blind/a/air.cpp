@@ -3,7 +3,7 @@
 //   alpha = theta + sgn(u) pi/2 - atan(w/u)
 //   F = 1/2 rho C_N(alpha) c U^2 dr, along the wing's x, at d_cp(alpha) c below the leading edge
 //   M_rd = -1/8 rho |thetadot| thetadot C_rd sum of c^4 dr, about y
-// C_N and d_cp: Fei et al., ICRA 2019 (arXiv 1902.09628). Sines and cosines of alpha come from the velocity itself.
+// C_N and d_cp: Fei et al., ICRA 2019 (arXiv 1902.09628). sin and cos of alpha follow from the velocity components without an atan.
 #include "blind/a/robot.hpp"
 
 namespace flappy::blind {
@@ -13,10 +13,11 @@ void Robot::blow() {
   air_ = {};
   const Vector3d &w = x_.torso.rate_rad_s, through_air = R_.transpose() * (x_.torso.velocity_m_s - x_.wind_m_s);
 
-  if (const double size = sizes_[Effect::clap_and_fling]; size > 0) {
-    // wings that all but meet, behind or before the body, part with a circulation that they keep for some milliseconds
+  if (const double magnitude = magnitudes_[Effect::clap_and_fling]; magnitude > 0) {
+    // wings that almost touch, behind or in front of the body, separate with extra circulation, which decays within
+    // some milliseconds
     const double gap_rad = kPi - std::abs(x_.side[0].wing.stroke_rad + x_.side[1].wing.stroke_rad);
-    const double met = 0.5 * size / (1 + exponential((gap_rad - 0.4) / 0.07));
+    const double met = 0.5 * magnitude / (1 + exponential((gap_rad - 0.4) / 0.07));
     x_.fling = std::max(met, x_.fling * (1 - step_s_ / 4e-3));
   }
 
@@ -30,22 +31,23 @@ void Robot::blow() {
     const double stroking = s.sign * rate.z(), lifting = s.sign * rate.x();
     const SinCos rotation = sin_cos(q.rotation_rad);
 
-    double memory = 0;  // a wing that turns back meets the air it has set in motion
-    if (const double size = sizes_[Effect::wake_capture]; size > 0) {
+    double memory = 0;  // after stroke reversal a wing meets the air that it has set in motion
+    if (const double magnitude = magnitudes_[Effect::wake_capture]; magnitude > 0) {
       state.wake_rad_s += step_s_ / 3e-3 * (q.stroke_rad_s - state.wake_rad_s);
-      if (state.wake_rad_s * q.stroke_rad_s < 0) memory = -0.15 * size * state.wake_rad_s;
+      if (state.wake_rad_s * q.stroke_rad_s < 0) memory = -0.15 * magnitude * state.wake_rad_s;
     }
     const double twist = state.twist_rad, span = s.planform.wing_length_m;
-    const double rotational = sizes_[Effect::rotational_lift] * 0.75 * kPi * rho * q.rotation_rad_s;
+    const double rotational = magnitudes_[Effect::rotational_lift] * 0.75 * kPi * rho * q.rotation_rad_s;
     const double pressure = 0.5 * rho * s.strips.width_m;
-    const double lift_gain = state.air_gain * (1 + x_.fling) * motion_gain_;  // of the lift alone: less is induced
+    // The gain acts on lift alone, as it stands for a lower induced velocity.
+    const double lift_gain = state.air_gain * (1 + x_.fling) * motion_gain_;
 
     double force_x = 0, force_z = 0, moment_x = 0, moment_y = 0, moment_z = 0, twisting = 0;
     for (std::size_t i = 0; i < kStrips; ++i) {
       const double r = s.strips.r_m[i], c = s.strips.chord_m[i];
       const double u = (stroking + memory) * r - shoulder.x(), up = lifting * r + shoulder.z();
       const double speed2 = u * u + up * up + 1e-12, per_speed = 1 / std::sqrt(speed2);
-      const double bent = twist * r / span;  // small: second order is enough
+      const double bent = twist * r / span;  // small angle: a second-order expansion is enough
       const double sin_t = rotation.sin + bent * (rotation.cos - 0.5 * bent * rotation.sin);
       const double cos_t = rotation.cos - bent * (rotation.sin + 0.5 * bent * rotation.cos);
       const double way = std::copysign(1.0, u);
@@ -58,8 +60,9 @@ void Robot::blow() {
       double f = pressure * s.kept[i] * c * normal * speed2;
       double arm = centre * c;
       if (rotational != 0) {
-        // circulation of the pitching strip, which a gust of its own edges limits; at half chord. On either stroke thetadot > 0
-        // moves the flow at 3/4 chord towards a larger C_N (Sane and Dickinson 2002): it adds to a wing that pitches up
+        // circulation of the pitching strip, at half chord, limited at high rotation rates. On either stroke
+        // thetadot > 0 moves the flow at 3/4 chord towards a larger C_N (Sane and Dickinson 2002), so it adds to the
+        // force of a wing that pitches up
         const double limited = 1 / (1 + std::abs(q.rotation_rad_s) * c / 40);
         const double extra = rotational * limited * s.kept[i] * s.strips.width_m * c * c / per_speed;
         arm = std::abs(f + extra) > 1e-9 ? (f * arm + extra * 0.5 * c) / (f + extra) : 0.5 * c;
@@ -76,10 +79,11 @@ void Robot::blow() {
     moment_x *= lift_gain;
     moment_y -= 0.125 * rho * std::abs(q.rotation_rad_s) * q.rotation_rad_s *
                 s.planform.rotational_damping_coefficient * s.fourth_m5;
-    if (const double size = sizes_[Effect::wing_flexibility]; size > 0) {
-      // one twist mode, linear along the span; the load bends it within a millisecond
+    if (const double magnitude = magnitudes_[Effect::wing_flexibility]; magnitude > 0) {
+      // one twist mode, linear along the span, which follows the load with a time constant of 1 ms
       constexpr double kTwist_Nm_rad = 8e-3, kTwist_s = 1e-3;
-      state.twist_rad += step_s_ / kTwist_s * (std::clamp(size * twisting / span / kTwist_Nm_rad, -0.6, 0.6) - twist);
+      state.twist_rad +=
+          step_s_ / kTwist_s * (std::clamp(magnitude * twisting / span / kTwist_Nm_rad, -0.6, 0.6) - twist);
     }
     const Vector3d force = p.edge * Vector3d(force_x, 0, force_z);
     const Vector3d moment = p.edge * Vector3d(s.sign * moment_x, moment_y, s.sign * moment_z);
@@ -88,14 +92,14 @@ void Robot::blow() {
     const int stroke = 6 + 2 * static_cast<int>(k);
     rhs_(stroke) += p.stroke_axis.dot(moment);
     rhs_(stroke + 1) += p.rotation_axis.dot(moment);
-    if (sizes_.has(Effect::added_mass)) add_added_mass(k);
+    if (magnitudes_.has(Effect::added_mass)) add_added_mass(k);
   }
   rhs_.segment<3>(0) += air_.moment_Nm;
   rhs_.segment<3>(3) += air_.force_N;
 }
 
-/// Air that goes along with each strip: mass rho pi/4 c^2 dr at half chord, by the change of the normal velocity n.v:
-/// n.a is linear in the unknowns and joins the mass matrix, v.(rate x n) and the rest of n.a are known.
+/// Added mass of each strip, rho pi/4 c^2 dr at half chord, times the rate of change of the normal velocity n.v. The part of n.a that
+/// is linear in the unknowns goes into the mass matrix; v.(rate x n) and the rest of n.a are known and go to the right-hand side.
 void Robot::add_added_mass(std::size_t k) {
   const Side& s = side_[k];
   const Pose& p = pose_[k];
@@ -104,7 +108,7 @@ void Robot::add_added_mass(std::size_t k) {
   const Vector3d shoulder_v = R_.transpose() * x_.torso.velocity_m_s + w.cross(s.shoulder_m);
   const Vector3d shoulder_a = w.cross(w.cross(s.shoulder_m));
   const int stroke = 6 + 2 * static_cast<int>(k);
-  const double scale = sizes_[Effect::added_mass] * density_kg_m3_ * x_.density_gain * kPi / 4 * s.strips.width_m;
+  const double scale = magnitudes_[Effect::added_mass] * density_kg_m3_ * x_.density_gain * kPi / 4 * s.strips.width_m;
   for (std::size_t i = 0; i < kStrips; ++i) {
     const double c = s.strips.chord_m[i], mass = scale * s.kept[i] * c * c;
     const Vector3d r = s.sign * s.strips.r_m[i] * p.wing.col(1) - 0.5 * c * p.wing.col(2);

@@ -21,7 +21,7 @@ const std::array<std::string, kBlindEffects>& effect_names() {
   return kNames;
 }
 
-Sizes::Sizes(const std::vector<BlindEffect>& effects) {
+Magnitudes::Magnitudes(const std::vector<BlindEffect>& effects) {
   const auto& names = effect_names();
   std::array<bool, kBlindEffects> given{};
   for (const BlindEffect& e : effects) {
@@ -30,11 +30,11 @@ Sizes::Sizes(const std::vector<BlindEffect>& effects) {
       throw io::InputError("--effect " + e.id + ": no such effect; accepted: what `flappy-blind effects` lists" +
                            io::did_you_mean(e.id, {names.begin(), names.end()}));
     if (given[k]) throw io::InputError("--effect " + e.id + ": given twice; accepted: each effect once");
-    if (!(e.size >= 0 && e.size <= 4))
-      throw io::InputError("--effect " + e.id + ": size " + io::shortest_digits(e.size) +
+    if (!(e.magnitude >= 0 && e.magnitude <= 4))
+      throw io::InputError("--effect " + e.id + ": magnitude " + io::shortest_digits(e.magnitude) +
                            " is out of range; accepted: 0 to 4, 1 is typical");
     given[k] = true;
-    size_[k] = e.size;
+    magnitude_[k] = e.magnitude;
   }
 }
 

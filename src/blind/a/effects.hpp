@@ -1,5 +1,5 @@
-// What may be wrong with the blind robot: the effects of the catalogue, each in a form of this room's own, and others
-// that no catalogue has (outside_*). An effect has one number, its size: 0 is none, 1 is typical of a 12 g vehicle.
+// Effects of family A: those of the catalogue, each by a law of this family's own, and others that are outside the catalogue
+// (outside_*). An effect has one parameter, its magnitude: 0 switches it off, 1 is typical of a 12 g vehicle.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace flappy::blind {
 
-/// Their identifiers; effect_names() has them as text.
+/// Identifiers of all effects; effect_names() gives them as text.
 #define FLAPPY_BLIND_EFFECTS                                                                                           \
   ground_effect, ceiling_effect, wall_effect, body_drag, added_mass, rotational_lift, wake_capture, clap_and_fling,    \
       wing_flexibility, wing_damage, wind, spring_hardening, gear_backlash, coulomb_friction, winding_heating,         \
@@ -26,20 +26,20 @@ const std::array<std::string, kBlindEffects>& effect_names();
 
 struct BlindEffect {
   std::string id;
-  double size = 1;
+  double magnitude = 1;
 };
 
-/// The size of every effect.
-class Sizes {
+/// Magnitude of every effect; 0 where the robot does not have it.
+class Magnitudes {
  public:
-  Sizes() = default;
-  /// io::InputError where an id is unknown or given twice, or a size is not within 0 and 4.
-  explicit Sizes(const std::vector<BlindEffect>& effects);
-  double operator[](Effect e) const { return size_[static_cast<std::size_t>(e)]; }
+  Magnitudes() = default;
+  /// Throws io::InputError if an id is unknown or given twice, or a magnitude is not within 0 and 4.
+  explicit Magnitudes(const std::vector<BlindEffect>& effects);
+  double operator[](Effect e) const { return magnitude_[static_cast<std::size_t>(e)]; }
   bool has(Effect e) const { return (*this)[e] > 0; }
 
  private:
-  std::array<double, kBlindEffects> size_{};
+  std::array<double, kBlindEffects> magnitude_{};
 };
 
 }  // namespace flappy::blind

@@ -5,7 +5,7 @@
 namespace flappy::blind {
 namespace {
 
-constexpr double kHeight_m = 1;  ///< of the goal, far from ground and ceiling
+constexpr double kHeight_m = 1;  ///< added to the task's heights, to be far from ground and ceiling
 
 model::Vec3<double> vec3(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -17,7 +17,7 @@ flight::Setpoint<double> hold(const Vector3d& position_m, double heading_rad) {
   return s;
 }
 
-/// Position and heading, as the task spreads them.
+/// Draws position and heading from the task's start range.
 Waypoint start_of(const flight::StartRange& range, std::uint64_t seed, std::size_t number) {
   Random random(seed, 100 * number + 171);
   const auto draw = [&](const flight::Spread& s) { return s.centre + s.half * (2 * random.uniform() - 1); };
@@ -29,7 +29,7 @@ Waypoint start_of(const flight::StartRange& range, std::uint64_t seed, std::size
   return w;
 }
 
-/// Hovers, then lets the policy act until its work is done.
+/// Hovers, then lets the policy act until it hands back.
 class Escaper {
  public:
   Escaper(const Case& c, std::size_t number, const EscapeRules& rules, const Waypoint& start)
@@ -83,7 +83,7 @@ class Escaper {
     std::ranges::copy(adds, episode_.adds);
   }
 
-  /// On the true state, but for the hand-back where that is the estimate's.
+  /// Judges on the true state, except the hand-back, which the task may base on the estimate.
   void note_outcome(const Torso& torso, const flight::Estimate<double>& seen, double t_s) {
     const flight::TaskConstants<double>& k = rules_.constants;
     flight::Estimate<double> truth{};
@@ -105,7 +105,7 @@ class Escaper {
   flight::Setpoint<double> start_, goal_{};
   flight::Pid<double> pid_{};
   flight::Episode<double> episode_{};
-  std::vector<double> past_;            // observations at the last actions, newest first
+  std::vector<double> past_;            // earlier observations, one for each action, newest first
   std::uint32_t tick_ = 0, ended_ = 0;  ///< control periods since the manoeuvre began
 };
 
@@ -118,7 +118,7 @@ Escape escape(const Case& c, std::size_t number, const EscapeRules& rules) {
   start.attitude = turned_by({0, 0, at.heading_rad});
   Escaper escaper(c, number, rules, at);
   Escape e;
-  constexpr double kAnyWayUp = -2;  // the task says what is lost
+  constexpr double kAnyWayUp = -2;  // no crash for tumbling: the task's limits decide
   e.flight = fly(c, number, start, rules.constants.limits.time_s, kAnyWayUp,
                  [&](double t_s, double beat, const Torso& torso) { return escaper.steer(t_s, beat, torso); });
   escaper.finish(e);

@@ -1,5 +1,5 @@
-// The blind robot flies a policy's manoeuvre: the observation, the action and the hand-back that the policy was trained with
-// (flight/episode.hpp), and its success judged as there; physics, sensors and the view of the state are the robot's own.
+// The blind robot flies a policy's manoeuvre. Observation, action, hand-back and the criterion of success are those of the policy's
+// training (flight/episode.hpp); physics, sensors and the view of the state are the robot's own.
 #pragma once
 
 #include <functional>
@@ -9,24 +9,24 @@
 
 namespace flappy::blind {
 
-/// From an observation to what is added to the controller's output: V, V, V, split cycle.
+/// Maps an observation to inputs that are added to the controller's: V, V, V, split cycle.
 using ObservationPolicy = std::function<std::array<double, 4>(const std::vector<double>& observation)>;
 
 struct EscapeRules {
-  flight::Task task;                        ///< its goal stands still: the path has one segment
-  flight::TaskConstants<double> constants;  ///< of its task
-  flight::PidConstants<double> controller;  ///< that hovers before and after, and whose trim the policy adds to
+  flight::Task task;                        ///< with a goal that stands still: its path has one segment
+  flight::TaskConstants<double> constants;  ///< derived from the task
+  flight::PidConstants<double> controller;  ///< hovers before and after the manoeuvre
   ObservationPolicy policy;
 };
 
 struct Escape {
   RobotFlight flight;
-  double captured_s = 0, lost_s = 0;  ///< 0: never
+  double captured_s = 0, lost_s = 0;  ///< 0 if never
   std::uint32_t ended = 0;            ///< bits of flight::Ended
 };
 
-/// Escape `number` of a case: hover where the task's start is drawn, a metre up, then the manoeuvre from t = 0 of the log on.
-/// The same bytes for the same case.
+/// Flies escape `number` of a case: hover at a start drawn from the task, raised by 1 m, then the manoeuvre from t = 0 of the log on.
+/// Returns the same bytes for the same arguments.
 Escape escape(const Case& c, std::size_t number, const EscapeRules& rules);
 
 }  // namespace flappy::blind

@@ -7,7 +7,7 @@ namespace {
 
 using Words = std::vector<std::string>;
 
-/// In the order of Effect.
+/// All effects, in the order of Effect.
 const std::vector<FamilyEffect>& table() {
   const Words forces = {"force_x", "force_y", "force_z"}, torques = {"torque_x", "torque_y", "torque_z"};
   const Words wrench = {"force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z"};
@@ -76,7 +76,7 @@ const std::vector<FamilyEffect>& table() {
   return effects;
 }
 
-/// How far a figure is drawn from the file's: the standard deviation, of the figure itself or as it is.
+/// Standard deviation of a parameter about the file's value: a share of that value if `share`, else in the parameter's unit.
 struct Spread {
   std::string_view ending;
   double sd;
@@ -100,20 +100,20 @@ constexpr Spread kSpreads[] = {{".mass_kg", 0.03, true},
                                {".stiffness_positive_Nm_rad", 0.05, true},
                                {".stiffness_negative_Nm_rad", 0.05, true},
                                {".rest_angle_rad", kDegree, false},
-                               {".mean_chord_m", 0.05, true},  // its force of the air, and little else
+                               {".mean_chord_m", 0.05, true},  // scales the aerodynamic force, and little else
                                {".rotational_damping_coefficient", 0.05, true},
                                {"air.density_kg_m3", 0.02, true}};
 constexpr double kInertiaSpread = 0.07;
 
-/// A normal within three standard deviations.
+/// Standard normal, redrawn beyond three standard deviations.
 double within_three(Random& random) {
   double n = random.normal();
   while (std::abs(n) > 3) n = random.normal();
   return n;
 }
 
-/// Every figure of every body apart.
-void draw_figures(model::Vehicle& v, std::uint64_t seed) {
+/// Draws every parameter of every body independently.
+void draw_parameters(model::Vehicle& v, std::uint64_t seed) {
   Random random(seed, 201);
   for (model::Parameter& p : model::parameters(v))
     for (const Spread& s : kSpreads)
@@ -124,14 +124,14 @@ void draw_figures(model::Vehicle& v, std::uint64_t seed) {
   for (model::RigidBody* b : {&v.torso, &v.left.leading_edge, &v.left.wing, &v.right.leading_edge, &v.right.wing}) {
     model::InertiaTensor& i = b->inertia_kg_m2;
     const model::InertiaTensor declared = i;
-    do {  // flat wings are at the edge of what an inertia can be
+    do {  // redraws: a flat wing's inertia is at the limit of what is physical
       i = declared;
       for (double* x : {&i.xx, &i.yy, &i.zz, &i.xy, &i.yz, &i.xz}) *x *= 1 + kInertiaSpread * within_three(random);
     } while (model::physical_fault(v));
   }
 }
 
-/// Sensors of other laboratories: their rates, latencies and places are declared as they are.
+/// Draws the sensors of another laboratory; rates, latencies and positions are declared exactly until misdeclare().
 SensorSet drawn_sensors(const Assignment& a) {
   SensorSet s = sensors_of(a.seed, a.power, a.wings);
   Random random(a.seed, 202);
@@ -149,7 +149,7 @@ SensorSet drawn_sensors(const Assignment& a) {
   return s;
 }
 
-/// What a laboratory knows less well: the IMU's place to a millimetre, noise by a factor.
+/// Adds errors to declarations that a laboratory knows less well: the IMU's position by 1 mm, noise by a factor.
 void misdeclare(flightlog::FlightHeader& h, std::uint64_t seed) {
   Random random(seed, 203);
   for (double& x : h.imu.position_m) x += 1e-3 * within_three(random);
@@ -158,10 +158,10 @@ void misdeclare(flightlog::FlightHeader& h, std::uint64_t seed) {
     *noise *= random.between(0.7, 1.5);
 }
 
-/// The torso is led along the path that was flown; what it would feel there, were it free, is summed up by beats.
+/// Leads the torso along the flown path, and takes harmonics by beats of the accelerations that a free torso would have there.
 Contrast led(const Case& c, std::size_t flight, const std::vector<Torso>& path,
              const std::vector<std::array<double, 2>>& volts) {
-  Robot robot(c.vehicle, flight_room(), c.sizes, c.seed, flight);
+  Robot robot(c.vehicle, flight_room(), c.magnitudes, c.seed, flight);
   const auto& at = c.sensors->imu.position_m;
   const double beats_per_step = kRobotStep_s * c.vehicle.driver.flapping_Hz, trim = kTrim_s / kRobotStep_s;
   Contrast out;
@@ -205,12 +205,13 @@ class FamilyA final : public Family {
     return {f.crashed, std::move(f.how), std::move(f.log)};
   }
 
-  Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect, double size) const override {
+  Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect,
+                    double magnitude) const override {
     check(flight);
     Assignment with = a;
     if (std::erase_if(with.effects, [&](const auto& e) { return e.first == effect; }) > 0)
       throw io::InputError("effect " + effect + ": the flight was flown with it; accepted: a flight without it");
-    with.effects.emplace_back(effect, size);
+    with.effects.emplace_back(effect, magnitude);
     const Case before = case_of(a), after = case_of(with);
     std::vector<Torso> path;
     std::vector<std::array<double, 2>> volts;
@@ -241,15 +242,15 @@ class FamilyA final : public Family {
 Case case_of(const Assignment& a) {
   Case c = declared_case(a.vehicle_file);
   std::vector<BlindEffect> effects;
-  for (const auto& [id, size] : a.effects) effects.push_back({id, size});
-  c.sizes = Sizes(effects);
+  for (const auto& [id, magnitude] : a.effects) effects.push_back({id, magnitude});
+  c.magnitudes = Magnitudes(effects);
   c.seed = a.seed;
   c.programme = a.hover ? Programme::hover : Programme::rich;
   c.proposed = a.proposed;
   c.power = a.power;
   c.wings = a.wings;
   c.sensors = a.conventions ? drawn_sensors(a) : sensors_of(a.seed, a.power, a.wings);
-  if (a.own_figures) draw_figures(c.vehicle, a.seed);
+  if (a.own_parameters) draw_parameters(c.vehicle, a.seed);
   return c;
 }
 

@@ -1,4 +1,4 @@
-// Family A: the blind robot of this folder behind the interface that all families have.
+// Family A: the blind robot of this folder behind the common interface.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@ namespace flappy::blind {
 
 std::unique_ptr<Family> make_family_a();
 
-/// The robot of an assignment as this folder flies it; the log of a robot with `conventions` declares some of it otherwise.
+/// The case that an assignment stands for, with exact declarations. With `conventions`, Family::fly then changes some of those in the log.
 Case case_of(const Assignment& a);
 
 }  // namespace flappy::blind

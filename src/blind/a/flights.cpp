@@ -5,11 +5,11 @@
 namespace flappy::blind {
 namespace {
 
-/// Times without the last digits that products of steps leave.
+/// Rounds to 1 ns, which removes rounding errors of step times number.
 double tidy(double t_s) { return std::round(t_s * 1e9) / 1e9; }
 
-/// Of programmes: farther over, the pilot has lost it.
-constexpr double kLeastUpright = 0.17;
+/// World z component of the body's z axis below which the pilot of a programme has lost control.
+constexpr double kMinUpright = 0.17;
 
 std::string crash(const Robot& robot, const Room& room, double least_upright) {
   const Torso& t = robot.torso();
@@ -125,7 +125,7 @@ RobotFlight fly(const Case& c, std::size_t flight, const Watch& watch) {
   const Plan plan(c.programme, flight, flight_room(), c.seed);
   RobotController pilot(c.vehicle.driver, c.seed, flight);
 
-  // It learns to trim a metre up, in two fifths of the time, and goes where the log begins.
+  // The robot finds its trim at a height of 1 m in the first two fifths of kTrim_s, then moves to where the log begins.
   const auto asked = [&](double t_s) { return c.proposed ? aim_of(*c.proposed, t_s) : plan.at(t_s); };
   const Vector3d home_m = asked(0).position_m;
   constexpr double kTrimHeight_m = 1;
@@ -147,7 +147,7 @@ RobotFlight fly(const Case& c, std::size_t flight, const Watch& watch) {
     const auto u = c.proposed->excitation(t_s);
     return pilot.steer(torso, aim, {u[0], u[1], u[2], u[3]});
   };
-  RobotFlight f = fly(c, flight, start, c.proposed ? c.proposed->lasts_s : kFlight_s, kLeastUpright, steer, watch);
+  RobotFlight f = fly(c, flight, start, c.proposed ? c.proposed->lasts_s : kFlight_s, kMinUpright, steer, watch);
   f.farthest_m = farthest_m;
   return f;
 }
@@ -156,9 +156,9 @@ RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double du
                 const Steer& steer, const Watch& watch) {
   const Room room = flight_room();
   const SensorSet sensors = c.sensors ? *c.sensors : sensors_of(c.seed, c.power, c.wings);
-  Robot robot(c.vehicle, room, c.sizes, c.seed, flight);
-  RobotImu imu(sensors, c.sizes, c.seed, flight, kRobotStep_s);
-  RobotMocap mocap(sensors, c.sizes, c.seed, flight);
+  Robot robot(c.vehicle, room, c.magnitudes, c.seed, flight);
+  RobotImu imu(sensors, c.magnitudes, c.seed, flight, kRobotStep_s);
+  RobotMocap mocap(sensors, c.magnitudes, c.seed, flight);
   Random power_random(c.seed, 100 * flight + 161), wings_random(c.seed, 100 * flight + 162);
   RobotFlight f;
   f.log.header = header_of(c, sensors, room);
@@ -223,7 +223,7 @@ RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double du
     if (!logged) continue;
     if (const auto s = imu.after_step(robot, t_s + kRobotStep_s)) add(f.log, *s);
     if (sensors.power && due(step, sensors.power->rate_hz, power_count)) {
-      flightlog::PowerStream& p = *f.log.power;  // of the instant at which the step began
+      flightlog::PowerStream& p = *f.log.power;  // values at the start of the step
       p.t_s.push_back(tidy(t_s + sensors.power->latency_s));
       p.battery_V.push_back(robot.battery_V() + sensors.power->voltage_noise_V * power_random.normal());
       p.left_current_A.push_back(robot.current_A(0) + sensors.power->current_noise_A * power_random.normal());

@@ -14,42 +14,43 @@ namespace flappy::blind {
 
 /// One robot and what it flies.
 struct Case {
-  model::Vehicle vehicle;  ///< the robot's own, effects left out
+  model::Vehicle vehicle;  ///< the robot's true parameters, without effects
   double declared_density_kg_m3 = 0;
-  std::string vehicle_file, vehicle_sha256;  ///< as declared in the log
-  Sizes sizes;
+  std::string vehicle_file, vehicle_sha256;  ///< declared in the log
+  Magnitudes magnitudes;
   std::uint64_t seed = 0;
   Programme programme = Programme::rich;
   bool power = false, wings = false;
-  std::optional<SensorSet> sensors;          ///< where they are not those of the seed
-  const ProposedFlight* proposed = nullptr;  ///< in place of a programme
+  std::optional<SensorSet> sensors;          ///< if absent, drawn from the seed (sensors_of)
+  const ProposedFlight* proposed = nullptr;  ///< replaces the programme; null: none
 };
 
 struct RobotFlight {
   bool crashed = false;
-  std::string how;  ///< it crashed
+  std::string how;  ///< how and when it crashed; empty if it did not
   flightlog::FlightLog log;
-  /// At the control rate: time, position, attitude (w first), velocity, body rates, stroke and rotation of both wings, their rates,
-  /// the gyro's constant bias.
+  /// True state at the control rate, SI units: time, position, attitude (w first), velocity, body rates, stroke and
+  /// rotation of the left and of the right wing, their rates, constant bias of the gyro.
   std::vector<flightlog::Column> truth;
-  double farthest_m = 0, most_tilt_rad = 0;  ///< from where it was meant to be; of the body's z axis
+  double farthest_m = 0, most_tilt_rad = 0;  ///< largest distance from the target, largest tilt of the body's z axis
 };
 
-/// The room in which they fly.
+/// Room of all flights.
 Room flight_room();
 
-/// Sees the robot before each step, from the first of the trimming on, and the volts of the step.
+/// Called before each step, those of the trimming included, with the robot and the commanded voltages of the step (left, right).
 using Watch = std::function<void(const Robot& robot, const std::array<double, 2>& volts)>;
 
-/// Flight 0, 1 or 2 of a case: it learns to trim, then the log begins. The same bytes for the same case.
+/// Flies flight 0, 1 or 2 of a case, or the proposed flight: the robot finds its trim, then the log begins. Returns the same bytes
+/// for the same arguments.
 RobotFlight fly(const Case& c, std::size_t flight, const Watch& watch = {});
 
-/// Who steers: asked once each control period, from kTrim_s before the log begins; `t_s` is on the log's clock, `beat` the
-/// fraction of the beat in [0, 1).
+/// Pilot, asked once in each control period from kTrim_s before the log begins. `t_s`: on the log's clock. `beat`: fraction of the
+/// beat in [0, 1).
 using Steer = std::function<Inputs(double t_s, double beat, const Torso& torso)>;
 
-/// A flight of `duration_s` from `start` on. It has crashed where it touches something, flies away, or its z axis comes
-/// below `least_upright` over the level (sine of the angle).
+/// Flies for `duration_s` from `start` on. The robot has crashed when it touches a surface, flies away, or the world z component of
+/// its z axis falls below `least_upright`.
 RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double duration_s, double least_upright,
                 const Steer& steer, const Watch& watch = {});
 

@@ -1,5 +1,5 @@
-// Elementary functions and random numbers of the blind robot's own: the same bits on every processor, which libm does
-// not promise, and nothing in common with the simulator under test. Absolute errors below 1e-13 unless stated.
+// Elementary functions and random numbers of the blind robot. They give the same bits on every processor, which libm does not
+// promise, and share no code with the simulator under test. Absolute errors are below 1e-13 unless stated.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,7 +29,7 @@ struct SinCos {
   double sin, cos;
 };
 
-/// For |x| up to about 1e6.
+/// Valid for |x| up to about 1e6.
 inline SinCos sin_cos(double x) {
   const double n = nearest(x * (2 / kPi));
   const double r = (x - n * 0x1.921fb54400000p+0) - n * 0x1.0b4611a626331p-34, y = r * r;
@@ -53,7 +53,7 @@ inline SinCos sin_cos(double x) {
   }
 }
 
-/// Relative error below 1e-13; 0 far below, for x up to 700.
+/// Valid for x up to 700, with a relative error below 1e-13; 0 for x below -700.
 inline double exponential(double x) {
   if (x < -700) return 0;
   const double n = nearest(x * std::numbers::log2e);
@@ -63,7 +63,7 @@ inline double exponential(double x) {
   return sum * std::bit_cast<double>(static_cast<std::uint64_t>(1023 + static_cast<std::int64_t>(n)) << 52);
 }
 
-/// Of a positive normal number.
+/// Natural logarithm; x must be positive and normal.
 inline double logarithm(double x) {
   const auto bits = std::bit_cast<std::uint64_t>(x);
   double exponent = static_cast<double>(static_cast<std::int64_t>(bits >> 52) - 1023);
@@ -75,7 +75,7 @@ inline double logarithm(double x) {
   return 2 * t * sum + exponent * std::numbers::ln2;
 }
 
-/// Of a positive base.
+/// `base` must be positive.
 inline double power(double base, double exponent) { return exponential(exponent * logarithm(base)); }
 
 inline double hyperbolic_tangent(double x) {
@@ -83,7 +83,7 @@ inline double hyperbolic_tangent(double x) {
   return 1 - 2 / (exponential(2 * x) + 1);
 }
 
-/// Rotation by a rotation vector.
+/// Quaternion of a rotation vector.
 inline Quaterniond turned_by(const Vector3d& angle_rad) {
   const double a = std::sqrt(angle_rad.squaredNorm());
   if (a < 1e-9) return Quaterniond(1, angle_rad.x() / 2, angle_rad.y() / 2, angle_rad.z() / 2).normalized();
@@ -92,12 +92,12 @@ inline Quaterniond turned_by(const Vector3d& angle_rad) {
   return {half.cos, v.x(), v.y(), v.z()};
 }
 
-/// Random numbers of one purpose: the draws of one never move those of another.
+/// Stream of random numbers for one purpose; its draws do not shift those of other purposes.
 class Random {
  public:
   Random(std::uint64_t seed, std::uint64_t purpose) : engine_(seed * 0x9e3779b97f4a7c15ULL + purpose) {}
 
-  /// In (0, 1).
+  /// Uniform in (0, 1).
   double uniform() { return (static_cast<double>(engine_() >> 12) + 0.5) * 0x1p-52; }
   double between(double low, double high) { return low + (high - low) * uniform(); }
   /// Standard normal (Box and Muller 1958).
@@ -109,7 +109,7 @@ class Random {
     const double x = normal(), y = normal();
     return {x, y, normal()};
   }
-  /// A level direction.
+  /// Unit vector in a random direction of the x-y plane.
   Vector3d level() {
     const SinCos t = sin_cos(2 * kPi * uniform());
     return {t.cos, t.sin, 0};

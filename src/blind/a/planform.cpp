@@ -1,6 +1,6 @@
 // With c the chord over the mean chord, x the distance over the wing length, <> the mean over the span:
 //   r_kk = <c x^k>,  k = 0..3      z_cpk = <c^2 x^k>,  k = 0..2      z_rd = <c^4>      c = sum of a_n x^n, n = 0..3
-// Gauss-Newton for a.
+// The coefficients a_n are found by Gauss-Newton.
 #include "blind/a/planform.hpp"
 
 #include <Eigen/Cholesky>

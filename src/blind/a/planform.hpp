@@ -11,12 +11,12 @@ inline constexpr std::size_t kStrips = 16;
 
 struct Strips {
   std::array<double, kStrips> r_m{};      ///< middle of the strip, from the shoulder
-  std::array<double, kStrips> chord_m{};  ///< a cubic in r
+  std::array<double, kStrips> chord_m{};  ///< chord at r_m, a cubic in r
   double width_m = 0;
 };
 
-/// The cubic chord whose eight moments come nearest to the planform's. The published ones are those of a trapezoid, to
-/// 1e-4; 16 strips then have them to 2e-3.
+/// Fits a cubic chord to the eight moments of the planform by least squares. The published moments are those of a trapezoid to 1e-4;
+/// 16 strips reproduce them to 2e-3.
 Strips cut_into_strips(const model::Planform& planform);
 
 }  // namespace flappy::blind

@@ -16,15 +16,15 @@ Matrix3d cross_matrix(const Vector3d& v) {
   return m;
 }
 
-/// Stops give by 0.01 rad under the wing's impact, as hardly any; an effect makes them softer.
+/// Natural frequency of a wing on its stop. An impact presses the stop in by 0.01 rad; stop_compliance softens it.
 constexpr double kStopFrequency_rad_s = 1.1e4;
 
 }  // namespace
 
-Robot::Robot(const model::Vehicle& v, const Room& room, const Sizes& sizes, std::uint64_t seed, std::uint64_t flight,
-             double step_s)
+Robot::Robot(const model::Vehicle& v, const Room& room, const Magnitudes& magnitudes, std::uint64_t seed,
+             std::uint64_t flight, double step_s)
     : room_(room),
-      sizes_(sizes),
+      magnitudes_(magnitudes),
       step_s_(step_s),
       density_kg_m3_(v.air_density_kg_m3),
       slow_steps_(std::max(1, static_cast<int>(std::lround(1e-3 / step_s)))),
@@ -38,21 +38,21 @@ Robot::Robot(const model::Vehicle& v, const Room& room, const Sizes& sizes, std:
     return to;
   };
   torso_ = body(v.torso);
-  if (const double size = sizes[Effect::com_offset]; size > 0) {
-    // a battery of 2 g slides, and takes the centre of mass of the torso 1 mm along
+  if (const double magnitude = magnitudes[Effect::com_offset]; magnitude > 0) {
+    // a battery of 2 g is displaced so far that the torso's centre of mass moves by 1 mm
     Random random(seed, 10);
     constexpr double kPart_kg = 2e-3;
-    const Vector3d moved = random.level() * (1e-3 * size * torso_.mass_kg / kPart_kg);
+    const Vector3d moved = random.level() * (1e-3 * magnitude * torso_.mass_kg / kPart_kg);
     const Vector3d shift = kPart_kg / torso_.mass_kg * moved;
     torso_.inertia_kg_m2 += kPart_kg * point_inertia(moved) - torso_.mass_kg * point_inertia(shift);
     torso_.com_m += shift;
   }
-  if (const double size = sizes[Effect::inertia_products]; size > 0) {
+  if (const double magnitude = magnitudes[Effect::inertia_products]; magnitude > 0) {
     Random random(seed, 11);
     Matrix3d& i = torso_.inertia_kg_m2;
     for (int a = 0; a < 3; ++a)
       for (int b = a + 1; b < 3; ++b) {
-        const double product = 0.05 * size * random.sign() * std::sqrt(i(a, a) * i(b, b));
+        const double product = 0.05 * magnitude * random.sign() * std::sqrt(i(a, a) * i(b, b));
         i(a, b) += product, i(b, a) += product;
       }
   }
@@ -86,13 +86,13 @@ void Robot::build_side(const model::Side& from, std::size_t s, std::uint64_t see
   to.strips = cut_into_strips(from.planform);
   to.kept.fill(1);
   if (s == (Random(seed, 13).uniform() < 0.5 ? 0u : 1u)) damage(to);
-  if (const double size = sizes_[Effect::wing_inertia]; size > 0) {
+  if (const double magnitude = magnitudes_[Effect::wing_inertia]; magnitude > 0) {
     Matrix3d& i = to.wing.inertia_kg_m2;
-    i(0, 0) *= 1 + 0.1 * size;
-    i(2, 2) *= 1 + 0.1 * size;
-    const double product = 0.08 * size * to.sign * std::sqrt(i(1, 1) * i(2, 2));
+    i(0, 0) *= 1 + 0.1 * magnitude;
+    i(2, 2) *= 1 + 0.1 * magnitude;
+    const double product = 0.08 * magnitude * to.sign * std::sqrt(i(1, 1) * i(2, 2));
     i(1, 2) += product, i(2, 1) += product;
-    to.wing.com_m.z() *= 1 + 0.1 * size;
+    to.wing.com_m.z() *= 1 + 0.1 * magnitude;
   }
   to.fourth_m5 = 0;
   for (std::size_t i = 0; i < kStrips; ++i) {
@@ -108,23 +108,23 @@ void Robot::build_side(const model::Side& from, std::size_t s, std::uint64_t see
     return Stop{joint.lower_rad, joint.upper_rad, stiffness, 2 * ratio * std::sqrt(stiffness * inertia),
                 softness_rad_Nm > 0 ? 6.0 : 0.0};
   };
-  const double size = sizes_[Effect::stop_compliance];
-  to.rotation_stop = stop(to.rotation, about(to.wing, 1), size / 0.12, 1 / (1 + 2 * size));
+  const double magnitude = magnitudes_[Effect::stop_compliance];
+  to.rotation_stop = stop(to.rotation, about(to.wing, 1), magnitude / 0.12, 1 / (1 + 2 * magnitude));
   to.stroke_stop = stop(to.stroke, about(to.wing, 2) + about(to.leading_edge, 2), 0, 1);
 }
 
-/// The tip is gone: a twentieth of the area, and two thirds of what that part of the wing weighs.
+/// Removes the tip of a wing: at magnitude 1, 5 % of its area, and two thirds of this share of its mass.
 void Robot::damage(Side& s) {
-  const double size = sizes_[Effect::wing_damage];
-  if (!(size > 0)) return;
+  const double magnitude = magnitudes_[Effect::wing_damage];
+  if (!(magnitude > 0)) return;
   double area = 0;
   for (const double c : s.strips.chord_m) area += c;
-  double to_lose = 0.05 * size * area, lever = 0;
-  const double lost_kg = s.wing.mass_kg * 0.67 * 0.05 * size;
+  double to_lose = 0.05 * magnitude * area, lever = 0;
+  const double lost_kg = s.wing.mass_kg * 0.67 * 0.05 * magnitude;
   for (std::size_t i = kStrips; i-- > 0 && to_lose > 0;) {
     const double lost = std::min(to_lose, s.strips.chord_m[i]);
     s.kept[i] = 1 - lost / s.strips.chord_m[i];
-    lever += lost * s.strips.r_m[i] / (0.05 * size * area);
+    lever += lost * s.strips.r_m[i] / (0.05 * magnitude * area);
     to_lose -= lost;
   }
   const Vector3d at(0, s.sign * lever, -0.4 * s.strips.chord_m[kStrips - 1]);
@@ -157,7 +157,7 @@ void Robot::pose_sides() {
   }
 }
 
-/// Adds a body whose joints are unknowns first, first + 1, ...; `acceleration` of its centre of mass at x = 0.
+/// Adds a body whose joints are the unknowns first, first + 1, ... `acceleration`: of its centre of mass at x = 0, in B.
 template <int joints>
 void Robot::add_body(double m, const Matrix3d& I, const Vector3d& c, const Vector3d& rate, const Vector3d& turning,
                      const Vector3d& acceleration, const std::array<Column, 2>& column, int first) {
@@ -207,7 +207,8 @@ void Robot::assemble() {
   }
 }
 
-/// A spring-damper that only pushes, at the end of the step: (M + h D + h^2 K) x = Q - K (d + h rate) - D rate.
+/// Adds a stop, a spring-damper that only pushes, with its torque at the end of the step:
+/// (M + h D + h^2 K) x = Q - K (d + h rate) - D rate.
 void Robot::add_stop(int joint, const Stop& stop, double angle, double rate) {
   const double beyond = angle > stop.upper_rad   ? angle - stop.upper_rad
                         : angle < stop.lower_rad ? angle - stop.lower_rad
@@ -225,7 +226,7 @@ void Robot::add_joints() {
     const Side& s = side_[k];
     const Wing& q = x_.side[k].wing;
     const int stroke = 6 + 2 * static_cast<int>(k), rotation = stroke + 1;
-    // dry friction, smooth within 0.5 and 1 rad/s of standing still
+    // dry friction, smoothed over 0.5 rad/s (stroke) and 1 rad/s (rotation)
     rhs_(stroke) += motor_torque(k) - s.stroke.damping_Nm_s * q.stroke_rad_s -
                     s.stroke.friction_Nm * hyperbolic_tangent(q.stroke_rad_s / 0.5);
     rhs_(rotation) -=
@@ -233,9 +234,9 @@ void Robot::add_joints() {
     const double stretch = q.stroke_rad - s.spring.rest_angle_rad;
     const double stiffness = stretch > 0 ? s.spring.stiffness_positive_Nm_rad : s.spring.stiffness_negative_Nm_rad;
     double hardened = 1;
-    if (const double size = sizes_[Effect::spring_hardening]; size > 0) {
-      const double a = std::abs(stretch);  // 4 % over a beat, by other powers than a cubic spring's
-      hardened += size * (0.045 * a + 0.05 * a * a * a);
+    if (const double magnitude = magnitudes_[Effect::spring_hardening]; magnitude > 0) {
+      const double a = std::abs(stretch);  // 4 % over a beat; the powers differ from those of a cubic spring
+      hardened += magnitude * (0.045 * a + 0.05 * a * a * a);
     }
     rhs_(stroke) -= stiffness * stretch * hardened;
     add_stop(stroke, s.stroke_stop, q.stroke_rad, q.stroke_rad_s);

@@ -1,11 +1,11 @@
-// The blind robot: a second simulator of the same vehicle, which stands for the real one where a diagnosis is tried. Five
-// rigid bodies (torso; on each side a leading edge and a wing), ten degrees of freedom, written from the published figures
-// and sharing neither physics nor effects with the simulator under test.
+// The blind robot: a second simulator of the same vehicle, which replaces the real robot in tests of a diagnosis. It has five rigid
+// bodies (torso; on each side a leading edge and a wing) and ten degrees of freedom. It is written from the published parameters and
+// shares neither physics nor effects with the simulator under test.
 //
-// Unknowns of a step, in B: turning acceleration, acceleration of the torso origin, strokes and rotations:
-//   sum of J^T (m, I) J  x = forces - J^T (what the bodies would need at x = 0)      J: Jacobian of a body's motion
-// Wings are cut into strips (planform.hpp); the wings' stops are stiff springs with dampers, taken implicitly, as nothing
-// else is stiff at a step of 20 us; semi-implicit Euler.
+// Unknowns x of a step: in B, angular acceleration of the torso and acceleration of its origin; accelerations of strokes and rotations:
+//   sum of J^T (m, I) J  x = forces - J^T (forces that the bodies need at x = 0)      J: Jacobian of a body's motion
+// Wings are cut into strips (planform.hpp). The step is 20 us of semi-implicit Euler; only the wings' stops, springs with dampers, are
+// stiff at this step and are therefore integrated implicitly.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@
 namespace flappy::blind {
 
 inline constexpr double kRobotStep_s = 2e-5;
-inline constexpr double kBattery_V = 18;  ///< nominal: at it, the motor gets what the driver is told
+inline constexpr double kBattery_V = 18;  ///< nominal: at this voltage the motor gets the commanded voltage
 
 struct Wall {
   double x_m = 0, y_m = 0, normal_x = 1, normal_y = 0;
@@ -41,17 +41,17 @@ struct Wing {
   double stroke_rad = 0, rotation_rad = 0, stroke_rad_s = 0, rotation_rad_s = 0;
 };
 
-/// All that changes of one side.
+/// State of one side.
 struct RobotSideState {
   Wing wing;
-  double rotor_rad = 0, rotor_rad_s = 0;         ///< of the motor behind a gear with backlash, in terms of the stroke
-  double driver_V = 0, driver_V_s = 0;           ///< of a driver that lags
-  double motor_V = 0, current_A = 0;             ///< now
-  double winding_K = 0, case_K = 0, heat_J = 0;  ///< above the air; since the last millisecond
-  double wake_rad_s = 0;                         ///< stroke rate that the air near the wing remembers
-  double twist_rad = 0;                          ///< of the tip
-  double envelope_V = 0, play_V = 0;             ///< of the voltage
-  double resistance_gain = 1, air_gain = 1, drive_gain = 1;  ///< since the last millisecond
+  double rotor_rad = 0, rotor_rad_s = 0;         ///< of a motor with gear backlash, divided by the gear ratio
+  double driver_V = 0, driver_V_s = 0;           ///< output of a driver with finite bandwidth, and its rate
+  double motor_V = 0, current_A = 0;             ///< in the last step
+  double winding_K = 0, case_K = 0, heat_J = 0;  ///< temperatures above the air; heat since the last slow update
+  double wake_rad_s = 0;                         ///< low-passed stroke rate, for wake capture
+  double twist_rad = 0;                          ///< at the tip
+  double envelope_V = 0, play_V = 0;             ///< low-passed amplitude of the command; state of its hysteresis
+  double resistance_gain = 1, air_gain = 1, drive_gain = 1;  ///< of the last slow update
 };
 
 struct RobotState {
@@ -64,22 +64,23 @@ struct RobotState {
   double yaw_rate_rad_s = 0, sink_m_s = 0;  ///< low-passed
   double shedding_turns = 0, brush_left_s = 0;
   double density_gain = 1, fling = 0;
-  Vector3d acceleration_m_s2 = Vector3d::Zero();  ///< of the torso origin, in B, not counting gravity; last step
+  Vector3d acceleration_m_s2 = Vector3d::Zero();  ///< of the torso origin in W, components in B; last step
   Vector3d turning_rad_s2 = Vector3d::Zero();
 };
 
 class Robot {
  public:
-  /// `seed`: of what effects draw once: directions, signs; `flight`: of what differs between flights: gusts, jitter.
-  Robot(const model::Vehicle& vehicle, const Room& room, const Sizes& sizes, std::uint64_t seed,
+  /// `seed` draws what is fixed for a robot, as directions and signs of effects; with `flight`, what differs between
+  /// flights: gusts, jitter.
+  Robot(const model::Vehicle& vehicle, const Room& room, const Magnitudes& magnitudes, std::uint64_t seed,
         std::uint64_t flight = 0, double step_s = kRobotStep_s);
 
-  /// One step under what the driver is told: volts at nominal battery.
+  /// Advances one step. The arguments command the driver, in V at nominal battery voltage.
   void step(double left_V, double right_V);
 
-  /// Moves the torso; wings, currents, heat and everything else stay as they are.
+  /// Moves the torso; all other states, as wings, currents and heat, stay.
   void place_torso(const Torso& torso) { x_.torso = torso; }
-  /// On a stand: the torso stays where it is.
+  /// Fixes the torso, as on a test stand.
   void hold_torso(bool held) { held_ = held; }
 
   const RobotState& state() const { return x_; }
@@ -92,18 +93,18 @@ class Robot {
   const Room& room() const { return room_; }
   double mass_kg() const { return mass_kg_; }
 
-  /// What an accelerometer at a point of B felt in the last step, in B.
+  /// Specific force (m/s^2) at a point of B in the last step, in B.
   Vector3d specific_force(const Vector3d& point_m) const;
 
   struct Wrench {
     Vector3d force_N = Vector3d::Zero(), moment_Nm = Vector3d::Zero();  ///< in B, about the torso origin
   };
-  /// Of the air on the wings, in the last step.
+  /// Wrench of the air on both wings in the last step, without added mass.
   const Wrench& air() const { return air_; }
 
   struct Momentum {
     Vector3d linear_kg_m_s, angular_kg_m2_s;  ///< in W, about its origin
-    double energy_J;                          ///< kinetic, rotors too, and of springs
+    double energy_J;                          ///< kinetic, including the rotors, and of the springs
   };
   Momentum momentum() const;
 
@@ -129,15 +130,15 @@ class Robot {
     model::Joint stroke, rotation;
     Stop stroke_stop, rotation_stop;
     Strips strips;
-    std::array<double, kStrips> kept;  ///< share of the strip that is still there
+    std::array<double, kStrips> kept;  ///< share of each strip's area that wing damage leaves
     double fourth_m5;                  ///< sum of chord^4 times width
   };
-  /// Where a side's parts are and turn, in B.
+  /// Attitude and rates of a side's links, in B.
   struct Pose {
-    Matrix3d edge, wing;  ///< from the link's frame
+    Matrix3d edge, wing;  ///< rotation from the link's frame to B
     Vector3d stroke_axis, rotation_axis;
     Vector3d edge_rate, wing_rate;        ///< rad/s
-    Vector3d edge_turning, wing_turning;  ///< rad/s^2, at x = 0
+    Vector3d edge_turning, wing_turning;  ///< angular acceleration at x = 0, rad/s^2
   };
   struct Column {
     Vector3d turn, shift;
@@ -165,14 +166,14 @@ class Robot {
   void push();                                //
 
   Room room_;
-  Sizes sizes_;
+  Magnitudes magnitudes_;
   double step_s_, density_kg_m3_, mass_kg_ = 0, motion_gain_ = 1;
   bool held_ = false;
   Body torso_;
   std::array<Side, 2> side_;
   int slow_steps_, until_slow_ = 0;
 
-  // drawn once
+  // drawn once for a robot
   Vector3d wind_direction_, magnet_, field_, front_, shedding_axis_;
   double shedding_Hz_ = 0;
   Random gust_random_, delay_random_, brush_random_;
@@ -184,7 +185,7 @@ class Robot {
   std::array<double, 2> told_V_{}, applied_V_{};
 
   RobotState x_;
-  Matrix3d R_ = Matrix3d::Identity();  // of this step
+  Matrix3d R_ = Matrix3d::Identity();  // from B to W, at the start of the step
   std::array<Pose, 2> pose_;
   Matrix10 mass_matrix_;
   Vector10 rhs_;

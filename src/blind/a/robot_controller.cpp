@@ -5,12 +5,12 @@
 namespace flappy::blind {
 namespace {
 
-constexpr double kMultisine_s = 10;  // their period
+constexpr double kMultisine_s = 10;  // period of the multisines
 
 /// Rms of a flight's multisines, in the order of Inputs (configs/fly/identify_multisine.toml).
 constexpr std::array<double, 4> kRms = {0.4, 0.15, 0.2, 0.01};
 
-/// Gains of configs/controllers/pid.toml; but yaw as published and height slower, which set-point steps and turns need.
+/// Gains of configs/controllers/pid.toml, except for steps and turns of the set-point: yaw as published, height slower.
 flight::PidConstants<double> gains() {
   flight::PidConstants<double> k{};
   k.position_xy_1_s = 8.08, k.position_z_1_s = 10, k.speed_limit_m_s = 1.5, k.climb_limit_m_s = 1.5;
@@ -42,14 +42,14 @@ Plan::Plan(Programme programme, std::size_t flight, const Room& room, std::uint6
   const auto add = [&](double t_s, double x, double y, double z, double heading = 0) {
     waypoints_.push_back({t_s, {x, y, z}, heading});
   };
-  double share = 0;  // of kRms
+  double share = 0;  // of kRms that the flight is excited with
   if (programme == Programme::hover) {
     add(0, 0, 0, 0.5);
   } else if (flight == 0) {
     add(0, 0, 0, 0.5);
     share = 1;
   } else if (flight == 1) {
-    // down to the ground, up to the ceiling, to the wall and back, to the front and back
+    // down to the ground, up to the ceiling, to the wall and back, along x and back
     const Wall& wall = room.wall;
     const double to_wall = (0 - wall.x_m) * wall.normal_x + (0 - wall.y_m) * wall.normal_y - 0.16;
     const double wx = -to_wall * wall.normal_x, wy = -to_wall * wall.normal_y;
@@ -70,7 +70,7 @@ Plan::Plan(Programme programme, std::size_t flight, const Room& room, std::uint6
     for (const double at : {1.5, 5.8}) steps_.push_back({1, at, at + 0.06, 0.5 * random.sign()});
     for (const double at : {3.0, 6.6}) steps_.push_back({2, at, at + 0.06, 0.8 * random.sign()});
   }
-  // input k has the harmonics h with h mod 4 = k: over a period no two inputs correlate
+  // input k has the harmonics h with h mod 4 = k, so no two inputs correlate over a period
   for (int k = 0; k < 4 && share > 0; ++k) {
     std::vector<int> harmonics;
     for (int h = 3; h <= 150; ++h)
@@ -95,7 +95,7 @@ Aim Plan::at(double t_s) const {
   const Vector3d leg = to.position_m - from.position_m;
   aim.position_m += way * leg;
   aim.heading_rad += way * (to.heading_rad - from.heading_rad);
-  if (whole < 0.05) return aim;  // a step: the controller finds its own way
+  if (whole < 0.05) return aim;  // a step of the set-point has no velocity
   aim.velocity_m_s = speed * leg;
   aim.acceleration_m_s2 = bend * leg;
   aim.heading_rad_s = speed * (to.heading_rad - from.heading_rad);

@@ -1,5 +1,5 @@
-// Who flies the blind robot, and where: the project's cascaded PID on an imperfect view of the state, along a programme of
-// waypoints with excitation on top.
+// Pilot and flight plan of the blind robot: the project's cascaded PID on an imperfect view of the state follows waypoints, with
+// excitation added to its inputs.
 #pragma once
 
 #include <memory>
@@ -18,7 +18,7 @@ struct Inputs {
   double amplitude_V = 0, difference_V = 0, bias_V = 0, split_cycle = 0;
 };
 
-/// As the driver clips them.
+/// Clips inputs to the driver's limits.
 Inputs clipped(const Inputs& u, const model::Driver& d);
 
 struct Waypoint {
@@ -32,12 +32,12 @@ struct Aim {
   double heading_rad, heading_rad_s;
 };
 
-/// One flight of a programme, on the clock of its log; before 0 it hovers where it begins.
+/// Target and excitation of one flight, on the clock of its log; before t = 0 the target is the first waypoint.
 class Plan {
  public:
   Plan(Programme programme, std::size_t flight, const Room& room, std::uint64_t seed);
   Aim at(double t_s) const;
-  /// To be added to the controller's output.
+  /// Inputs that are added to the controller's output; none before t = 0.
   Inputs excitation(double t_s) const;
   const Waypoint& start() const { return waypoints_.front(); }
 
@@ -59,9 +59,9 @@ class RobotController {
  public:
   RobotController(const model::Driver& driver, std::uint64_t seed, std::uint64_t flight);
   ~RobotController();
-  /// Once each control period.
+  /// Called once in each control period.
   Inputs steer(const Torso& torso, const Aim& aim, const Inputs& excitation);
-  /// Of one motor at a fraction of the beat in [0, 1).
+  /// Voltage of one motor at the fraction `beat` of the beat, in [0, 1).
   static double voltage(const Inputs& inputs, std::size_t side, double beat, double limit_V);
 
  private:

@@ -1,7 +1,7 @@
-// What the blind robot's own sensors make of its motion, on the clock of the flight, as rows of a flight log.
+// Sensors of the blind robot: they turn its motion into rows of a flight log, on the clock of the flight.
 //
-// IMU: a first-order low-pass, the mean over the interval, constant bias, white noise and a tenth of it that drifts.
-// Motion capture: pose of the torso origin with noise, late, arriving with jitter; short bursts are lost.
+// IMU: first-order low-pass, mean over the sampling interval, constant bias of the gyro, white noise, slow noise of a tenth of its sd.
+// Motion capture: pose of the torso origin with noise, latency and jitter of the arrival; short bursts are lost.
 #pragma once
 
 #include "blind/a/robot.hpp"
@@ -9,37 +9,37 @@
 
 namespace flappy::blind {
 
-/// What a flight log declares of its sensors.
+/// Sensors of a robot: the headers that its log declares, and the true values behind them.
 struct SensorSet {
   flightlog::MocapHeader mocap;
   flightlog::ImuHeader imu;
   std::optional<flightlog::PowerHeader> power;
   std::optional<flightlog::WingsHeader> wings;
-  double imu_low_pass_hz = 0, imu_transport_s = 0;  ///< behind the header's bandwidth and latency
-  Matrix3d imu_turned = Matrix3d::Identity();       ///< from B to the IMU's own axes
+  double imu_low_pass_hz = 0, imu_transport_s = 0;  ///< true values behind `imu`'s bandwidth and latency
+  Matrix3d imu_turned = Matrix3d::Identity();       ///< from B to the IMU's axes
 };
 
-/// Declares bandwidth and latency of an IMU of this rate, low-pass and transport.
+/// Derives the declared bandwidth and latency from the IMU's rate, low-pass and transport delay.
 void declare_imu(SensorSet& set);
 
-/// The sensors of a robot: rates differ from robot to robot.
+/// Draws the sensors of a robot; the rates of IMU and motion capture depend on the seed.
 SensorSet sensors_of(std::uint64_t seed, bool power, bool wings);
 
-/// The IMU alone, for whoever moves a torso along a path of his own.
+/// The IMU alone; usable with any caller that moves a robot.
 class RobotImu {
  public:
   struct Sample {
     double arrival_s;
     Vector3d gyro_rad_s, accel_m_s2;
   };
-  RobotImu(const SensorSet& set, const Sizes& sizes, std::uint64_t seed, std::uint64_t flight, double step_s);
-  /// After a step that ended at `t_s` on the log's clock; a sample where its interval ended.
+  RobotImu(const SensorSet& set, const Magnitudes& magnitudes, std::uint64_t seed, std::uint64_t flight, double step_s);
+  /// Called after each step; `t_s` is the step's end on the log's clock. Returns a sample if a sampling interval ended.
   std::optional<Sample> after_step(const Robot& robot, double t_s);
   const Vector3d& constant_bias_rad_s() const { return bias_; }
 
  private:
   const SensorSet set_;
-  const Sizes sizes_;
+  const Magnitudes magnitudes_;
   double step_s_, share_;
   int steps_, count_ = 0;
   bool begun_ = false;
@@ -58,13 +58,13 @@ class RobotMocap {
     Vector3d position_m;
     Quaterniond attitude;
   };
-  RobotMocap(const SensorSet& set, const Sizes& sizes, std::uint64_t seed, std::uint64_t flight);
-  /// The pose at `t_s`, unless it is lost.
+  RobotMocap(const SensorSet& set, const Magnitudes& magnitudes, std::uint64_t seed, std::uint64_t flight);
+  /// Measures the pose at `t_s`; returns nothing if the frame is lost.
   std::optional<Sample> look(const Torso& torso, double t_s);
 
  private:
   const SensorSet set_;
-  const Sizes sizes_;
+  const Magnitudes magnitudes_;
   Random random_, delay_random_;
   Quaterniond tilt_ = Quaterniond::Identity();
   Vector3d marker_m_ = Vector3d::Zero();
@@ -72,7 +72,7 @@ class RobotMocap {
   double last_s_ = -1;
 };
 
-/// Where the mean over an interval behind a first-order low-pass lets 1/sqrt(2) through.
+/// Frequency at which a first-order low-pass followed by the mean over an interval has a gain of 1/sqrt(2).
 double bandwidth_hz(double interval_s, double low_pass_hz);
 
 }  // namespace flappy::blind

@@ -39,7 +39,7 @@ SampledRobot fly_sampled(Case c, const sim::Randomisation& randomisation, std::u
     sampled.lost.push_back({sampled.flights.size(), sampled.flights.back().how});
   }
   throw NeverFlies("--seed " + std::to_string(seed) + ": " + std::to_string(kTries) +
-                   " robots in a row crashed; accepted: effects of smaller size, less randomisation");
+                   " robots in a row crashed; accepted: effects of smaller magnitude, less randomisation");
 }
 
 }  // namespace flappy::blind

@@ -1,4 +1,4 @@
-// Robots drawn one after another until one flies all its flights.
+// Draws robots until one flies all its flights without a crash.
 #pragma once
 
 #include <filesystem>
@@ -15,27 +15,27 @@ struct Crash {
 };
 
 struct SampledRobot {
-  Case flown;               ///< with the vehicle and the seed of the draw
-  std::uint64_t draw = 0;   ///< which of the seed's
-  std::vector<Crash> lost;  ///< of the draws before
+  Case flown;               ///< has the vehicle and the seed of the draw
+  std::uint64_t draw = 0;   ///< number of the draw, from 0
+  std::vector<Crash> lost;  ///< crashes of the earlier draws
   std::vector<RobotFlight> flights;
 };
 
-/// The robot as its file declares it. InputError where the file has effects.
+/// The robot as its file declares it. Throws InputError if the file has effects.
 Case declared_case(const std::filesystem::path& vehicle_file);
 
-/// Every one of the draws crashed.
+/// Thrown if all draws crash.
 class NeverFlies : public io::InputError {
  public:
   using InputError::InputError;
 };
 
-inline constexpr std::uint64_t kTries = 20;  ///< robots drawn until one does not crash
+inline constexpr std::uint64_t kTries = 20;  ///< largest number of draws
 
-/// One draw of a seed's. `c`: what all draws share.
+/// The case of one draw of a seed. `c`: the part that all draws share.
 Case sampled_case(Case c, const sim::Randomisation& randomisation, std::uint64_t seed, std::uint64_t draw);
 
-/// `c`: what all draws share. The same bytes for the same seed. NeverFlies after 20 draws.
+/// `c`: the part that all draws share. Returns the same bytes for the same seed. Throws NeverFlies after 20 draws.
 SampledRobot fly_sampled(Case c, const sim::Randomisation& randomisation, std::uint64_t seed);
 
 }  // namespace flappy::blind

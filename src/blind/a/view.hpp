@@ -1,5 +1,5 @@
-// What the blind robot's own filter on motion capture and IMU would leave of the true state: white noise, a bias of the
-// gyro, a position that wanders by 1 mm.
+// The pilot's view of the state: the true state with the errors that a filter on motion capture and IMU would leave, namely white
+// noise, a bias of the gyro, and a position error that drifts by about 1 mm.
 #pragma once
 
 #include "blind/a/robot.hpp"
@@ -12,7 +12,7 @@ class View {
   View(std::uint64_t seed, std::uint64_t flight) : random_(seed, 100 * flight + 151) {
     gyro_bias_rad_s_ = 0.01 * random_.normals();
   }
-  /// Once each control period.
+  /// Called once in each control period.
   flight::Estimate<double> see(const Torso& torso) {
     position_drift_m_ += 0.1e-3 * random_.normals() - 0.01 * position_drift_m_;
     const auto vec3 = [](const Vector3d& v) { return model::Vec3<double>{v.x(), v.y(), v.z()}; };

@@ -9,7 +9,7 @@ namespace {
 constexpr double kCentroid = 0.46, kGyration = 0.53;
 constexpr std::array<double, 2> kA = {0.165, 0.335}, kB = {0.0455, 0.3};
 
-/// Share of the mean chord at x of the span, over a number of cells that is enough for its mean.
+/// Chord over the mean chord at the share x of the span.
 double beta_chord(double x) {
   const double variance = kGyration * kGyration - kCentroid * kCentroid;
   const double n = kCentroid * (1 - kCentroid) / variance - 1;
@@ -20,7 +20,7 @@ double beta_chord(double x) {
 
 }  // namespace
 
-// The fits are not quite zero where symmetry wants no lift: at 0 and 90 degrees they are led there within some degrees.
+// By symmetry lift is zero at 0 and 90 degrees, but the fits are not quite: two factors bring them to zero within some degrees.
 double lift_coefficient(double alpha) {
   const double fit = 0.225 + 1.58 * std::sin(2.13 * alpha - 7.2 * kDegree);
   return fit * std::tanh(alpha / (3 * kDegree)) * std::tanh((kPi / 2 - alpha) / (6 * kDegree));
@@ -39,14 +39,15 @@ Polar::Polar(double lift, double drag) {
   }
 }
 
-WingAir::WingAir(const Figures& figures, const Ailments& ailments, std::size_t side)
-    : polar_(figures.side[side].lift, figures.side[side].drag),
+WingAir::WingAir(const RobotParameters& parameters, const EffectMagnitudes& effect_magnitudes, std::size_t side)
+    : polar_(parameters.side[side].lift, parameters.side[side].drag),
       sign_(side == 0 ? 1 : -1),
-      length_(figures.side[side].wing_length_m),
-      density_(figures.density_kg_m3),
+      length_(parameters.side[side].wing_length_m),
+      density_(parameters.density_kg_m3),
       added_(Eigen::Matrix3d::Zero()) {
-  const Side& s = figures.side[side];
-  const double lost = ailments.damaged_side == static_cast<int>(side) ? 0.05 * ailments[kWingDamage] : 0;
+  const Side& s = parameters.side[side];
+  const double lost =
+      effect_magnitudes.damaged_side == static_cast<int>(side) ? 0.05 * effect_magnitudes[kWingDamage] : 0;
   const double width = length_ / kStrips;
   reference_r_ = kGyration * length_;
   reference_chord_ = s.mean_chord_m * beta_chord(kGyration);
@@ -59,8 +60,8 @@ WingAir::WingAir(const Figures& figures, const Ailments& ailments, std::size_t s
     strip.chord = s.mean_chord_m * beta_chord(strip.r / length_);
     area += strip.chord * width;
   }
-  // Few strips miss some of the area; their chords are stretched so that it is the file's. Then the tip is cut: half of what is lost
-  // from the last strip, the rest from the two before.
+  // A small number of strips misses some of the area, so chords are stretched to give the file's area. Wing damage then
+  // cuts the tip: half of the lost area from the last strip, the rest from the two before.
   const double stretch = length_ * s.mean_chord_m / area;
   for (std::size_t i = 0; i < kStrips; ++i) {
     Strip& strip = strips_[i];
@@ -74,16 +75,16 @@ WingAir::WingAir(const Figures& figures, const Ailments& ailments, std::size_t s
     strip.share = strip.r / reference_r_;
     turning_force_ += turning * c * c * c / 3 * width;
     turning_torque_ += turning * c * c * c * c / 4 * width;
-    if (ailments.any(kAddedMass)) {
-      const double mass = kPi / 4 * density_ * c * c * width * ailments[kAddedMass];
+    if (effect_magnitudes.any(kAddedMass)) {
+      const double mass = kPi / 4 * density_ * c * c * width * effect_magnitudes[kAddedMass];
       const Vector3d w(-c / 2, -sign_ * strip.r, 1);
       added_ += mass * w * w.transpose();
-      added_(0, 0) += kPi / 128 * density_ * c * c * c * c * width * ailments[kAddedMass];
+      added_(0, 0) += kPi / 128 * density_ * c * c * c * c * width * effect_magnitudes[kAddedMass];
     }
   }
-  rotational_lift_ = ailments[kRotationalLift] * kPi * 0.75 * 2 * s.lift;
-  twists_ = ailments.any(kWingFlexibility);
-  bends_ = ailments.any(kEdgeBending);
+  rotational_lift_ = effect_magnitudes[kRotationalLift] * kPi * 0.75 * 2 * s.lift;
+  twists_ = effect_magnitudes.any(kWingFlexibility);
+  bends_ = effect_magnitudes.any(kEdgeBending);
 }
 
 double WingAir::area_m2() const {
@@ -94,7 +95,7 @@ double WingAir::area_m2() const {
 
 WingAir::Load WingAir::load(const Flow& flow) const {
   Load out;
-  // About the stroke axis, air that goes on turns as the wing does: sign z of the leading edge, seen in the wing.
+  // The wake rotates about the stroke axis: sign z of the leading edge's frame, here in the wing's frame.
   const Vector3d rate = flow.rate_rad_s - flow.wake_rad_s * sign_ * Vector3d(-flow.sin_rotation, 0, flow.cos_rotation);
   const auto at = [&](double r) {
     return std::pair{flow.shoulder_m_s.x() - rate.z() * sign_ * r, flow.shoulder_m_s.z() + rate.x() * sign_ * r};
@@ -136,10 +137,10 @@ WingAir::Load WingAir::load(const Flow& flow) const {
     x *= s.pressure;
     z *= s.pressure;
     if (rotational_lift_ != 0) {
-      // The wing turns about its leading edge (x0 = 0). The measured coefficient falls with the angular velocity.
+      // The wing rotates about its leading edge (x0 = 0). The measured coefficient falls with the angular velocity.
       const double u = std::sqrt(square);
       const double reduced = std::abs(flow.rotation_rate_rad_s) * s.chord / (u + 0.5);
-      const double forward = u * uz / (az + 0.3);  // to where the leading edge goes
+      const double forward = u * uz / (az + 0.3);  // positive if the leading edge leads
       x += rotational_lift_ * s.pressure * s.chord * flow.rotation_rate_rad_s * forward / (1 + reduced / 0.4);
     }
     double force_x = x, force_z = z;

@@ -1,4 +1,4 @@
-// What the air does to a wing: blade strips with measured lift and drag, and circulation that lags behind.
+// Aerodynamics of a wing: blade strips with measured lift and drag, and circulation that lags behind the quasi-steady value.
 //
 // A strip at r from the shoulder, chord c, whose point on the hinge moves with (u_x, u_z) through the air (wing frame: x its normal,
 // z from trailing to leading edge), U^2 = u_x^2 + u_z^2, alpha = atan(|u_x| / |u_z|):
@@ -6,19 +6,19 @@
 //   lift   across (u_x, u_z), drag against it:  1/2 rho U^2 c dr C       C_L = 0.225 + 1.58 sin(2.13 alpha - 7.2 deg)
 //                                                                         C_D = 1.92 - 1.55 cos(2.04 alpha - 9.82 deg)     [1, 2]
 //   centre of pressure behind the edge that leads:  c (0.82 alpha / pi + 0.05)                                             [3]
-//   circulation  g = U C_L at the radius of the second moment; what lags of it,
-//                d = (A1 + A2) g - z1 - z2,   dz_i/dt = (2 U / c) b_i (A_i g - z_i),   is taken from each strip as r goes  [4, 5]
-//   turning about the hinge with w_y:  1/2 rho C_D(90 deg) w_y |w_y| (c^3 / 3 on the normal force, c^4 / 4 on the hinge) dr
+//   circulation  g = U C_L at the radius of the second moment; its lagging part,
+//                d = (A1 + A2) g - z1 - z2,   dz_i/dt = (2 U / c) b_i (A_i g - z_i),   is subtracted in proportion to r     [4, 5]
+//   rotation about the hinge with w_y:  1/2 rho C_D(90 deg) w_y |w_y| (c^3 / 3 on the normal force, c^4 / 4 on the hinge) dr
 //
-// Chords are those of a beta density over the span, the form that Ellington gave insects' wings [6],
-// c = c_mean x^(p-1) (1-x)^(q-1) / B(p, q); p and q are this family's own: mean 0.46, mean square 0.53^2.
+// Chords follow a beta density over the span, as Ellington described insects' wings [6],
+// c = c_mean x^(p-1) (1-x)^(q-1) / B(p, q); p and q are this family's choice: mean 0.46, mean square 0.53^2.
 //
-// The coefficients were measured at a Reynolds number of 10^2. At 10^4 wings have more lift for their drag [8]: one factor on lift,
-// kScale, makes the nominal robot carry its weight at about 10 V.
+// The coefficients were measured at a Reynolds number of 10^2. At 10^4 the ratio of lift to drag is higher [8]. One factor on lift,
+// kScale, is chosen so that the nominal robot carries its weight at about 10 V.
 //
-// Rotational circulation [2], added mass [7], wake, twist and what is near are effects: nothing of them is here unless they are on.
-// Assumed: strips do not act on each other, spanwise flow does nothing, one lag stands for a wing. Valid while wings beat; a robot that
-// glides has no downwash here.
+// Rotational circulation [2], added mass [7], wake, twist and nearby surfaces are effects; at magnitude 0 they contribute nothing.
+// Assumed: strips are independent of each other, spanwise flow exerts no force, one lag represents a wing. Valid while wings beat: the
+// model has no downwash of a gliding robot.
 //
 // 1 Dickinson, Lehmann, Sane, Wing rotation and the aerodynamic basis of insect flight, Science 284 (1999): both fits
 // 2 Sane, Dickinson, The aerodynamic effects of wing rotation and a revised quasi-steady model of flapping flight, J. Exp. Biol. 205
@@ -37,14 +37,14 @@
 #include <array>
 
 #include "blind/b/effects.hpp"
-#include "blind/b/figures.hpp"
+#include "blind/b/robot_parameters.hpp"
 
 namespace flappy::blind::b {
 
 inline constexpr std::size_t kStrips = 8;
-inline constexpr double kScale = 1.5;  ///< on lift, see above
+inline constexpr double kScale = 1.5;  ///< factor on lift, see above
 
-/// Coefficients over |u_x| / (|u_x| + |u_z|), which needs no angle.
+/// Table of coefficients over |u_x| / (|u_x| + |u_z|), a variable that needs no arctangent.
 struct Polar {
   static constexpr int kCells = 512;
   struct Row {
@@ -52,7 +52,7 @@ struct Polar {
   };
   std::array<Row, kCells + 1> row;
 
-  /// Factors are those on lift and drag.
+  /// `lift`, `drag`: factors on C_L and C_D.
   Polar(double lift, double drag);
   Row at(double share) const {
     const double x = share * kCells;
@@ -64,23 +64,23 @@ struct Polar {
   }
 };
 
-/// The coefficients themselves, angle from 0 to pi/2.
+/// C_L and C_D at an angle of attack from 0 to pi/2.
 double lift_coefficient(double alpha_rad);
 double drag_coefficient(double alpha_rad);
 
-/// A wing as the air meets it. sign is 1 on the left, -1 on the right: the span runs along sign y of the wing.
+/// Aerodynamic model of one wing. sign is 1 on the left and -1 on the right; the span runs along sign y of the wing's frame.
 class WingAir {
  public:
-  WingAir(const Figures& figures, const Ailments& ailments, std::size_t side);
+  WingAir(const RobotParameters& parameters, const EffectMagnitudes& effect_magnitudes, std::size_t side);
 
-  /// What is instantaneous: velocities through the air in the wing's frame.
+  /// Instantaneous flow: velocities relative to the air, in the wing's frame.
   struct Flow {
     Vector3d shoulder_m_s, rate_rad_s;
-    double rotation_rate_rad_s = 0;                ///< of the hinge
-    double wake_rad_s = 0;                         ///< of the air about the stroke axis, where it goes on
+    double rotation_rate_rad_s = 0;                ///< rate of the rotation hinge
+    double wake_rad_s = 0;                         ///< rotation of the wake air about the stroke axis
     double twist_rad = 0, bending_rate_rad_s = 0;  ///< at the tip
     double sin_rotation = 0, cos_rotation = 1;
-    double gain = 1;  ///< by what is near
+    double gain = 1;  ///< factor on the force, by nearby surfaces and by clap and fling
     std::array<double, 2> lag{};
   };
   struct Load {
@@ -89,14 +89,14 @@ class WingAir {
   };
   Load load(const Flow& flow) const;
 
-  /// Sedov's inertia of the air: of (w_y, w_z, v_x at the shoulder); zero without the effect.
+  /// Sedov's inertia of the air for (w_y, w_z, v_x at the shoulder); zero if added_mass has magnitude 0.
   const Eigen::Matrix3d& added() const { return added_; }
   double area_m2() const;
   double length_m() const { return length_; }
 
  private:
   struct Strip {
-    double r, pressure, chord, share;  ///< pressure: 1/2 rho c dr; share of the lag
+    double r, pressure, chord, share;  ///< pressure: 1/2 rho c dr; share: weight of the lag
   };
   Polar polar_;
   std::array<Strip, kStrips> strips_;

@@ -9,32 +9,32 @@
 namespace flappy::blind::b {
 namespace {
 
-/// What an accelerometer of this robot would be shaken by: the effects on the accelerometer itself count.
+/// Specific force in front of the IMU's mount, with the effects of the accelerometer itself.
 Vector3d at_imu(const Robot& robot, const Felt& felt, const Vector3d& place) {
-  const Ailments& a = robot.plant().ailments();
+  const EffectMagnitudes& a = robot.plant().effect_magnitudes();
   Vector3d force = felt.at(place);
   if (a.any(kAccelerometerMisalignment)) force += (a[kAccelerometerMisalignment] * a.misalignment).cross(force);
   if (a.any(kVibrationRectification)) force += 1e-3 * a[kVibrationRectification] * force.cwiseProduct(force);
   return force;
 }
 
-/// Coefficients of the beats of a robot that is led along the path with these voltages.
+/// Harmonics, by beats, of a robot that is led along the path while its drivers get the sent inputs.
 Contrast led(const Assignment& a, const Case& c, std::size_t flight, double trim_s, const Path& path,
              const std::vector<Beat>& sent) {
-  Robot robot(c.figures, c.ailments, c.room, a.seed, flight);
+  Robot robot(c.parameters, c.effect_magnitudes, c.room, a.seed, flight);
   std::copy(path.pose.front().begin(), path.pose.front().end(), robot.state().begin());
-  Radio radio(a.seed, flight, c.ailments[kCommandDropout], -trim_s);
-  SoftMount mount(c.ailments[kSoftImuMount]);
+  Radio radio(a.seed, flight, c.effect_magnitudes[kCommandDropout], -trim_s);
+  SoftMount mount(c.effect_magnitudes[kSoftImuMount]);
   Contrast out;
-  const double beat_s = 1 / c.figures.flapping_Hz;
-  // Beats of the log that are whole, by the driver's phase.
+  const double beat_s = 1 / c.parameters.flapping_Hz;
+  // Number of the first whole beat of the log, by the driver's phase.
   long beat = std::lround(std::ceil(trim_s / beat_s - 1e-9));
   std::array<double, 30> sum{};
   int count = 0;
   const std::size_t ticks = std::min(sent.size(), path.pose.size() / kStepsPerTick);
   for (std::size_t k = 0; k < ticks; ++k) {
     const double begins = static_cast<double>(k) * kTick_s;
-    robot.drive(waveform(c.figures, radio.arrived(sent[k], begins - trim_s), begins));
+    robot.drive(waveform(c.parameters, radio.arrived(sent[k], begins - trim_s), begins));
     for (int step = 0; step < kStepsPerTick; ++step) {
       const std::size_t at = k * kStepsPerTick + static_cast<std::size_t>(step);
       if (at + 1 >= path.acceleration.size()) return out;
@@ -50,7 +50,8 @@ Contrast led(const Assignment& a, const Case& c, std::size_t flight, double trim
         ++beat;
       }
       robot.led_step(path, at);
-      // Impacts at the stops last for a few steps, so each step counts. A soft mount takes a tenth of a second to be shaken as it is.
+      // Impacts at the stops last for a few steps, so every step is evaluated. A soft mount needs 0.1 s before the log
+      // to settle.
       const double left = static_cast<double>(beat) * beat_s - 1e-9 - time;
       if (left > 0.1) continue;
       const Felt felt = robot.felt_now();
@@ -75,7 +76,7 @@ Contrast led(const Assignment& a, const Case& c, std::size_t flight, double trim
 FamilyFlight fly_programme(const Assignment& a, std::size_t number, const Times& times, Path* path,
                            std::vector<Beat>* sent) {
   const Case c = make_case(a);
-  const Programme programme(a, number, c.figures, c.room);
+  const Programme programme(a, number, c.parameters, c.room);
   Flight flight(a, c, number, programme.start_m(), programme.start_heading_rad(), times.trim_s);
   flight.record(path);
   Beat beat;
@@ -103,14 +104,14 @@ FamilyFlight fly_programme(const Assignment& a, std::size_t number, const Times&
   return out;
 }
 
-Contrast contrast_of(const Assignment& a, std::size_t flight, const std::string& effect, double size,
+Contrast contrast_of(const Assignment& a, std::size_t flight, const std::string& effect, double magnitude,
                      const Times& times) {
   for (const auto& [id, present] : a.effects)
     if (id == effect && present != 0)
       throw io::InputError("effect " + effect + ": the flight was flown with it; accepted: a flight without it");
   Assignment with = a;
   std::erase_if(with.effects, [&](const auto& e) { return e.first == effect; });
-  with.effects.emplace_back(effect, size);
+  with.effects.emplace_back(effect, magnitude);
   const Case before = make_case(a), after = make_case(with);
   Path path;
   std::vector<Beat> sent;

@@ -32,7 +32,7 @@ double Plant::spring_torque(std::size_t side, double stroke, double stiffness) c
   const Side& s = f_.side[side];
   const double d = stroke - s.rest_angle_rad;
   const double k = stiffness * (d > 0 ? s.stiffness_positive_Nm_rad : s.stiffness_negative_Nm_rad);
-  // Stiffening as the hyperbolic sine: d + d^3 / (6 spread^2) + ...
+  // A hyperbolic sine hardens the spring: d + d^3 / (6 spread^2) + ...
   if (spread_rad_[side] != 0) return -k * spread_rad_[side] * std::sinh(d / spread_rad_[side]);
   return -k * d;
 }
@@ -48,7 +48,7 @@ double Plant::stroke_torque(const State& x, std::size_t side, double current_A, 
   const Side& s = f_.side[side];
   const double n = ratio(x, side), stroke = x[kStroke + side], stroke_rate = x[kStrokeRate + side];
   const bool play = a_.any(kGearBacklash);
-  const double turning = play ? x[kRotorRate + side] : stroke_rate;  // of the rotor, over the ratio
+  const double turning = play ? x[kRotorRate + side] : stroke_rate;  // rotor rate over gear ratio
   double torque_constant = slow.torque_constant_Nm_A[side];
   if (a_.any(kMagnetSaturation))
     torque_constant /= 1 + 0.05 * a_[kMagnetSaturation] * (current_A / 0.5) * (current_A / 0.5);
@@ -59,8 +59,8 @@ double Plant::stroke_torque(const State& x, std::size_t side, double current_A, 
         n * s.motor.friction_Nm * smooth_sign(turning, kFrictionOver_rad_s) + s.motor.damping_Nm_s * n * n * turning;
   }
   if (a_.any(kCoulombFriction)) {
-    // The bristles of the LuGre model (1995), that bend far enough for the step; their strength falls from 1.4 to 1 of the motor's
-    // friction, Fc + (Fs - Fc) exp(-(v / vs)^2), as the speed passes that of Stribeck.
+    // Bristles of the LuGre model (1995), soft enough for the step. Their strength, Fc + (Fs - Fc) exp(-(v / vs)^2),
+    // falls from 1.4 to 1 times the motor's friction beyond the Stribeck speed.
     constexpr double kReach_rad = 1.5 * std::numbers::pi / 180, kStribeck_rad_s = 30;
     const double v = turning / kStribeck_rad_s;
     const double strength = 1 + 0.4 * std::exp(-v * v);
@@ -73,7 +73,7 @@ double Plant::stroke_torque(const State& x, std::size_t side, double current_A, 
              std::sin(6 * n * (play ? x[kRotor + side] : stroke) + a_.cogging_phase_rad[side]);
   double torque = motor;
   if (play) {
-    // Nordin, Galic, Gutman (1997): an elastic shaft with damping behind a gap transmits no pull.
+    // Nordin, Galic, Gutman (1997): a damped elastic shaft behind a gap, which transmits no pull.
     constexpr double kShaft_Nm_rad = 0.5, kShaftDamping_Nm_s = 6e-5;
     const double gap = 0.5 * std::numbers::pi / 180 * a_[kGearBacklash];
     const double apart = x[kRotor + side] - stroke, closing = turning - stroke_rate;

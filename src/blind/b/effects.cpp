@@ -67,7 +67,10 @@ std::vector<FamilyEffect> table() {
        {"time", "charge", "amplitude"}},
       {"driver_dead_zone", "0.4 V, smooth", kStroke, {"amplitude", "always"}},
       {"driver_bandwidth", "two poles of 0.5 ms", kStroke, {"always", "amplitude"}},
-      {"command_delay", "0.3 of a beat, another half millisecond each beat", kStroke, {"always", "acceleration"}},
+      {"command_delay",
+       "0.3 of a beat, 0.25 ms more and less in turn from beat to beat",
+       kStroke,
+       {"always", "acceleration"}},
       {"stop_compliance", "stops of the wing five times softer", kStroke, {"always", "amplitude"}},
       {"com_offset", "1 mm", {"torque_x", "torque_y", "torque_z"}, {"always"}},
       {"inertia_products", "5 % of the mean moment in each product", kTorques, {"rate", "acceleration"}},
@@ -128,17 +131,17 @@ std::size_t effect_number(const std::string& id) {
                        io::did_you_mean(id, names));
 }
 
-Ailments ailments_of(const std::vector<std::pair<std::string, double>>& effects, std::uint64_t seed) {
-  Ailments a;
+EffectMagnitudes effect_magnitudes_of(const std::vector<std::pair<std::string, double>>& effects, std::uint64_t seed) {
+  EffectMagnitudes a;
   std::array<bool, kEffects> named{};
-  for (const auto& [id, size] : effects) {
+  for (const auto& [id, magnitude] : effects) {
     const std::size_t number = effect_number(id);
     if (named[number]) throw io::InputError("effect " + id + ": named twice; accepted: each once");
-    if (!(size >= 0 && size <= 4))
-      throw io::InputError("effect " + id + ": size " + io::shortest_digits(size) +
+    if (!(magnitude >= 0 && magnitude <= 4))
+      throw io::InputError("effect " + id + ": magnitude " + io::shortest_digits(magnitude) +
                            " is out of range; accepted: from 0 to 4");
     named[number] = true;
-    a.size[number] = size;
+    a.magnitude[number] = magnitude;
   }
   const auto random = [&](Effect e) { return Random(seed, 0, Stream::kEffect, e); };
   const auto direction = [](Random r) {
@@ -148,7 +151,7 @@ Ailments ailments_of(const std::vector<std::pair<std::string, double>>& effects,
   constexpr double kTurn = 2 * std::numbers::pi;
   a.damaged_side = random(kWingDamage).uniform() < 0.5 ? 0 : 1;
   a.wind_direction_rad = random(kWind).uniform(0, kTurn);
-  // level, as height of the centre of mass alone hardly acts
+  // horizontal, as a change of height alone has almost no effect
   const double com = random(kComOffset).uniform(0, kTurn);
   a.com_m = 1e-3 * Eigen::Vector3d(std::cos(com), std::sin(com), 0);
   a.marker_m = 2e-3 * direction(random(kMarkerOffset));

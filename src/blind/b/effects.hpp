@@ -1,4 +1,4 @@
-// What may be wrong with a robot of this family: its effects by number, with what they draw.
+// Effects of this family by number, and the random properties that they draw.
 #pragma once
 
 #include <Eigen/Dense>
@@ -11,7 +11,7 @@
 
 namespace flappy::blind::b {
 
-/// The order is that of family_effects().
+/// Numbers of the effects, in the order of family_effects().
 enum Effect : std::size_t {
   kGroundEffect,
   kCeilingEffect,
@@ -56,27 +56,28 @@ enum Effect : std::size_t {
   kEffects,
 };
 
-/// All of them, in words.
+/// Descriptions of all effects.
 const std::vector<FamilyEffect>& family_effects();
 
-/// Number of an effect. InputError with the nearest name where there is none.
+/// Number of an effect. Throws InputError, which suggests the nearest name, for an unknown id.
 std::size_t effect_number(const std::string& id);
 
-/// Sizes of a robot's effects, 0 for those it has not, and what they draw of their own, which does not depend on sizes.
-struct Ailments {
-  std::array<double, kEffects> size{};
-  double operator[](Effect e) const { return size[e]; }
-  bool any(Effect e) const { return size[e] != 0; }
+/// Magnitudes of a robot's effects, 0 for those that it does not have, and the random properties of all effects, which do not depend on
+/// the magnitudes.
+struct EffectMagnitudes {
+  std::array<double, kEffects> magnitude{};
+  double operator[](Effect e) const { return magnitude[e]; }
+  bool any(Effect e) const { return magnitude[e] != 0; }
 
   int damaged_side = 0;
   double wind_direction_rad = 0;
-  Eigen::Vector3d com_m = Eigen::Vector3d::Zero();         ///< of length 1 mm
-  Eigen::Vector3d marker_m = Eigen::Vector3d::Zero();      ///< of length 2 mm
-  Eigen::Vector3d products = Eigen::Vector3d::Zero();      ///< xy, xz, yz: share of the mean moment
-  Eigen::Vector3d misalignment = Eigen::Vector3d::Zero();  ///< rotation vector of length 0.02 rad
-  Eigen::Vector3d gyro_drift = Eigen::Vector3d::Zero();    ///< warm-up, rad/s
+  Eigen::Vector3d com_m = Eigen::Vector3d::Zero();         ///< displacement, 1 mm long
+  Eigen::Vector3d marker_m = Eigen::Vector3d::Zero();      ///< displacement, 2 mm long
+  Eigen::Vector3d products = Eigen::Vector3d::Zero();      ///< xy, xz, yz, as shares of the mean moment
+  Eigen::Vector3d misalignment = Eigen::Vector3d::Zero();  ///< rotation vector, 0.02 rad long
+  Eigen::Vector3d gyro_drift = Eigen::Vector3d::Zero();    ///< by warm-up, rad/s
   double mocap_tilt_direction_rad = 0;
-  std::array<double, 2> wing_inertia{1, 1};  ///< signs of the change of each side
+  std::array<double, 2> wing_inertia{1, 1};  ///< sign of the change on each side
   double wing_product = 1;
   Eigen::Vector2d tether_foot_m = Eigen::Vector2d::Zero();
   double delay_sign = 1;
@@ -84,7 +85,7 @@ struct Ailments {
   std::array<double, 2> cogging_phase_rad{}, gear_phase_rad{}, creep_sign{1, 1}, ageing{1, 1};
 };
 
-/// InputError for an effect that is unknown or named twice, and a size below 0 or above 4.
-Ailments ailments_of(const std::vector<std::pair<std::string, double>>& effects, std::uint64_t seed);
+/// Throws InputError for an effect that is unknown or named twice, and for a magnitude below 0 or above 4.
+EffectMagnitudes effect_magnitudes_of(const std::vector<std::pair<std::string, double>>& effects, std::uint64_t seed);
 
 }  // namespace flappy::blind::b

@@ -9,10 +9,10 @@
 namespace flappy::blind::b {
 namespace {
 
-/// The goal stands in the middle of the room, so that nothing is near.
+/// The goal is in the middle of the room, far from all surfaces.
 const Vector3d kGoal_m(0, 0, 1);
 
-/// What the policy may ask for: the parts' names in task files, with their numbers. Errors are from the goal, whose heading is 0.
+/// Observation by the parts' names in task files. Errors are relative to the goal, whose heading is 0.
 std::vector<double> observed(const std::vector<std::string>& names, const View& view, double beat_phase, double time,
                              const Beat& trim, const std::array<double, 4>& added) {
   std::vector<double> out;
@@ -20,7 +20,7 @@ std::vector<double> observed(const std::vector<std::string>& names, const View& 
   const auto vector = [&](const Vector3d& v) { out.insert(out.end(), {v.x(), v.y(), v.z()}); };
   const double heading = heading_of(view.attitude);
   for (const std::string& name : names) {
-    if (name == "rotation_matrix" || name == "goal_rotation") {  // row by row; the goal's heading is that of W
+    if (name == "rotation_matrix" || name == "goal_rotation") {  // row by row; equal, as the goal's heading is 0
       for (int i = 0; i < 3; ++i) vector(R.row(i).transpose());
     } else if (name == "position_error") {
       vector(view.position_m - kGoal_m);
@@ -61,7 +61,7 @@ Standing standing(const Vector3d& position, const Vector3d& velocity, const Vect
 }
 
 bool within(const Standing& s, const EscapeAssignment::Bounds& b) {
-  // A bound that is not set binds nothing.
+  // A bound of 0 or less is not applied.
   const auto held = [](double value, double bound) { return bound <= 0 || value <= bound; };
   return held(s.distance_m, b.distance_m) && held(s.speed_m_s, b.speed_m_s) &&
          held(s.body_rate_rad_s, b.body_rate_rad_s) && held(s.tilt_rad, b.tilt_rad) &&
@@ -82,7 +82,7 @@ FamilyEscape fly_escape(const Assignment& a, std::size_t number, const EscapeAss
   const double heading = wrapped(rules.heading_rad + rules.heading_half_rad * random.uniform(-1, 1));
   Flight flown(a, c, flight, start, heading, trim_s);
   observed(rules.observation, flown.view(), 0, 0, flown.pilot().trim(),
-           {});  // a name that is unknown is refused before the work
+           {});  // throws for an unknown name before anything is flown
 
   FamilyEscape out;
   Beat beat;
@@ -106,7 +106,7 @@ FamilyEscape fly_escape(const Assignment& a, std::size_t number, const EscapeAss
         } else {
           const Beat trim = flown.pilot().trim();
           if (now >= next_action - 1e-9) {
-            const double phase = 2 * kPi * (now + trim_s) * c.figures.flapping_Hz;
+            const double phase = 2 * kPi * (now + trim_s) * c.parameters.flapping_Hz;
             added = rules.policy(observed(rules.observation, view, phase, now, trim, added));
             for (double& u : added)
               if (!std::isfinite(u)) u = 0;
@@ -117,7 +117,7 @@ FamilyEscape fly_escape(const Assignment& a, std::size_t number, const EscapeAss
         }
       }
     }
-    const std::string how = flown.tick(beat, true);  // an escape is a somersault
+    const std::string how = flown.tick(beat, true);  // may tumble: an escape is a somersault
     if (!how.empty()) {
       out.crashed = true;
       break;

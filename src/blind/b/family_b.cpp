@@ -25,9 +25,10 @@ class FamilyB final : public Family {
     check_flight(flight);
     return fly_programme(a, flight);
   }
-  Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect, double size) const override {
+  Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect,
+                    double magnitude) const override {
     check_flight(flight);
-    return contrast_of(a, flight, effect, size);
+    return contrast_of(a, flight, effect, magnitude);
   }
   FamilyEscape escape(const Assignment& a, std::size_t number, const EscapeAssignment& rules) const override {
     return fly_escape(a, number, rules);

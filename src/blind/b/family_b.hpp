@@ -1,5 +1,5 @@
-// A family of blind robots: blade strips with circulation that lags, rigid bodies in reduced coordinates, Runge and Kutta at 50 us,
-// windings, friction and stops in forms of their own, sensors that jitter and swap markers. It shares nothing with other families.
+// Family B: blade strips with lagging circulation, rigid bodies in reduced coordinates, Runge-Kutta at 50 us, its own models of
+// windings, friction and stops, sensors that jitter and swap markers. It shares nothing with other families.
 #pragma once
 
 #include <memory>

@@ -8,25 +8,25 @@ namespace flappy::blind::b {
 
 Case make_case(const Assignment& a) {
   Case c;
-  c.ailments = ailments_of(a.effects, a.seed);
-  c.figures = read_figures(a.vehicle_file);
-  c.header.vehicle = c.figures.file;
-  c.header.vehicle_sha256 = c.figures.sha256;
-  c.header.flapping_Hz = c.figures.flapping_Hz;
+  c.effect_magnitudes = effect_magnitudes_of(a.effects, a.seed);
+  c.parameters = read_parameters(a.vehicle_file);
+  c.header.vehicle = c.parameters.file;
+  c.header.vehicle_sha256 = c.parameters.sha256;
+  c.header.flapping_Hz = c.parameters.flapping_Hz;
   c.header.gravity_m_s2 = kGravity_m_s2;
-  c.header.ambient = {c.figures.density_kg_m3, c.room.ground_z_m, c.room.ceiling_z_m, {{0, c.room.wall_y_m, 0, -1}}};
-  c.sensors = draw_sensors(a, c.figures.side[0].motor.voltage_limit_V, c.header);
-  if (a.own_figures) draw_figures(a.seed, c.figures);
+  c.header.ambient = {c.parameters.density_kg_m3, c.room.ground_z_m, c.room.ceiling_z_m, {{0, c.room.wall_y_m, 0, -1}}};
+  c.sensors = draw_sensors(a, c.parameters.side[0].motor.voltage_limit_V, c.header);
+  if (a.own_parameters) draw_parameters(a.seed, c.parameters);
   return c;
 }
 
 Flight::Flight(const Assignment& a, const Case& c, std::uint64_t flight, const Vector3d& start, double heading,
                double trim_s)
-    : robot_(c.figures, c.ailments, c.room, a.seed, flight),
+    : robot_(c.parameters, c.effect_magnitudes, c.room, a.seed, flight),
       sensors_(a, c.sensors, robot_, flight, trim_s, a.power, a.wings),
       observer_(c.header, start, heading),
-      pilot_(c.figures),
-      radio_(a.seed, flight, c.ailments[kCommandDropout], -trim_s),
+      pilot_(c.parameters),
+      radio_(a.seed, flight, c.effect_magnitudes[kCommandDropout], -trim_s),
       trim_s_(trim_s) {
   robot_.put(start, heading);
   log_.header = c.header;
@@ -34,15 +34,15 @@ Flight::Flight(const Assignment& a, const Case& c, std::uint64_t flight, const V
   log_.command.phase_rad.emplace();
 }
 
-Radio::Radio(std::uint64_t seed, std::uint64_t flight, double size, double begins_s)
+Radio::Radio(std::uint64_t seed, std::uint64_t flight, double magnitude, double begins_s)
     : random_(seed, flight, Stream::kEffect, kCommandDropout),
-      size_(size),
+      magnitude_(magnitude),
       fails_s_(begins_s + random_.uniform(0.3, 1)) {}
 
 Beat Radio::arrived(const Beat& sent, double now) {
-  if (size_ == 0) return sent;
+  if (magnitude_ == 0) return sent;
   if (now >= fails_s_) {
-    returns_s_ = now + size_ * random_.uniform(0.03, 0.09);
+    returns_s_ = now + magnitude_ * random_.uniform(0.03, 0.09);
     fails_s_ = returns_s_ + random_.uniform(0.2, 0.7);
   }
   if (now >= returns_s_) last_ = sent;
@@ -51,7 +51,7 @@ Beat Radio::arrived(const Beat& sent, double now) {
 
 std::string Flight::tick(const Beat& sent, bool may_tumble) {
   const double now = time_s();
-  const Figures& f = robot_.plant().figures();
+  const RobotParameters& f = robot_.plant().parameters();
   const std::array<double, 2> logged = waveform(f, sent, now + trim_s_);
   if (now >= -1e-9) {
     flightlog::CommandStream& c = log_.command;

@@ -1,4 +1,4 @@
-// One flight of one robot, from the ground crew's hands to the log.
+// One flight of one robot, from its placement in the room to the log.
 #pragma once
 
 #include "blind/b/pilot.hpp"
@@ -10,35 +10,36 @@ namespace flappy::blind::b {
 
 inline constexpr double kTrim_s = 5;
 
-/// The robot of an assignment with its figures, what is wrong with it and what is declared of it.
+/// Robot of an assignment: its parameters, effects, room, sensors, and the header that declares them.
 struct Case {
-  Figures figures;
-  Ailments ailments;
+  RobotParameters parameters;
+  EffectMagnitudes effect_magnitudes;
   Surroundings room;
   flightlog::FlightHeader header;
   SensorTruth sensors;
 };
 Case make_case(const Assignment& a);
 
-/// What the wings get of the inputs that are sent: packets that are lost leave those of the last.
+/// Radio link: returns the sent inputs, or the last ones that arrived while packets are lost (command dropout).
 class Radio {
  public:
-  Radio(std::uint64_t seed, std::uint64_t flight, double size, double begins_s);
+  Radio(std::uint64_t seed, std::uint64_t flight, double magnitude, double begins_s);
   Beat arrived(const Beat& sent, double now_s);
 
  private:
   Random random_;
-  double size_, returns_s_ = -1e9, fails_s_;
+  double magnitude_, returns_s_ = -1e9, fails_s_;
   Beat last_;
 };
 
-/// A robot with who flies it, tick by tick from -kTrim_s on.
+/// A robot with its sensors and pilot, advanced by ticks from t = -trim_s on.
 class Flight {
  public:
   Flight(const Assignment& a, const Case& c, std::uint64_t flight, const Vector3d& start_m, double heading_rad,
          double trim_s);
 
-  /// Flies one tick with these inputs of the pilot, held between its periods. Empty, or how it crashed.
+  /// Flies one tick with the pilot's inputs, which are held between its periods. Returns how the robot crashed, or an
+  /// empty string.
   std::string tick(const Beat& sent, bool may_tumble = false);
   double time_s() const { return static_cast<double>(ticks_) * kTick_s - trim_s_; }
   long ticks() const { return ticks_; }
@@ -46,7 +47,7 @@ class Flight {
   const View& view() const { return observer_.view(); }
   const Robot& robot() const { return robot_; }
   Pilot& pilot() { return pilot_; }
-  /// Records the torso's path.
+  /// Records the torso's path in `path` from now on; null: no recording.
   void record(Path* path) { path_ = path; }
   flightlog::FlightLog log(double end_s) const;
 

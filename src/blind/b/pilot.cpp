@@ -14,7 +14,7 @@ Eigen::Quaterniond turn_by(const Vector3d& rotation) {
 
 Vector3d rotation_of(const Eigen::Quaterniond& q) {
   const double sign = q.w() < 0 ? -1 : 1;
-  return 2 * sign * q.vec();  // near enough for corrections
+  return 2 * sign * q.vec();  // small-angle approximation
 }
 
 }  // namespace
@@ -40,7 +40,7 @@ void Observer::correct(const MocapSample& frame) {
   const View& then = past_[(ticks_ + past_.size() - std::min(late_ticks_, past_.size() - 1)) % past_.size()];
   const Vector3d away = frame.position_m - then.position_m;
   const Vector3d turned = rotation_of(then.attitude.conjugate() * frame.attitude);
-  // A frame that does not fit is refused, until it is the robot that does not.
+  // An outlier is rejected, up to 11 in a row: after that the estimate, not the frame, is assumed to be wrong.
   if ((away.norm() > 0.025 || turned.norm() > 0.5) && ++refused_ < 12) return;
   refused_ = 0;
   const double position = 30 * period_s_, velocity = 350 * period_s_, attitude = 8 * period_s_, drift = 6 * period_s_;
@@ -81,8 +81,8 @@ Beat Pilot::steer(const View& view, const Target& target) {
   Vector3d rate, velocity;
   for (std::size_t k = 0; k < 3; ++k) {
     const auto i = static_cast<Eigen::Index>(k);
-    rate[i] = rate_notch_[k](view.rate_rad_s[i], figures_.flapping_Hz);
-    velocity[i] = velocity_notch_[k](view.velocity_m_s[i], figures_.flapping_Hz);
+    rate[i] = rate_notch_[k](view.rate_rad_s[i], parameters_.flapping_Hz);
+    velocity[i] = velocity_notch_[k](view.velocity_m_s[i], parameters_.flapping_Hz);
   }
   const double dt = kPeriod_s;
   Vector3d wanted = target.velocity_m_s + Vector3d(2.2, 2.2, 4).cwiseProduct(target.position_m - view.position_m);
@@ -115,7 +115,7 @@ Beat Pilot::steer(const View& view, const Target& target) {
   return b;
 }
 
-Programme::Programme(const Assignment& a, std::uint64_t flight, const Figures& f, const Surroundings& room)
+Programme::Programme(const Assignment& a, std::uint64_t flight, const RobotParameters& f, const Surroundings& room)
     : proposed_(a.proposed) {
   if (proposed_) {
     const auto [x, y, z, facing] = proposed_->goal(0);
@@ -128,7 +128,7 @@ Programme::Programme(const Assignment& a, std::uint64_t flight, const Figures& f
   Vector3d at = Vector3d::Zero();
   const auto go = [&](const Vector3d& to, double speed, double turn, double wait) {
     facing += turn;
-    // The fastest moment of a smooth leg is 1.875 of its mean.
+    // The peak speed of a smooth leg is 1.875 times its mean.
     const double lasts = std::max({0.3, 1.875 * (to - at).norm() / speed, 1.875 * std::abs(turn) / 3});
     legs_.push_back({now, lasts, to, facing});
     now += lasts + wait;
@@ -179,7 +179,7 @@ Programme::Programme(const Assignment& a, std::uint64_t flight, const Figures& f
   for (std::size_t input = 0; input < 4; ++input)
     for (int n = 0; n < 5; ++n) {
       const double frequency = 0.9 * std::pow(9.5, (n + random.uniform()) / 5);
-      // Slow tones would carry the robot away; the loops leave little of them.
+      // Slow tones would displace the robot, so they are weaker below 3 Hz.
       tones_[input].push_back({share[input] * std::min(1.0, frequency / 3), frequency, random.uniform(0, 2 * kPi)});
     }
   for (double t = 1 + random.uniform(); t < 9.5; t += random.uniform(0.5, 0.9)) {
@@ -202,7 +202,7 @@ Target Programme::target(double time) const {
   for (const Leg& next : legs_)
     if (time >= next.begins_s) before = leg, leg = &next;
   if (leg == &legs_.front()) return {leg->to, Vector3d::Zero(), leg->heading};
-  // From rest to rest as a polynomial of fifth degree.
+  // Polynomial of fifth degree from rest to rest.
   const double x = std::clamp((time - leg->begins_s) / leg->lasts_s, 0.0, 1.0);
   const double s = x * x * x * (10 + x * (-15 + 6 * x)), rate = 30 * x * x * (1 - x) * (1 - x) / leg->lasts_s;
   const Vector3d way = leg->to - before->to;

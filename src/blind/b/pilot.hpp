@@ -1,8 +1,9 @@
-// Who flies: an observer on what the sensors send, a cascade of loops, and the programme of a flight.
+// Pilot of family B: an observer on the sensors' data, cascaded control loops, and the programme of a flight.
 //
-// The observer carries position, velocity and attitude forward with the IMU, and corrects them where a frame of motion capture arrives, by
-// what it thought at the time the frame was taken. The loops: position to velocity to acceleration to the direction of thrust; attitude to
-// the inputs of the wing beat, with rates freed of the beat by a notch. Integrators find the trim of a robot.
+// The observer integrates position, velocity and attitude from the IMU. When a frame of motion capture arrives, it corrects them by the
+// difference between the frame and its own estimate at the time of the frame. The loops: position to velocity to acceleration to the
+// direction of thrust; attitude to the inputs of the wing beat. Notches remove the beat from rates and velocities. Integrators find the
+// trim.
 #pragma once
 
 #include <array>
@@ -13,7 +14,7 @@
 
 namespace flappy::blind::b {
 
-/// What the pilot knows.
+/// The pilot's estimate of the state.
 struct View {
   Vector3d position_m = Vector3d::Zero(), velocity_m_s = Vector3d::Zero(), rate_rad_s = Vector3d::Zero();
   Eigen::Quaterniond attitude = Eigen::Quaterniond::Identity();
@@ -21,9 +22,9 @@ struct View {
 
 class Observer {
  public:
-  /// Starts where the robot is put: someone put it there.
+  /// Starts from the pose at which the robot is placed, which is known exactly.
   Observer(const flightlog::FlightHeader& header, const Vector3d& position_m, double heading_rad);
-  /// Every tick, with what has arrived.
+  /// Called every tick; takes the samples that have arrived.
   void tick(Sensors& sensors, double now_s);
   const View& view() const { return view_; }
 
@@ -46,32 +47,33 @@ struct Target {
 
 class Pilot {
  public:
-  explicit Pilot(const Figures& figures) : figures_(figures) {}
-  /// Every second tick.
+  explicit Pilot(const RobotParameters& parameters) : parameters_(parameters) {}
+  /// Called every second tick.
   Beat steer(const View& view, const Target& target);
-  /// What the integrators hold.
+  /// Inputs that the integrators hold.
   Beat trim() const;
-  /// The rates that the loops use.
+  /// Period of the loops.
   static constexpr double kPeriod_s = 2 * kTick_s;
 
  private:
-  /// Takes the beat out of a signal: a notch of quality 1.
+  /// Notch filter of quality 1, which removes the beat from a signal.
   struct Notch {
     double x1 = 0, x2 = 0, y1 = 0, y2 = 0;
     bool begun = false;
     double operator()(double x, double frequency_hz);
   };
-  Figures figures_;
+  RobotParameters parameters_;
   std::array<Notch, 3> rate_notch_, velocity_notch_;
   Vector3d held_acceleration_ = Vector3d::Zero();
   double roll_ = 0, pitch_ = 0, yaw_ = 0, lift_V_ = 10;
 };
 
-/// Where a flight goes, how it turns, and what is added to the pilot's inputs so that they are excited.
+/// Path and heading of a flight, and the excitation that is added to the pilot's inputs.
 class Programme {
  public:
-  /// Flight 0 is near the ground, 1 near the ceiling, 2 along the wall; all are in the free too. Hover stays where it is.
-  Programme(const Assignment& a, std::uint64_t flight, const Figures& figures, const Surroundings& room);
+  /// Flight 0 is near the ground, 1 near the ceiling, 2 along the wall; each also has legs in free air. Hover keeps its
+  /// place.
+  Programme(const Assignment& a, std::uint64_t flight, const RobotParameters& parameters, const Surroundings& room);
   Vector3d start_m() const { return legs_.front().to; }
   double start_heading_rad() const { return legs_.front().heading; }
   Target target(double time_s) const;
@@ -91,7 +93,7 @@ class Programme {
     std::size_t input;
     double size;
   };
-  const ProposedFlight* proposed_;  ///< or none
+  const ProposedFlight* proposed_;  ///< null if nothing is proposed
   std::vector<Leg> legs_;
   std::array<std::vector<Tone>, 4> tones_;
   std::vector<Pulse> pulses_;

@@ -15,10 +15,10 @@ double decay(double distance, double length) { return std::exp(-std::max(distanc
 
 struct Plant::SideNow {
   Matrix3d edge, wing;  // frames in B
-  double sine, cosine;  // of the rotation
+  double sine, cosine;  // of the rotation angle
   Twist s1, s2;
   Inertia edge_inertia, wing_inertia;
-  Eigen::Matrix<double, 6, 3> added_twist;  // (w_y, w_z, v_x of the shoulder) of the wing, from its twist
+  Eigen::Matrix<double, 6, 3> added_twist;  // columns project the wing's twist on w_y, w_z and v_x at the shoulder
 };
 
 Matrix3d rotation_matrix(const State& x) {
@@ -29,8 +29,8 @@ Matrix3d rotation_matrix(const State& x) {
   return R;
 }
 
-Plant::Plant(Figures figures, const Ailments& ailments)
-    : f_(std::move(figures)), a_(ailments), wing_{WingAir(f_, a_, 0), WingAir(f_, a_, 1)}, spread_rad_{} {
+Plant::Plant(RobotParameters parameters, const EffectMagnitudes& effect_magnitudes)
+    : f_(std::move(parameters)), a_(effect_magnitudes), wing_{WingAir(f_, a_, 0), WingAir(f_, a_, 1)}, spread_rad_{} {
   Link torso = f_.torso;
   torso.com_m += a_[kComOffset] * a_.com_m;
   const double mean = torso.inertia_kg_m2.trace() / 3;
@@ -87,8 +87,9 @@ void Plant::place(const State& x, std::size_t side, SideNow& now) const {
 double Plant::near_gain(const Vector3d& shoulder_W, const Vector3d& tip_W, const Surroundings& room) const {
   double gain = 1;
   const double height = 0.5 * (shoulder_W.z() + tip_W.z());
-  // Exponential laws, finite at contact, other than that of Cheeseman and Bennett: of ground as in In-Ground-Effect Modeling ...,
-  // J. Dyn. Syst. Meas. Control 141, 071013; of ground and ceiling as in Modelling of Ground and Ceiling Effects (University of Bolzano).
+  // Exponential laws are finite at contact, unlike that of Cheeseman and Bennett. Ground:
+  // In-Ground-Effect Modeling ..., J. Dyn. Syst. Meas. Control 141, 071013; ground and ceiling: Modelling of Ground
+  // and Ceiling Effects (University of Bolzano).
   if (a_.any(kGroundEffect)) gain += 0.14 * a_[kGroundEffect] * decay(height - room.ground_z_m, 0.075);
   if (a_.any(kCeilingEffect)) gain += 0.12 * a_[kCeilingEffect] * decay(room.ceiling_z_m - height, 0.06);
   if (a_.any(kWallEffect)) gain -= 0.05 * a_[kWallEffect] * decay(room.wall_y_m - tip_W.y(), 0.08);
@@ -100,7 +101,7 @@ Wrench Plant::on_torso(const State& x, const Matrix3d& R, const Slow& slow, cons
   const Vector3d position(x[0], x[1], x[2]);
   const Vector3d w(x[kRate], x[kRate + 1], x[kRate + 2]);
   if (a_.any(kBodyDrag) && has_air) {
-    // Cross-flow: each axis has its own area and its own component of velocity.
+    // Cross-flow drag: each axis has its own area and uses its own component of velocity.
     const Vector3d centre(0, 0, -3e-3), area(1.6e-3, 1.3e-3, 1.0e-3);
     const Vector3d v =
         Vector3d(x[kVelocity], x[kVelocity + 1], x[kVelocity + 2]) + w.cross(centre) - R.transpose() * slow.wind_m_s;
@@ -108,14 +109,15 @@ Wrench Plant::on_torso(const State& x, const Matrix3d& R, const Slow& slow, cons
           at_point(centre, -0.5 * f_.density_kg_m3 * a_[kBodyDrag] * area.cwiseProduct(v.cwiseAbs().cwiseProduct(v)));
   }
   if (a_.any(kWallEffect) && has_air) {
-    // The image of the wings' downwash draws the robot to the wall, at the stroke plane.
+    // The mirror image of the wings' downwash pulls the robot towards the wall, at the stroke plane.
     const double near = decay(room.wall_y_m - position.y() - f_.around_m, 0.08);
     const Vector3d pull(0, 0.04 * a_[kWallEffect] * f_.mass_kg() * kGravity_m_s2 * near, 0);
     sum = sum + at_point(Vector3d(0, 0, f_.above_m), R.transpose() * pull);
   }
   if (a_.any(kTether)) {
-    // A cable hangs from below the torso to a foot on the ground. What hangs weighs; its horizontal pull is that of a shallow
-    // catenary, weight times distance over eight times the sag, the sag being a third of the height.
+    // A cable hangs from below the torso to a foot on the ground. Its hanging part pulls down by its weight. The
+    // horizontal pull is that of a shallow catenary, weight times distance over eight times the sag, with a sag of a
+    // third of the height.
     const double weight = 0.2e-3 * a_[kTether] * room.gravity_m_s2;
     const double height = std::max(position.z() - room.ground_z_m, 0.0);
     const Vector3d to_foot(a_.tether_foot_m.x() - position.x(), a_.tether_foot_m.y() - position.y(), 0);
@@ -171,7 +173,7 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
     const Inertia both = now.edge_inertia + now.wing_inertia;
     Wrench f1 = both * now.s1, f2 = now.wing_inertia * now.s2;
 
-    // The air about the wing has inertia but no weight, so it is accelerated by free fall too.
+    // Added mass has inertia but no weight. Accelerations are relative to free fall, so gravity is added for it.
     Eigen::Matrix<double, 6, 6> air = Eigen::Matrix<double, 6, 6>::Zero();
     const auto in_air = [&](const Twist& t) {
       Vector6d column;
@@ -210,14 +212,15 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
         flow.gain = near_gain(position + R * s.shoulder_m, position + R * (s.shoulder_m + span), room);
       }
       if (a_.any(kClapAndFling)) {
-        // Lehmann, Sane, Dickinson (2005): up to 17 % where wings are less than 10 to 12 degrees apart; more as they part.
+        // Lehmann, Sane, Dickinson (2005): up to 17 % while wings are less than 10 to 12 degrees apart; more while they
+        // separate.
         const double sum = x[kStroke] + x[kStroke + 1];
         const double apart = std::numbers::pi - std::abs(sum);
         const double parting = 0.5 * (1 - smooth_sign(sum * (x[kStrokeRate] + x[kStrokeRate + 1]), 40));
         flow.gain += 0.17 * a_[kClapAndFling] * (0.3 + 0.7 * parting) / (1 + std::exp((apart - 0.6) / 0.12));
       }
       if (a_.any(kEdgeBending)) {
-        // The tip follows the load on the wing within a millisecond; its speed is the bending's.
+        // The bending of the tip follows the load on the wing with a time constant of 1 ms; its rate moves the strips.
         constexpr double kFollows_s = 1e-3;
         WingAir::Flow stiff = flow;
         const WingAir::Load on = wing_[j].load(stiff);
@@ -230,7 +233,8 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
       rate[kLag + 2 * j] = on.lag_rate[0];
       rate[kLag + 2 * j + 1] = on.lag_rate[1];
       if (a_.any(kWingFlexibility)) {
-        // Twist along the span that is linear (Guan, Yu, Appl. Math. Mech. 35 (2014)), as much as the torque on the hinge.
+        // Twist that is linear along the span (Guan, Yu, Appl. Math. Mech. 35 (2014)) and proportional to the torque on
+        // the hinge.
         constexpr double kFollows_s = 0.8e-3, kHover_Nm = 4e-4;
         rate[kTwist + j] =
             (8 * std::numbers::pi / 180 * a_[kWingFlexibility] * std::clamp(on.torque_Nm.y() / kHover_Nm, -3.0, 3.0) -
@@ -251,7 +255,7 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
     rotation_load += hinge_torque(s.rotation, x[kRotation + j], theta_rate, kRotationStop * softer, kStopLoss,
                                   slow.stop_shift_rad[j]);
 
-    // The rotor's momentum along the stroke axis, against the wing's.
+    // Angular momentum of the rotor along the stroke axis; it turns against the wing.
     const double turning = play ? x[kRotorRate + j] : psi_rate;
     const Vector3d rotor(0, 0, -sign * m.rotor_inertia_kg_m2 * n);
     side_load.n -= w.cross(rotor) * turning;
@@ -273,13 +277,13 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
   }
 
   if (a_.any(kLooseScrew)) {
-    // It rattles between two ends; the robot feels what it is accelerated by beyond the torso.
+    // The screw rattles between two end stops; its acceleration relative to the torso reacts on the robot.
     const double screw = x[kScrew], speed = x[kScrewRate];
     double push = -2e-3 * speed;
     const double over = std::abs(screw) - kScrewGap_m;
     if (over > 0) push -= (screw > 0 ? 1 : -1) * 400 * over * std::max(0.0, 1 + 1.2 * (screw > 0 ? speed : -speed));
     const double mass = kScrewMass_kg * a_[kLooseScrew];
-    const double torso_up = felt.acceleration.v.z();  // of the rates before, a fraction of a step ago
+    const double torso_up = felt.acceleration.v.z();  // from the previous evaluation, a fraction of a step ago
     rate[kScrew] = speed;
     rate[kScrewRate] = push / kScrewMass_kg - torso_up;
     load -= stacked(at_point(a_.screw_m, Vector3d(0, 0, mass * rate[kScrewRate])));

@@ -1,5 +1,5 @@
-// Random numbers of this family: a Mersenne twister of its own for each seed, flight and stream, and normals by Box and Muller, as those
-// of the standard library have other bits in other libraries.
+// Random numbers of this family: each seed, flight and stream has its own Mersenne twister. Normals are made by Box and Muller, because
+// std::normal_distribution gives different numbers in different standard libraries.
 #pragma once
 
 #include <cmath>
@@ -9,9 +9,9 @@
 
 namespace flappy::blind::b {
 
-/// What a stream of numbers draws.
+/// Purposes of the streams.
 enum class Stream : std::uint64_t {
-  kFigures = 1,
+  kParameters = 1,
   kSensors,
   kConventions,
   kProgramme,
@@ -28,10 +28,10 @@ class Random {
   Random(std::uint64_t seed, std::uint64_t flight, Stream stream, std::uint64_t number = 0)
       : engine_(mixed(mixed(mixed(seed) ^ flight) ^ (static_cast<std::uint64_t>(stream) + number))) {}
 
-  /// From 0, below 1.
+  /// Uniform in [0, 1).
   double uniform() { return static_cast<double>(engine_() >> 11U) * 0x1p-53; }
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
-  /// Of mean 0 and variance 1.
+  /// Normal with mean 0 and variance 1.
   double normal() {
     if (has_second_) {
       has_second_ = false;
@@ -43,14 +43,14 @@ class Random {
     has_second_ = true;
     return radius * std::cos(angle);
   }
-  /// The same, drawn again beyond 3.
+  /// normal(), drawn again while its absolute value exceeds 3.
   double normal_within_three() {
     double x = normal();
     while (std::abs(x) > 3) x = normal();
     return x;
   }
   std::size_t below(std::size_t count) { return static_cast<std::size_t>(engine_() % count); }
-  /// 1 or -1.
+  /// 1 or -1 with equal probability.
   double sign() { return uniform() < 0.5 ? -1.0 : 1.0; }
 
  private:

@@ -6,7 +6,7 @@
 
 namespace flappy::blind::b {
 
-std::array<double, 2> waveform(const Figures& f, const Beat& b, double time_s) {
+std::array<double, 2> waveform(const RobotParameters& f, const Beat& b, double time_s) {
   const double phase = time_s * f.flapping_Hz;
   const double t = phase - std::floor(phase);
   const double amplitude = std::clamp(b.amplitude_V, 0.0, f.amplitude_limit_V);
@@ -23,9 +23,9 @@ std::array<double, 2> waveform(const Figures& f, const Beat& b, double time_s) {
   return volts;
 }
 
-Robot::Robot(Figures figures, const Ailments& ailments, const Surroundings& room, std::uint64_t seed,
-             std::uint64_t flight)
-    : plant_(std::move(figures), ailments),
+Robot::Robot(RobotParameters parameters, const EffectMagnitudes& effect_magnitudes, const Surroundings& room,
+             std::uint64_t seed, std::uint64_t flight)
+    : plant_(std::move(parameters), effect_magnitudes),
       room_(room),
       gusts_(seed, flight, Stream::kEffect, kWind),
       slow_(plant_.fresh()) {
@@ -44,17 +44,17 @@ void Robot::put(const Vector3d& position, double heading) {
 void Robot::drive(const std::array<double, 2>& voltage) {
   steps_ = 0;
   wanted_ = voltage;
-  if (plant_.ailments().any(kCommandDelay)) history_.push_back(voltage);
+  if (plant_.effect_magnitudes().any(kCommandDelay)) history_.push_back(voltage);
   advance_slow();
   ++tick_;
 }
 
 void Robot::advance_slow() {
-  const Ailments& a = plant_.ailments();
-  const Figures& f = plant_.figures();
+  const EffectMagnitudes& a = plant_.effect_magnitudes();
+  const RobotParameters& f = plant_.parameters();
   const double t = static_cast<double>(tick_) * kTick_s;
   if (a.any(kWindingHeating)) {
-    // Winding and housing, each a mass of its own: a network of two nodes, of figures typical of a motor of 8 mm.
+    // Thermal network of two nodes, winding and housing, with parameters typical of an 8 mm motor.
     constexpr double kWinding_J_K = 0.12, kHousing_J_K = 1.0, kInside_K_W = 14, kOutside_K_W = 50;
     for (std::size_t j = 0; j < 2; ++j) {
       const double inside = (winding_K_[j] - housing_K_[j]) / kInside_K_W;
@@ -67,7 +67,8 @@ void Robot::advance_slow() {
     }
   }
   if (a.any(kBatterySag)) {
-    // Thevenin's circuit, as for cells of model aircraft (Suti, Di Rito, Mattei, Energies 15 (2022)): charge, resistance, one relaxation.
+    // Thevenin circuit, as for cells of model aircraft (Suti, Di Rito, Mattei, Energies 15 (2022)): charge, resistance,
+    // one relaxation.
     constexpr double kHover_A = 0.5, kRelaxes_s = 1.5;
     const double load = load_As_ / kTick_s;
     charge_As_ += load_As_;
@@ -76,7 +77,7 @@ void Robot::advance_slow() {
   }
   load_As_ = 0;
   if (a.any(kWind)) {
-    // Dryden's longitudinal filter, first order, of a length that is a room's.
+    // Dryden's first-order longitudinal filter, with the length scale of a room.
     constexpr double kGust_m_s = 0.06, kStays_s = 0.8;
     const double keep = std::exp(-kTick_s / kStays_s);
     for (double& g : gust_) g = keep * g + kGust_m_s * std::sqrt(1 - keep * keep) * gusts_.normal();
@@ -92,13 +93,13 @@ void Robot::advance_slow() {
 }
 
 void Robot::set_voltages(double h) {
-  const Ailments& a = plant_.ailments();
+  const EffectMagnitudes& a = plant_.effect_magnitudes();
   std::array<double, 2> volts = wanted_;
   if (a.any(kCommandDelay)) {
-    // It arrives late by a time that is another by up to a quarter of a millisecond from beat to beat.
-    const double beat = std::floor(static_cast<double>(tick_) * kTick_s * plant_.figures().flapping_Hz);
+    // The delay is 0.3 beats, plus and minus 0.25 ms in alternate beats.
+    const double beat = std::floor(static_cast<double>(tick_) * kTick_s * plant_.parameters().flapping_Hz);
     const double late =
-        a[kCommandDelay] * (0.3 / plant_.figures().flapping_Hz + 0.25e-3 * (std::fmod(beat, 2) < 1 ? 1 : -1));
+        a[kCommandDelay] * (0.3 / plant_.parameters().flapping_Hz + 0.25e-3 * (std::fmod(beat, 2) < 1 ? 1 : -1));
     const double now =
         static_cast<double>(history_.size() - 1) + static_cast<double>(steps_) / kStepsPerTick - late / kTick_s;
     volts = now < 0 ? std::array<double, 2>{} : history_[static_cast<std::size_t>(now)];
@@ -125,7 +126,7 @@ void Robot::set_voltages(double h) {
 }
 
 std::array<double, 2> Robot::back(const State& x) const {
-  const std::size_t at = plant_.ailments().any(kGearBacklash) ? kRotorRate : kStrokeRate;
+  const std::size_t at = plant_.effect_magnitudes().any(kGearBacklash) ? kRotorRate : kStrokeRate;
   return {plant_.ratio(x, 0) * x[at], plant_.ratio(x, 1) * x[at + 1]};
 }
 
@@ -187,7 +188,7 @@ Felt Robot::felt_now() const {
 }
 
 std::string Robot::crash(bool may_tumble) const {
-  const Figures& f = plant_.figures();
+  const RobotParameters& f = plant_.parameters();
   for (const double x : x_)
     if (!std::isfinite(x) || std::abs(x) > 1e6) return "its motion ran away";
   const double up = 1 - 2 * (x_[kQuaternion + 1] * x_[kQuaternion + 1] + x_[kQuaternion + 2] * x_[kQuaternion + 2]);

@@ -24,14 +24,14 @@ Matrix3d turned(const Vector3d& rotation) {
 
 }  // namespace
 
-SoftMount::SoftMount(double size)
-    : frequency_rad_s_(size > 0 ? std::min(kTurn * 90 / std::sqrt(size), 0.8 / kStep_s) : 0) {}
+SoftMount::SoftMount(double magnitude)
+    : frequency_rad_s_(magnitude > 0 ? std::min(kTurn * 90 / std::sqrt(magnitude), 0.8 / kStep_s) : 0) {}
 
 Vector3d SoftMount::shaken(const Vector3d& by) {
   if (frequency_rad_s_ == 0) return by;
   if (!begun_) now_ = by;
   begun_ = true;
-  // a fifth of critical damping
+  // damping ratio 0.2
   rate_ += kStep_s * frequency_rad_s_ * (frequency_rad_s_ * (by - now_) - 0.4 * rate_);
   now_ += kStep_s * rate_;
   return now_;
@@ -66,14 +66,14 @@ SensorTruth draw_sensors(const Assignment& a, double battery_nominal_V, flightlo
                                           t.current_noise_A};
   if (a.wings) header.wings = flightlog::WingsHeader{t.wings_rate_hz, wings_noise};
 
-  // Each draw is made in any case, so that one convention does not change the others.
+  // All draws are made in any case, so that one convention does not shift the others.
   Random c(a.seed, 0, Stream::kConventions);
   const std::size_t kind = c.below(3);
   const double averaging = c.uniform(0.3e-3, 1e-3), own_clock = c.uniform(1000, 1600);
   const bool with_interval = c.uniform() < 0.5;
   const double imu_rate = c.uniform(0.98, 1.02), mocap_rate = c.uniform(0.99, 1.01);
   Vector3d place = normals(c);
-  place *= std::min(1.0, 3 / place.norm()) * 1e-3;  // sd 1 mm an axis, at most 3 mm
+  place *= std::min(1.0, 3 / place.norm()) * 1e-3;  // sd 1 mm for each axis, at most 3 mm in all
   Vector3d mount = normals(c);
   mount *= c.uniform(0, 1) * kTurn / 360 / mount.norm();
   const bool after = c.uniform() < 0.5;
@@ -86,7 +86,8 @@ SensorTruth draw_sensors(const Assignment& a, double battery_nominal_V, flightlo
   t.sample = kind == 0 ? Sample::kInstant : kind == 1 ? Sample::kMean : Sample::kHeld;
   t.averaging_s = averaging;
   t.own_clock_hz = own_clock;
-  // The log's latency is the mean from the instant measured: half of what was averaged over, or held for, belongs to it.
+  // By the log format, latency is the mean delay from the measured instant: it includes half of the averaging or
+  // holding time.
   if (with_interval && t.sample == Sample::kMean) header.imu.latency_s += averaging / 2;
   if (with_interval && t.sample == Sample::kHeld) header.imu.latency_s += 0.5 / own_clock;
   t.imu_rate_hz *= imu_rate;
@@ -109,7 +110,7 @@ SensorTruth draw_sensors(const Assignment& a, double battery_nominal_V, flightlo
 Sensors::Sensors(const Assignment& a, const SensorTruth& truth, const Robot& robot, std::uint64_t flight, double trim_s,
                  bool power, bool wings)
     : truth_(truth),
-      ailments_(robot.plant().ailments()),
+      effect_magnitudes_(robot.plant().effect_magnitudes()),
       trim_s_(trim_s),
       power_(power),
       wings_(wings),
@@ -118,14 +119,14 @@ Sensors::Sensors(const Assignment& a, const SensorTruth& truth, const Robot& rob
       power_random_(a.seed, flight, Stream::kPower),
       wings_random_(a.seed, flight, Stream::kWings),
       drift_random_(a.seed, flight, Stream::kEffect, kGyroBias),
-      gyro_mount_(ailments_[kSoftImuMount]),
-      accel_mount_(ailments_[kSoftImuMount]),
-      nominal_V_(robot.plant().figures().side[0].motor.voltage_limit_V) {
+      gyro_mount_(effect_magnitudes_[kSoftImuMount]),
+      accel_mount_(effect_magnitudes_[kSoftImuMount]),
+      nominal_V_(robot.plant().parameters().side[0].motor.voltage_limit_V) {
   gyro_bias_ = normals(imu_random_).cwiseProduct(Vector3d(0.02, 0.03, 0.015));
   accel_bias_ = 0.02 * normals(imu_random_);
   warming_ = 1e-3 * normals(imu_random_);
-  accel_turn_ = turned(ailments_[kAccelerometerMisalignment] * ailments_.misalignment);
-  const double tilt = 0.01 * ailments_[kMocapTilt], way = ailments_.mocap_tilt_direction_rad;
+  accel_turn_ = turned(effect_magnitudes_[kAccelerometerMisalignment] * effect_magnitudes_.misalignment);
+  const double tilt = 0.01 * effect_magnitudes_[kMocapTilt], way = effect_magnitudes_.mocap_tilt_direction_rad;
   tilt_ = Eigen::Quaterniond(Eigen::AngleAxisd(tilt, Vector3d(std::cos(way), std::sin(way), 0)));
   next_imu_s_ = -trim_s + imu_random_.uniform(0.001, 0.003);
   next_own_s_ = -trim_s + imu_random_.uniform(0, 1e-3);
@@ -135,7 +136,7 @@ Sensors::Sensors(const Assignment& a, const SensorTruth& truth, const Robot& rob
 }
 
 void Sensors::imu_step(const Robot& robot, double time) {
-  // What was felt at the beginning of the step, at `time`; the filters take the mean since the step before.
+  // felt() belongs to the start of the step, at `time`; the filters get the mean of this and the previous value.
   const Felt& felt = robot.felt();
   const Vector3d gyro_now = truth_.imu_turn * felt.motion.w, accel_now = truth_.imu_turn * felt.at(truth_.imu_place_m);
   if (!settled_) {
@@ -146,12 +147,12 @@ void Sensors::imu_step(const Robot& robot, double time) {
   Vector3d gyro = 0.5 * (gyro_felt_ + gyro_now), accel = 0.5 * (accel_felt_ + accel_now);
   gyro_felt_ = gyro_now;
   accel_felt_ = accel_now;
-  if (ailments_.any(kAccelerometerMisalignment)) accel = accel_turn_ * accel;
+  if (effect_magnitudes_.any(kAccelerometerMisalignment)) accel = accel_turn_ * accel;
   gyro = gyro_mount_.shaken(gyro);
   accel = accel_mount_.shaken(accel);
-  // A proof mass that is not quite even rectifies what shakes it, before any filter (Ang, Khosla, Riviere, IEEE Sensors J. 7 (2007)).
-  if (ailments_.any(kVibrationRectification))
-    accel += 1e-3 * ailments_[kVibrationRectification] * accel.cwiseProduct(accel);
+  // An asymmetric proof mass rectifies vibration before any filter (Ang, Khosla, Riviere, IEEE Sensors J. 7 (2007)).
+  if (effect_magnitudes_.any(kVibrationRectification))
+    accel += 1e-3 * effect_magnitudes_[kVibrationRectification] * accel.cwiseProduct(accel);
   gyro_before_ = gyro_;
   accel_before_ = accel_;
   const double keep = std::exp(-kStep_s * kTurn * truth_.bandwidth_hz);
@@ -186,11 +187,11 @@ void Sensors::imu_step(const Robot& robot, double time) {
 void Sensors::imu_sample(double time, const Vector3d& gyro, const Vector3d& accel) {
   const double on = time + trim_s_;
   Vector3d rate = gyro + gyro_bias_ + warming_ * (1 - std::exp(-on / 40));
-  if (ailments_.any(kGyroBias)) {
-    // Warming up, and a first-order Gauss-Markov process, as data sheets' bias instability is modelled.
+  if (effect_magnitudes_.any(kGyroBias)) {
+    // Warm-up, and a first-order Gauss-Markov process, the usual model of bias instability in data sheets.
     const double keep = std::exp(-1 / (6 * truth_.imu_rate_hz));
     wandering_ = keep * wandering_ + std::sqrt(1 - keep * keep) * 0.012 * normals(drift_random_);
-    rate += ailments_[kGyroBias] * (ailments_.gyro_drift * (1 - std::exp(-on / 5)) + wandering_);
+    rate += effect_magnitudes_[kGyroBias] * (effect_magnitudes_.gyro_drift * (1 - std::exp(-on / 5)) + wandering_);
   }
   rate += truth_.gyro_noise_rad_s * normals(imu_random_);
   const Vector3d force = accel + accel_bias_ + truth_.accel_noise_m_s2 * normals(imu_random_);
@@ -207,7 +208,7 @@ void Sensors::mocap_step(const Robot& robot, double time) {
   if (time < next_mocap_s_) return;
   next_mocap_s_ += 1 / truth_.mocap_rate_hz;
   Random& random = mocap_random_;
-  // Each frame draws the same numbers, whatever becomes of it.
+  // Each frame draws the same count of numbers, also if it is lost or swapped.
   const Vector3d noise = truth_.position_noise_m * normals(random), turn = truth_.attitude_noise_rad * normals(random);
   const double lost = random.uniform(), burst = random.uniform(), swapped = random.uniform(), late = random.uniform(),
                where = random.uniform(0, kTurn);
@@ -217,12 +218,13 @@ void Sensors::mocap_step(const Robot& robot, double time) {
   const State& x = robot.state();
   Eigen::Quaterniond attitude(x[kQuaternion], x[kQuaternion + 1], x[kQuaternion + 2], x[kQuaternion + 3]);
   Vector3d position = robot.position();
-  if (ailments_.any(kMarkerOffset)) position += attitude * (ailments_[kMarkerOffset] * ailments_.marker_m);
+  if (effect_magnitudes_.any(kMarkerOffset))
+    position += attitude * (effect_magnitudes_[kMarkerOffset] * effect_magnitudes_.marker_m);
   if (swapped < 6e-4) {
     position += Vector3d(0.03 * std::cos(where), 0.03 * std::sin(where), 0.01);
     attitude = attitude * Eigen::Quaterniond(Eigen::AngleAxisd(kTurn / 3, Vector3d::UnitZ()));
   }
-  if (ailments_.any(kMocapTilt)) {
+  if (effect_magnitudes_.any(kMocapTilt)) {
     position = tilt_ * position;
     attitude = tilt_ * attitude;
   }
@@ -230,8 +232,9 @@ void Sensors::mocap_step(const Robot& robot, double time) {
   attitude.normalize();
   if (attitude.dot(last_attitude_) < 0) attitude.coeffs() *= -1;
   last_attitude_ = attitude;
-  // Frames wait for the network: an exponential share of the latency, whose mean is what is declared.
-  const double late_s = std::max(2e-4, truth_.mocap_late_s + 5e-3 * ailments_[kMocapDelay] * ailments_.delay_sign);
+  // Waiting for the network adds exponential jitter, whose mean is removed so that the mean latency is the declared one.
+  const double late_s =
+      std::max(2e-4, truth_.mocap_late_s + 5e-3 * effect_magnitudes_[kMocapDelay] * effect_magnitudes_.delay_sign);
   const double jitter = 0.5 * std::min(1e-3 * -std::log(1 - late) - 1e-3, 5e-3);
   MocapSample s{time + late_s + jitter, position + noise, attitude};
   if (!mocap_samples_.empty()) s.arrival_s = std::max(s.arrival_s, mocap_samples_.back().arrival_s + 1e-5);
@@ -260,7 +263,7 @@ void Sensors::after_step(const Robot& robot, double time, int step) {
   mocap_step(robot, time);
   if (power_ && step == truth_.power_step && time >= next_power_s_ - 1e-7) {
     next_power_s_ += 1 / truth_.power_rate_hz;
-    // A converter that the driver triggers has the trigger's time; one in the middle of a tick has its own.
+    // A converter that the driver triggers reports the time of the trigger; one in the middle of a tick reports its own.
     power_sample(robot, truth_.power_step == kStepsPerTick / 2 ? time : time - truth_.power_step * kStep_s);
   }
   if (wings_ && time >= next_wings_s_) {

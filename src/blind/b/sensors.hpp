@@ -1,11 +1,11 @@
-// What is measured of a robot, and what is declared of that.
+// Sensors of a robot, and what its log declares about them.
 //
-// IMU: specific force and rate where it sits and as it is turned; what is wrong with it; a first-order low-pass; samples with jitter that
-// are instants, means over an averaging time or held from a clock of its own; bias that drifts with temperature, noise, range, steps.
-// Motion capture: noise, bursts of lost frames, frames with markers swapped, arrival that jitters. Currents: instants of a converter that
-// is triggered within a tick of the driver, or at its switch, then just before or just after. Wings: an encoder of 4096 steps a turn.
+// IMU: specific force and rate at its position and in its orientation; its effects; a first-order low-pass; samples with jitter, which
+// are instantaneous, means over an averaging time, or held from its own clock; bias with thermal drift, noise, range, resolution.
+// Motion capture: noise, bursts of lost frames, frames with swapped markers, arrival with jitter. Currents: instantaneous values, taken
+// in the middle of a driver's tick, or just before or just after its switching. Wings: an encoder of 4096 steps a turn.
 //
-// Declarations are exact, or drawn within what laboratories do. Times are those of the log: 0 where it begins.
+// Declarations are exact, or drawn within the habits of laboratories. Times are on the log's clock, which is 0 at its start.
 #pragma once
 
 #include <deque>
@@ -19,10 +19,10 @@ namespace flappy::blind::b {
 
 enum class Sample { kInstant, kMean, kHeld };
 
-/// A mount that gives way: what sits on it follows as an oscillator of 90 Hz, softer the larger its size; stiff at size 0.
+/// Soft mount of the IMU: an oscillator of 90 Hz over the square root of the magnitude; rigid at magnitude 0.
 class SoftMount {
  public:
-  explicit SoftMount(double size);
+  explicit SoftMount(double magnitude);
   Vector3d shaken(const Vector3d& by);
 
  private:
@@ -31,7 +31,7 @@ class SoftMount {
   Vector3d now_ = Vector3d::Zero(), rate_ = Vector3d::Zero();
 };
 
-/// How it is in truth.
+/// True properties of the sensors.
 struct SensorTruth {
   Sample sample = Sample::kInstant;
   double imu_rate_hz = 1000, imu_late_s = 2e-3, bandwidth_hz = 250, averaging_s = 0, own_clock_hz = 1125;
@@ -40,12 +40,12 @@ struct SensorTruth {
   double gyro_noise_rad_s = 0.05, accel_noise_m_s2 = 0.5;
   double mocap_rate_hz = 200, mocap_late_s = 0.015, position_noise_m = 1e-4, attitude_noise_rad = 5e-3;
   double power_rate_hz = 500, power_late_s = 2e-4, voltage_noise_V = 0.02, current_noise_A = 5e-3;
-  int power_step = kStepsPerTick / 2;  ///< of the tick at which currents are taken; 0: before the switch
+  int power_step = kStepsPerTick / 2;  ///< step of the tick that samples currents; 0: before the driver switches
   double wings_rate_hz = 500, wings_noise_rad = 1e-3;
-  double imu_clock = 1, mocap_clock = 1, power_clock = 1;  ///< how fast each stream's clock runs
+  double imu_clock = 1, mocap_clock = 1, power_clock = 1;  ///< relative speed of each stream's clock
 };
 
-/// Draws the robot's sensors, and what is declared of them, all of the header but the vehicle and the surroundings.
+/// Draws the robot's sensors and their declarations. Fills the header except for the vehicle and the surroundings.
 SensorTruth draw_sensors(const Assignment& a, double battery_nominal_V, flightlog::FlightHeader& header);
 
 struct ImuSample {
@@ -58,22 +58,22 @@ struct MocapSample {
   Eigen::Quaterniond attitude = Eigen::Quaterniond::Identity();
 };
 
-/// Of one flight, which has been going on for `trim_s` where the log begins.
+/// Sensors of one flight, which starts `trim_s` before the log.
 class Sensors {
  public:
   Sensors(const Assignment& a, const SensorTruth& truth, const Robot& robot, std::uint64_t flight, double trim_s,
           bool power, bool wings);
 
-  /// After each step of the robot. `time_s` is that of the step's end, `step` its number within the tick, from 1 on.
+  /// Called after each step of the robot. `time_s`: end of the step. `step`: its number within the tick, from 1 on.
   void after_step(const Robot& robot, double time_s, int step);
-  /// Before the driver switches.
+  /// Called before the driver switches.
   void before_tick(const Robot& robot, double time_s);
 
-  /// What has arrived by now and was not asked for before.
+  /// The next sample that has arrived by `now_s` and was not returned before.
   std::optional<ImuSample> imu(double now_s);
   std::optional<MocapSample> mocap(double now_s);
 
-  /// Streams into the log, from 0 to `end_s`.
+  /// Writes all streams from 0 to `end_s` into the log.
   void write(double end_s, flightlog::FlightLog& log) const;
 
  private:
@@ -83,7 +83,7 @@ class Sensors {
   void power_sample(const Robot& robot, double time_s);
 
   SensorTruth truth_;
-  Ailments ailments_;
+  EffectMagnitudes effect_magnitudes_;
   double trim_s_;
   bool power_, wings_;
   Random imu_random_, mocap_random_, power_random_, wings_random_, drift_random_;

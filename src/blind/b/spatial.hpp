@@ -1,10 +1,10 @@
-// Motions, wrenches and inertias of rigid bodies, all seen at one point: the torso's origin, in B.
+// Twists, wrenches and inertias of rigid bodies, all at one reference point, the torso's origin, with components in B.
 //
 //   momentum of a body        h = I V:  n = J w + c x v,  f = m v - c x w      c = m r, J about the point
 //   rate of a moving vector   dS/dt = V x S:  (w x Sw, w x Sv + v x Sw)
 //   rate of a moving wrench   dF/dt = V x* F: (w x n + v x f, w x f)
 //
-// These are Newton's and Euler's equations for a point that need be neither fixed nor the centre of mass.
+// These are the Newton-Euler equations about a point that need neither be fixed nor be the centre of mass.
 #pragma once
 
 #include <Eigen/Dense>
@@ -41,7 +41,7 @@ struct Inertia {
   Inertia operator+(const Inertia& o) const { return {m + o.m, c + o.c, j + o.j}; }
 };
 
-/// Of a body whose frame stands at `place`, turned by `turn`.
+/// Inertia of a body whose frame is at `place` and rotated by `turn`.
 inline Inertia inertia_at(double mass, const Vector3d& com, const Matrix3d& about_com, const Matrix3d& turn,
                           const Vector3d& place) {
   const Vector3d r = place + turn * com;

@@ -1,11 +1,11 @@
 // References:
 // [1] He et al., In-ground-effect modeling and nonlinear-disturbance observer for multirotor UAV control, ASME J. Dyn. Syst. Meas.
 //     Control 141(7), 071013 (2019): thrust grows by C_a exp(-C_b z/R), which is finite at the ground.
-// [2] Tu et al., Acting is seeing: navigating tight space using flapping wings, ICRA 2019: this robot feels ground and walls in its
-//     wings' loads.
+// [2] Tu et al., Acting is seeing: navigating tight space using flapping wings, ICRA 2019: ground and walls change the wing loads of
+//     this robot.
 // [3] Lehmann, Sane, Dickinson, The aerodynamic effects of wing-wing interaction in flapping insect wings, J. Exp. Biol. 208, 3075
 //     (2005): up to 17 % more force over a beat, less with the angle between the wings.
-// The laws for ceiling, wall, wake and wash are our own, of the sizes in the catalogue.
+// The laws for ceiling, wall, wake and downwash are our own; their strengths are like the catalogue's.
 #include "blind/c/air.hpp"
 
 #include <algorithm>
@@ -18,17 +18,17 @@ constexpr double kHoverRate2 = 2.9e4;  // mean square of the stroke rate of the 
 
 }  // namespace
 
-Air::Air(const Figures& figures, const Sizes& sizes, std::uint64_t seed, std::size_t flight)
-    : figures_(&figures),
-      ground_(0.15 * sizes[Effect::kGround]),
-      ceiling_(0.12 * sizes[Effect::kCeiling]),
-      wall_(sizes[Effect::kWall]),
-      wake_(0.3 * sizes[Effect::kWakeCapture]),
-      clap_(0.25 * sizes[Effect::kClapAndFling]),
-      flexibility_(175 * sizes[Effect::kWingFlexibility]),
-      wind_(sizes[Effect::kWind]),
-      tether_(0.2e-3 * sizes[Effect::kTether]),
-      downwash_(0.03 * sizes[Effect::kDownwashOnBody]),
+Air::Air(const RobotParameters& parameters, const Magnitudes& magnitudes, std::uint64_t seed, std::size_t flight)
+    : parameters_(&parameters),
+      ground_(0.15 * magnitudes[Effect::kGround]),
+      ceiling_(0.12 * magnitudes[Effect::kCeiling]),
+      wall_(magnitudes[Effect::kWall]),
+      wake_(0.3 * magnitudes[Effect::kWakeCapture]),
+      clap_(0.25 * magnitudes[Effect::kClapAndFling]),
+      flexibility_(175 * magnitudes[Effect::kWingFlexibility]),
+      wind_(magnitudes[Effect::kWind]),
+      tether_(0.2e-3 * magnitudes[Effect::kTether]),
+      downwash_(0.03 * magnitudes[Effect::kDownwashOnBody]),
       random_(seed, "gusts", flight),
       any_factor_(ground_ + ceiling_ + wall_ + wake_ + clap_ > 0) {
   Random once(seed, "air");
@@ -38,7 +38,7 @@ Air::Air(const Figures& figures, const Sizes& sizes, std::uint64_t seed, std::si
 }
 
 double Air::room_factor(const Mechanism& mechanism, std::size_t side, double wall_m) const {
-  const double length = figures_->sides[side].planform.length_m;
+  const double length = parameters_->sides[side].planform.length_m;
   const double z = mechanism.strip_position(side, Mechanism::kStrips - 1).z();
   double factor = 1;
   if (ground_ > 0) factor += ground_ * std::exp(-std::max(0.0, z - Room::kGround_m) / length);
@@ -48,12 +48,12 @@ double Air::room_factor(const Mechanism& mechanism, std::size_t side, double wal
 }
 
 double Air::wing_factor(std::size_t side) const {
-  const double chord = figures_->sides[side].planform.chord_m;
+  const double chord = parameters_->sides[side].planform.chord_m;
   double factor = 1;
-  if (wake_ > 0) factor += wake_ * std::exp(-travelled_m_[side] / chord);  // what the wing left behind is a chord long
+  if (wake_ > 0) factor += wake_ * std::exp(-travelled_m_[side] / chord);  // the wake is one chord long
   if (clap_ > 0)
     factor += clap_ * met_[side] *
-              std::exp(-travelled_m_[side] / (3 * chord));  // circulation of the fling stays for some chords
+              std::exp(-travelled_m_[side] / (3 * chord));  // the fling's circulation decays over three chords
   return factor;
 }
 
@@ -74,16 +74,16 @@ Wrench Air::act(Mechanism& mechanism, double step_s) {
     if (rate * direction_[side] <= 0) {
       direction_[side] = rate < 0 ? -1 : 1;
       travelled_m_[side] = 0;
-      // how near the wings are where this one turns, before or behind the body
+      // closeness of the wings when this one reverses, in front of or behind the body
       const double sum = std::abs(mechanism.stroke(0) + mechanism.stroke(1));
       met_[side] = std::exp(-std::max(0.0, M_PI - sum) / kMeeting_rad);
     }
-    travelled_m_[side] += std::abs(rate) * 0.72 * figures_->sides[side].planform.length_m * step_s;
+    travelled_m_[side] += std::abs(rate) * 0.72 * parameters_->sides[side].planform.length_m * step_s;
     if (any_factor_) {
       const double factor = room_factor(mechanism, side, wall_m[side]) * wing_factor(side);
       for (std::size_t i = 0; i < Mechanism::kStrips; ++i) mechanism.scale_air(side, i, factor);
     }
-    if (flexibility_ > 0) {  // the outer part gives way to the load within a millisecond
+    if (flexibility_ > 0) {  // the outer part yields to the load with a time constant of 1 ms
       const double bound = std::clamp(flexibility_ * mechanism.hinge_torque(side), -0.6, 0.6);
       twist_rad_[side] += (1 - std::exp(-step_s / 1e-3)) * (bound - twist_rad_[side]);
       mechanism.twist(side, twist_rad_[side]);
@@ -91,10 +91,10 @@ Wrench Air::act(Mechanism& mechanism, double step_s) {
     if (downwash_ > 0)
       stroke_rate_squared_ += (1 - std::exp(-step_s / 0.015)) / 2 * (rate * rate - stroke_rate_squared_);
   }
-  const double weight = figures_->mass_kg() * Mechanism::kGravity_m_s2;
+  const double weight = parameters_->mass_kg() * Mechanism::kGravity_m_s2;
   if (wall_ > 0) {
-    const double away = std::max(0.0, Room::kWall_m - torso.position_W.y() - figures_->around_m);
-    wrench.force_W.y() += 0.02 * wall_ * weight * std::exp(-away / figures_->sides[0].planform.length_m);
+    const double away = std::max(0.0, Room::kWall_m - torso.position_W.y() - parameters_->around_m);
+    wrench.force_W.y() += 0.02 * wall_ * weight * std::exp(-away / parameters_->sides[0].planform.length_m);
   }
   if (tether_ > 0) {
     const Eigen::Vector3d at_B(0, 0, -0.01), at_W = torso.R_WB * at_B, from = torso.position_W + at_W - anchor_;

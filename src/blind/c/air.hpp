@@ -1,5 +1,5 @@
-// What the room, the wind and the wings' own flow do beyond MuJoCo's fluid model: mostly one factor on the force of each ellipsoid,
-// which MuJoCo has a place for.
+// Aerodynamic effects that MuJoCo's fluid model lacks: room, wind and the wings' own wake. Most of them are a factor on the fluid force
+// of each ellipsoid, for which MuJoCo has a parameter.
 #pragma once
 
 #include "blind/c/drive.hpp"
@@ -7,15 +7,15 @@
 
 namespace flappy::blind::c {
 
-/// As declared in every log: the ground z = 0, the ceiling z = 2, one wall through y = 1.
+/// Surfaces of the room, declared in every log: ground z = 0, ceiling z = 2, one wall y = 1.
 struct Room {
   static constexpr double kGround_m = 0, kCeiling_m = 2, kWall_m = 1;
 };
 
 class Air {
  public:
-  Air(const Figures& figures, const Sizes& sizes, std::uint64_t seed, std::size_t flight);
-  /// Sets factors, wind and twist for the next step; the wrench is that on the torso at its origin.
+  Air(const RobotParameters& parameters, const Magnitudes& magnitudes, std::uint64_t seed, std::size_t flight);
+  /// Sets force factors, wind and twist for the next step. Returns the wrench on the torso at its origin, in W.
   Wrench act(Mechanism& mechanism, double step_s);
 
  private:
@@ -23,7 +23,7 @@ class Air {
   double wing_factor(std::size_t side) const;
   void blow(Mechanism& mechanism, double step_s);
 
-  const Figures* figures_;
+  const RobotParameters* parameters_;
   double ground_, ceiling_, wall_, wake_, clap_, flexibility_, wind_, tether_, downwash_;
   Random random_;
   Eigen::Vector3d mean_wind_ = Eigen::Vector3d::Zero(), gust_ = Eigen::Vector3d::Zero(),

@@ -1,6 +1,6 @@
-// The flight is flown once; then its voltages are applied twice more, with the effect and without, while the torso moves as it was
-// flown. Both times the acceleration counts that the torso would have if it were free in this step; wings and whatever else moves
-// follow the torso's true acceleration. What only a sensor sees changes nothing here.
+// The flight is flown once. Its voltages are then applied twice more, with and without the effect, while the torso repeats the flown
+// motion. Both runs record the acceleration that the torso would have if it were free in this step; wings and other moving parts follow
+// the torso's true acceleration. Effects that act on sensors alone give no contrast.
 #include "blind/c/contrast.hpp"
 
 namespace flappy::blind::c {
@@ -8,7 +8,7 @@ namespace {
 
 using Six = Eigen::Matrix<double, 6, 1>;
 
-/// Mean, cosine and sine of the first and of the second harmonic, of each beat.
+/// Sums for mean, cosine and sine of the first and of the second harmonic of each beat.
 struct Beats {
   std::vector<std::array<double, 30>> sums;
   std::vector<double> counts;
@@ -29,12 +29,12 @@ struct Beats {
 
 Beats replayed(const Assignment& a, std::size_t flight, const Flown& flown, Length length) {
   Robot robot(a, flight);
-  const Eigen::Vector3d place = sensor_figures(a, robot).imu.position_m;
+  const Eigen::Vector3d place = sensor_parameters(a, robot).imu.position_m;
   robot.mechanism().move_torso(flown.path.front());
   Beats beats;
   std::size_t step = 0;
   const std::size_t before =
-      static_cast<std::size_t>(std::lround(length.trim_s / robot.figures().hold_s)) * robot.steps_per_tick();
+      static_cast<std::size_t>(std::lround(length.trim_s / robot.parameters().hold_s)) * robot.steps_per_tick();
   for (const std::array<double, 2>& voltages : flown.voltages) {
     robot.tick_held(voltages, &flown.path[step], [&] {
       if (step >= before && robot.is_finite()) {
@@ -44,7 +44,8 @@ Beats replayed(const Assignment& a, std::size_t flight, const Flown& flown, Leng
         now.turning_B = free.turning_B;
         Six value;
         value << specific_force_B(now, place), now.turning_B;
-        const double beat = (static_cast<double>(step - before) + 0.5) * robot.step_s() * robot.figures().flapping_Hz;
+        const double beat =
+            (static_cast<double>(step - before) + 0.5) * robot.step_s() * robot.parameters().flapping_Hz;
         beats.add(static_cast<std::size_t>(beat), beat - std::floor(beat), value);
       }
       ++step;
@@ -55,19 +56,20 @@ Beats replayed(const Assignment& a, std::size_t flight, const Flown& flown, Leng
 
 }  // namespace
 
-Contrast contrast_of(const Assignment& a, std::size_t flight, const std::string& effect, double size, Length length) {
+Contrast contrast_of(const Assignment& a, std::size_t flight, const std::string& effect, double magnitude,
+                     Length length) {
   Assignment without = a;
   std::erase_if(without.effects, [&](const auto& one) { return one.first == effect; });
   Assignment with = without;
-  with.effects.emplace_back(effect, size);
-  const Sizes checked(with.effects);  // refuses what it does not know before the work
+  with.effects.emplace_back(effect, magnitude);
+  const Magnitudes checked(with.effects);  // throws for an unknown effect before anything is flown
   const Flown flown = fly_one(without, flight, true, length);
   const Beats plain = replayed(without, flight, flown, length), changed = replayed(with, flight, flown, length);
-  const double flapping_Hz = read_figures(a.vehicle_file).flapping_Hz;
+  const double flapping_Hz = read_parameters(a.vehicle_file).flapping_Hz;
   const double end_s = flown.flight.log.command.t_s.empty() ? 0 : flown.flight.log.command.t_s.back();
   Contrast contrast;
   for (std::size_t beat = 0; beat < std::min(plain.sums.size(), changed.sums.size()); ++beat) {
-    if (static_cast<double>(beat + 1) / flapping_Hz > end_s + 1e-3) break;  // only whole beats
+    if (static_cast<double>(beat + 1) / flapping_Hz > end_s + 1e-3) break;  // the last beat is incomplete
     contrast.beat_s.push_back(static_cast<double>(beat) / flapping_Hz);
     std::array<double, 30>& change = contrast.change.emplace_back();
     for (std::size_t i = 0; i < 30; ++i)

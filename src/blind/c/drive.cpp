@@ -6,13 +6,13 @@ namespace flappy::blind::c {
 namespace {
 
 constexpr double kCopper_1_K = 0.00393;  // temperature coefficient of copper's resistance (effect catalogue)
-constexpr double kWindingToAir_K_W = 45, kWinding_J_K = 0.35;  // of a coreless motor 6 mm across; typical, not measured
-constexpr double kHover_A = 0.19;                              // drawn from the battery by a nominal robot that hovers
+constexpr double kWindingToAir_K_W = 45, kWinding_J_K = 0.35;  // typical of a 6 mm coreless motor, not measured
+constexpr double kHover_A = 0.19;                              // battery current of a hovering nominal robot
 constexpr double kInternal_ohm = 1.2, kBuffer_s = 5e-3;
 
 }  // namespace
 
-Inputs clipped(Inputs in, const Figures& f) {
+Inputs clipped(Inputs in, const RobotParameters& f) {
   in.amplitude_V = std::clamp(in.amplitude_V, 0.0, f.amplitude_limit_V);
   in.difference_V = std::clamp(in.difference_V, -f.difference_limit_V, f.difference_limit_V);
   in.bias_V = std::clamp(in.bias_V, -f.bias_limit_V, f.bias_limit_V);
@@ -20,11 +20,11 @@ Inputs clipped(Inputs in, const Figures& f) {
   return in;
 }
 
-std::array<double, 2> beat_voltages(const Inputs& in, double phase, const Figures& f) {
+std::array<double, 2> beat_voltages(const Inputs& in, double phase, const RobotParameters& f) {
   std::array<double, 2> volts{};
   for (std::size_t side = 0; side < 2; ++side) {
     const double sign = side == 0 ? 1 : -1, first = 0.5 - sign * in.split_cycle;
-    const double half = phase < first ? phase / first : 1 + (phase - first) / (1 - first);  // of a period of two
+    const double half = phase < first ? phase / first : 1 + (phase - first) / (1 - first);  // half periods, from 0 to 2
     const double limit = f.sides[side].motor.voltage_limit_V;
     volts[side] =
         std::clamp((in.amplitude_V + sign * in.difference_V) * std::cos(M_PI * half) + in.bias_V, -limit, limit);
@@ -32,17 +32,17 @@ std::array<double, 2> beat_voltages(const Inputs& in, double phase, const Figure
   return volts;
 }
 
-Drive::Drive(const Figures& figures, const Sizes& sizes, std::uint64_t seed, std::size_t flight)
-    : figures_(&figures),
-      dead_zone_V_(0.4 * sizes[Effect::kDriverDeadZone]),
-      pole_s_(0.5e-3 * sizes[Effect::kDriverBandwidth]),
-      delay_s_(0.3 / figures.flapping_Hz * sizes[Effect::kCommandDelay]),
-      heating_(sizes[Effect::kWindingHeating]),
-      sag_(sizes[Effect::kBatterySag]),
-      eccentricity_(0.04 * sizes[Effect::kGearEccentricity]),
-      ripple_(0.08 * sizes[Effect::kCommutatorRipple]),
-      shared_ohm_(1.5 * sizes[Effect::kSharedSupply]),
-      jitter_s_(0.4e-3 * sizes[Effect::kDriverJitter]),
+Drive::Drive(const RobotParameters& parameters, const Magnitudes& magnitudes, std::uint64_t seed, std::size_t flight)
+    : parameters_(&parameters),
+      dead_zone_V_(0.4 * magnitudes[Effect::kDriverDeadZone]),
+      pole_s_(0.5e-3 * magnitudes[Effect::kDriverBandwidth]),
+      delay_s_(0.3 / parameters.flapping_Hz * magnitudes[Effect::kCommandDelay]),
+      heating_(magnitudes[Effect::kWindingHeating]),
+      sag_(magnitudes[Effect::kBatterySag]),
+      eccentricity_(0.04 * magnitudes[Effect::kGearEccentricity]),
+      ripple_(0.08 * magnitudes[Effect::kCommutatorRipple]),
+      shared_ohm_(1.5 * magnitudes[Effect::kSharedSupply]),
+      jitter_s_(0.4e-3 * magnitudes[Effect::kDriverJitter]),
       random_(seed, "driver", flight) {
   Random once(seed, "gears");
   for (double& phase : gear_phase_) phase = once.uniform(0, 2 * M_PI);
@@ -61,7 +61,7 @@ std::array<double, 2> Drive::torques(double now_s, double step_s, const std::arr
   std::array<double, 2> torques{};
   double drawn_A = 0, bus_A = 0;
   for (std::size_t side = 0; side < 2; ++side) {
-    const Motor& motor = figures_->sides[side].motor;
+    const Motor& motor = parameters_->sides[side].motor;
     double volts = applied_[side];
     if (dead_zone_V_ > 0) volts -= dead_zone_V_ * volts / std::sqrt(volts * volts + dead_zone_V_ * dead_zone_V_);
     if (pole_s_ > 0) {

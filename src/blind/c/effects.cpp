@@ -16,7 +16,7 @@ const std::vector<FamilyEffect>& effect_table() {
        lift,
        {"ceiling", "place"}},
       {"wall_effect",
-       "at the wall 6 % less air force on the wing beside it, and a pull of 2 % of the weight; both decay over a "
+       "at the wall 6 % less air force on the wing next to it, and a pull of 2 % of the weight; both decay over a "
        "wing's length",
        {"force_y", "torque_x"},
        {"wall", "place"}},
@@ -122,7 +122,7 @@ const std::vector<FamilyEffect>& effect_table() {
        {"always", "amplitude"}},
       {"outside_spring_creep", "rest angle of both springs creeps by 2 deg over 15 s", {"torque_y"}, {"time"}},
       {"outside_imu_mount",
-       "IMU on foam: 120 Hz with a damping of 0.2; its compliance grows with the size",
+       "IMU on foam: 120 Hz with a damping of 0.2; its compliance grows with the magnitude",
        {"gyro", "accelerometer"},
        {"always", "acceleration"}},
       {"outside_gyro_g_sensitivity", "1e-3 rad/s per m/s^2", {"gyro"}, {"acceleration", "amplitude"}},
@@ -131,22 +131,22 @@ const std::vector<FamilyEffect>& effect_table() {
   return table;
 }
 
-Sizes::Sizes(const std::vector<std::pair<std::string, double>>& effects) {
+Magnitudes::Magnitudes(const std::vector<std::pair<std::string, double>>& effects) {
   const std::vector<FamilyEffect>& table = effect_table();
   std::vector<std::string> names;
   for (const FamilyEffect& effect : table) names.push_back(effect.id);
   std::vector<bool> given(table.size());
-  for (const auto& [id, size] : effects) {
+  for (const auto& [id, magnitude] : effects) {
     std::size_t i = 0;
     while (i < table.size() && table[i].id != id) ++i;
     if (i == table.size())
       throw io::InputError("effect " + id + ": family C has no such effect" + io::did_you_mean(id, names));
     if (given[i]) throw io::InputError("effect " + id + ": given twice");
-    if (!(size >= 0 && size <= 4))
-      throw io::InputError("effect " + id + ": size " + io::shortest_digits(size) +
+    if (!(magnitude >= 0 && magnitude <= 4))
+      throw io::InputError("effect " + id + ": magnitude " + io::shortest_digits(magnitude) +
                            " is out of range; accepted: a number from 0 to 4");
     given[i] = true;
-    sizes_[i] = size;
+    magnitudes_[i] = magnitude;
   }
 }
 

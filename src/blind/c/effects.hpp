@@ -1,4 +1,4 @@
-// What may be wrong with a robot of family C, and how much of it one robot has.
+// Effects of family C, and their magnitudes in one robot.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace flappy::blind::c {
 
-/// In the order of the table in effects.cpp.
+/// All effects; the table in effects.cpp has the same order.
 enum class Effect : std::size_t {
   kGround,
   kCeiling,
@@ -58,15 +58,15 @@ enum class Effect : std::size_t {
 
 const std::vector<FamilyEffect>& effect_table();
 
-/// The size of each effect; 0: the robot does not have it.
-class Sizes {
+/// Magnitude of each effect; 0: absent.
+class Magnitudes {
  public:
-  /// InputError for an unknown id, one given twice, and a size outside 0 to 4.
-  explicit Sizes(const std::vector<std::pair<std::string, double>>& effects);
-  double operator[](Effect effect) const { return sizes_[static_cast<std::size_t>(effect)]; }
+  /// Throws InputError for an unknown id, a repeated id, and a magnitude outside 0 to 4.
+  explicit Magnitudes(const std::vector<std::pair<std::string, double>>& effects);
+  double operator[](Effect effect) const { return magnitudes_[static_cast<std::size_t>(effect)]; }
 
  private:
-  std::array<double, static_cast<std::size_t>(Effect::kCount)> sizes_{};
+  std::array<double, static_cast<std::size_t>(Effect::kCount)> magnitudes_{};
 };
 
 }  // namespace flappy::blind::c

@@ -1,15 +1,15 @@
-// The goal is the origin of the task's world with heading 0; it hangs in the middle of the room, so the log's ground is z = -1.
+// The goal is the origin of the task's world, with heading 0. It is in the middle of the room, so the ground is at z = -1 in that world.
 //
-// The robot trims itself in hover, is set to where the episode begins, and holds its trim while the policy adds to it. The policy
-// sees the pilot's view, by names:
-//   goal_rotation      body to the goal's heading frame, which is that of W: as the next
+// The robot finds its trim in hover, is moved to the start of the episode, and holds this trim while the policy adds to it. The policy
+// observes the pilot's view, by names:
+//   goal_rotation      body to the goal's heading frame; equals rotation_matrix, as the goal's heading is 0
 //   rotation_matrix    body to world, row by row
 //   position_error     position minus goal, W
 //   velocity           W            body_rate        B
-//   heading_error      heading minus the goal's: sine and cosine, as the next
+//   heading_error      heading minus the goal's: sine and cosine, as for beat_phase
 //   beat_phase
-//   time               since the start
-//   trim               V, V, V, split cycle           previous_action  the same units
+//   time               since the start of the episode
+//   trim               V, V, V, split cycle           previous_action  in these units too
 #include "blind/c/escape.hpp"
 
 namespace flappy::blind::c {
@@ -19,7 +19,7 @@ const Eigen::Vector3d kGoal_W(0, 0, 1);
 
 bool within(const EscapeAssignment::Bounds& bounds, const Eigen::Vector3d& from_goal, const Eigen::Vector3d& velocity,
             const Eigen::Vector3d& rate, const Eigen::Matrix3d& R) {
-  // a bound that is not positive is none
+  // a bound that is not positive does not apply
   const auto holds = [](double value, double bound) { return !(bound > 0) || value < bound; };
   return holds(from_goal.norm(), bounds.distance_m) && holds(velocity.norm(), bounds.speed_m_s) &&
          holds(rate.norm(), bounds.body_rate_rad_s) &&
@@ -54,13 +54,13 @@ std::vector<double> observed(const std::vector<std::string>& names, const View& 
 }  // namespace
 
 FamilyEscape escape_of(const Assignment& a, std::size_t number, const EscapeAssignment& rules, double trim_s) {
-  observed(rules.observation, {}, 0, 0, {}, {});  // refuses a part that it does not know before the work
+  observed(rules.observation, {}, 0, 0, {}, {});  // throws for an unknown part before anything is flown
   const std::size_t stream = 1000 + number;
   Robot robot(a, stream);
-  const Figures& f = robot.figures();
+  const RobotParameters& f = robot.parameters();
   const double tick_s = f.hold_s;
   Pilot pilot(f, a.seed, stream);
-  Sensors sensors(a, stream, robot, sensor_figures(a, robot));
+  Sensors sensors(a, stream, robot, sensor_parameters(a, robot));
   Random random(a.seed, "escape", number);
   Eigen::Vector3d start;
   for (std::size_t i = 0; i < 3; ++i)
@@ -82,7 +82,7 @@ FamilyEscape escape_of(const Assignment& a, std::size_t number, const EscapeAssi
   double end_s = 0;
   for (long tick = -before; tick < after; ++tick) {
     const double t_s = static_cast<double>(tick) * tick_s, phase = beat_phase(t_s, f.flapping_Hz);
-    if (tick == 0) {  // what is left of the hover's wandering is taken away
+    if (tick == 0) {  // removes the drift of the hover: the episode starts exactly at the drawn pose
       const Motion now = robot.mechanism().motion();
       const Eigen::Vector3d shift = target.position_W - now.position_W;
       const double turn = wrapped(heading - heading_of(now.R_WB));
@@ -111,7 +111,7 @@ FamilyEscape escape_of(const Assignment& a, std::size_t number, const EscapeAssi
                        f);
     } else {
       inputs = pilot.fly(target, tick_s);
-      const Inputs now = pilot.trim();  // of the last second, about
+      const Inputs now = pilot.trim();  // averaged over about the last second
       const double share = tick_s / 1.0;
       if (tick == -before) mean_trim = now;
       mean_trim.amplitude_V += share * (now.amplitude_V - mean_trim.amplitude_V);

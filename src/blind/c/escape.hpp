@@ -1,4 +1,4 @@
-// The escape of a robot of family C under a policy that was trained elsewhere.
+// The escape of a robot of family C, flown by a policy that was trained in another simulator.
 #pragma once
 
 #include "blind/c/flight.hpp"

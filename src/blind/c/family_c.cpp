@@ -16,8 +16,9 @@ class FamilyC final : public Family {
     if (!a.proposed) return fly_one(a, flight).flight;
     return fly_one(a, flight, false, {.flight_s = a.proposed->lasts_s}).flight;
   }
-  Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect, double size) const override {
-    return contrast_of(a, flight, effect, size);
+  Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect,
+                    double magnitude) const override {
+    return contrast_of(a, flight, effect, magnitude);
   }
   FamilyEscape escape(const Assignment& a, std::size_t number, const EscapeAssignment& rules) const override {
     return escape_of(a, number, rules);

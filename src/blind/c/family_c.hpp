@@ -1,4 +1,4 @@
-// Blind robots in MuJoCo's engine and MuJoCo's fluid model, with effects, sensors, conventions and a pilot of their own.
+// Family C: robots in MuJoCo's engine with MuJoCo's fluid model. Effects, sensors, conventions and pilot are this family's own.
 #pragma once
 
 #include <memory>

@@ -3,7 +3,7 @@
 namespace flappy::blind::c {
 
 double beat_phase(double t_s, double flapping_Hz) {
-  const double beats = t_s * flapping_Hz + 1e-9;  // a tick that falls on a beat's start belongs to it
+  const double beats = t_s * flapping_Hz + 1e-9;  // a tick at the start of a beat belongs to that beat
   return std::max(0.0, beats - std::floor(beats) - 1e-9);
 }
 
@@ -24,7 +24,7 @@ void add_command(flightlog::CommandStream& commands, double t_s, const std::arra
 std::string trouble(const Robot& robot, bool may_tumble) {
   if (!robot.is_finite()) return "its motion diverged";
   const Motion now = robot.mechanism().motion();
-  const Figures& f = robot.figures();
+  const RobotParameters& f = robot.parameters();
   if (now.position_W.z() - f.below_m < Room::kGround_m) return "it struck the ground";
   if (now.position_W.z() + f.above_m + 0.01 > Room::kCeiling_m) return "it struck the ceiling";
   if (now.position_W.y() + f.around_m > Room::kWall_m) return "it struck the wall";
@@ -37,10 +37,10 @@ Flown fly_one(const Assignment& a, std::size_t flight, bool keep_path, Length le
   if (flight >= Family::kFlights && !a.proposed)
     throw io::InputError("flight " + std::to_string(flight) + ": accepted: 0 to 2");
   Robot robot(a, flight);
-  const Figures& f = robot.figures();
+  const RobotParameters& f = robot.parameters();
   Programme programme(a, flight, f);
   Pilot pilot(f, a.seed, flight);
-  Sensors sensors(a, flight, robot, sensor_figures(a, robot));
+  Sensors sensors(a, flight, robot, sensor_parameters(a, robot));
   const double tick_s = f.hold_s;
   const long before = std::lround(length.trim_s / tick_s), after = std::lround(length.flight_s / tick_s);
 

@@ -1,4 +1,4 @@
-// One flight of a robot of family C from its release on.
+// One flight of a robot of family C, from its release on.
 #pragma once
 
 #include "blind/c/programme.hpp"
@@ -7,25 +7,25 @@
 
 namespace flappy::blind::c {
 
-/// The robot trims itself for so long before a log begins, which lasts for so long.
+/// Durations: of the trimming before the log, and of the log.
 struct Length {
   double trim_s = 5, flight_s = Family::kFlight_s;
 };
 
 struct Flown {
   FamilyFlight flight;
-  std::vector<std::array<double, 2>> voltages;  ///< of each tick, from the release on
-  std::vector<Motion> path;  ///< pose and motion at the start of each step with the acceleration in it, and of the end
+  std::vector<std::array<double, 2>> voltages;  ///< for each tick since the release
+  std::vector<Motion> path;  ///< at the start of each step, with the acceleration during it; last: the end
 };
 
 Flown fly_one(const Assignment& a, std::size_t flight, bool keep_path = false, Length length = {});
 
-/// Phase of the beat from 0 to 1; one begins at t = 0.
+/// Phase of the beat from 0 to 1; a beat begins at t = 0.
 double beat_phase(double t_s, double flapping_Hz);
-/// A row of the log's commands, with the inputs.
+/// Appends a row to the log's commands.
 void add_command(flightlog::CommandStream& commands, double t_s, const std::array<double, 2>& voltages,
                  const Inputs& inputs, double phase);
-/// What the robot has run into, or that it is upside down; empty if nothing.
+/// Cause of a crash: contact, divergence, leaving the room, or, unless `may_tumble`, turning over. Empty if there is none.
 std::string trouble(const Robot& robot, bool may_tumble);
 
 }  // namespace flappy::blind::c

@@ -10,7 +10,7 @@ namespace flappy::blind::c {
 namespace {
 
 mjModel* compiled(const std::string& text) {
-  static std::mutex one_at_a_time;  // the parser keeps the last model for all threads
+  static std::mutex one_at_a_time;  // MuJoCo's parser keeps global state
   const std::lock_guard<std::mutex> lock(one_at_a_time);
   const auto files = std::make_unique<mjVFS>();
   mj_defaultVFS(files.get());
@@ -30,8 +30,8 @@ Eigen::Map<const Eigen::Vector3d> vector_of(const mjtNum* at) { return Eigen::Ma
 
 }  // namespace
 
-Mechanism::Mechanism(const Figures& figures, const Build& build, double step_s)
-    : model_(compiled(mjcf_text(figures, build, step_s)), mj_deleteModel),
+Mechanism::Mechanism(const RobotParameters& parameters, const Build& build, double step_s)
+    : model_(compiled(mjcf_text(parameters, build, step_s)), mj_deleteModel),
       data_(mj_makeData(model_.get()), mj_deleteData),
       added_mass_(build.added_mass) {
   mjModel& m = *model_;
@@ -52,7 +52,7 @@ Mechanism::Mechanism(const Figures& figures, const Build& build, double step_s)
       strips_[side][i] = mj_name2id(&m, mjOBJ_GEOM, (names[side] + "_strip_" + std::to_string(i)).c_str());
     std::memcpy(strip_quat_[side].data(), m.geom_quat + 4 * strips_[side].back(), sizeof strip_quat_[side]);
   }
-  // What stands for no air has no virtual mass either.
+  // Geoms without aerodynamic force, and the torso, have no virtual mass.
   for (std::ptrdiff_t geom = 0; geom < m.ngeom; ++geom) {
     mjtNum* fluid = m.geom_fluid + mjNFLUID * geom;
     if (fluid[1] == 0 || geom == mj_name2id(&m, mjOBJ_GEOM, "torso")) std::fill(fluid + 6, fluid + mjNFLUID, 0.0);
@@ -123,16 +123,16 @@ void Mechanism::step(const std::array<double, 2>& motor_Nm, const std::array<dou
     d->qfrc_applied[drive_v_[side]] += motor_Nm[side];
     d->qfrc_applied[stroke_v_[side]] += spring_Nm[side];
   }
-  // the free joint's forces are those at the torso's origin, its torques are in B
+  // the free joint takes forces at the torso's origin in W, and torques in B
   vector_at(d->qfrc_applied) = wrench.force_W;
   Eigen::Matrix3d R_WB;
-  mju_quat2Mat(R_WB.data(), d->qpos + 3);  // row by row, so this is its transpose
+  mju_quat2Mat(R_WB.data(), d->qpos + 3);  // MuJoCo writes row by row, Eigen reads columns: this is the transpose
   vector_at(d->qfrc_applied + 3) = R_WB * wrench.torque_W;
   mj_step2(m, d);
   if (held != nullptr) hold_torso(*held);
 }
 
-// M += J^T (m_A, I_A) J of each ellipsoid, with its own virtual masses and moments: the part that needs the acceleration, implicitly.
+// M += J^T (m_A, I_A) J for the virtual masses and moments of each ellipsoid: the terms in the acceleration, treated implicitly.
 void Mechanism::add_virtual_mass() {
   mjModel* m = model_.get();
   mjData* d = data_.get();
@@ -159,7 +159,7 @@ void Mechanism::add_virtual_mass() {
   mj_factorM(m, d);
 }
 
-// What moves beside the torso gets the acceleration that it has with the torso's held: M_ww da_w = -M_wt da_t.
+// Corrects the accelerations of all other coordinates w for the prescribed acceleration of the torso t: M_ww da_w = -M_wt da_t.
 void Mechanism::hold_torso(const Motion& held) {
   mjModel* m = model_.get();
   mjData* d = data_.get();
@@ -173,7 +173,7 @@ void Mechanism::hold_torso(const Motion& held) {
       M.bottomRightCorner(rest, rest).ldlt().solve(-M.bottomLeftCorner(rest, 6) * change);
   for (int i = 0; i < rest; ++i) {
     d->qvel[6 + i] += m->opt.timestep * other[i];
-    d->qpos[7 + i] += m->opt.timestep * m->opt.timestep * other[i];  // every joint after the first is a hinge
+    d->qpos[7 + i] += m->opt.timestep * m->opt.timestep * other[i];  // valid as every joint after the first is a hinge
   }
 }
 

@@ -1,10 +1,10 @@
-// The bodies, hinges and air of one robot in MuJoCo: an MJCF text made from its figures, one mjModel and one mjData.
+// Bodies, hinges and air of one robot in MuJoCo: an MJCF text made from its parameters, one mjModel and one mjData.
 //
-// Each wing has two ellipsoids of MuJoCo's fluid model [1]. Their places along the span and their areas are the nodes and weights of
-// Gauss's quadrature for the planform's moments r00, r11, r22 and r33, so that force and its moment about the shoulder are those of
-// the whole planform wherever they are of second degree in the radius. The chord is that of the ellipse as long and as large as the
-// wing, its middle 0.55 mean chords behind the leading edge. MuJoCo leaves out what the virtual mass does under acceleration
-// [1]; so does this robot, but for its effect added_mass.
+// Each wing has two ellipsoids of MuJoCo's fluid model [1]. Their positions along the span and their areas are the nodes and weights of
+// the Gauss quadrature for the planform's moments r00, r11, r22 and r33. Force and its moment about the shoulder are then those of the
+// whole planform wherever they are of second degree in the radius. The chord is that of an ellipse with the wing's length and area; its
+// middle is 0.55 mean chords behind the leading edge. MuJoCo omits the force of the virtual mass under acceleration [1]; only the effect
+// added_mass adds it.
 //
 // [1] MuJoCo documentation, Computation, Fluid forces: ellipsoid model; after Andersen, Pesavento, Wang, J. Fluid Mech. 541 (2005).
 #pragma once
@@ -15,47 +15,47 @@
 #include <string>
 
 #include "blind/c/effects.hpp"
-#include "blind/c/figures.hpp"
+#include "blind/c/robot_parameters.hpp"
 
 namespace flappy::blind::c {
 
-/// What effects change of the bodies, drawn once for a robot.
+/// Changes to the bodies by effects, drawn once for a robot.
 struct Build {
   double damage = 0;                 ///< share of the outer ellipse's area
-  std::size_t damaged = 0;           ///< side
-  double backlash_rad = 0;           ///< 0: the rotor is one with the stroke hinge
+  std::size_t damaged = 0;           ///< side with the damage
+  double backlash_rad = 0;           ///< 0: the rotor is rigidly coupled to the stroke hinge
   double spar_stiffness_Nm_rad = 0;  ///< 0: rigid
   double leg_mass_kg = 0;            ///< 0: part of the torso
   double body_drag_m2 = 0;           ///< C_d A of the torso
   double rotational_lift = 0;        ///< share of pi (0.75 - 0.25)
   double added_mass = 0;             ///< share of the virtual mass
-  double stop_softness = 1;          ///< stiffness of the stops is divided by it
+  double stop_softness = 1;          ///< divides the stiffness of the stops
 };
 
 struct Wrench {
   Eigen::Vector3d force_W = Eigen::Vector3d::Zero(), torque_W = Eigen::Vector3d::Zero();
 };
 
-/// Where the torso is and how it moves.
+/// Pose, velocity and acceleration of the torso.
 struct Motion {
   Eigen::Vector3d position_W = Eigen::Vector3d::Zero();
   Eigen::Matrix3d R_WB = Eigen::Matrix3d::Identity();
   Eigen::Quaterniond q_WB = Eigen::Quaterniond::Identity();
   Eigen::Vector3d velocity_W = Eigen::Vector3d::Zero(), rate_B = Eigen::Vector3d::Zero();
   Eigen::Vector3d acceleration_W = Eigen::Vector3d::Zero(),
-                  turning_B = Eigen::Vector3d::Zero();  ///< of the step before
+                  turning_B = Eigen::Vector3d::Zero();  ///< accelerations of the previous step
 };
 
 class Mechanism {
  public:
-  /// Semi-implicit Euler, of first order. In hover with the torso held, against a quarter of this step: mean thrust 0.2 % of the
-  /// weight, first harmonics 1 %, stroke 0.06 %.
+  /// Semi-implicit Euler, of first order. In hover with the torso held, against a quarter of this step: mean thrust
+  /// 0.2 % of the weight, first harmonics 1 %, stroke 0.06 %.
   static constexpr double kStep_s = 5e-5;
   static constexpr double kGravity_m_s2 = 9.81;
-  /// Ellipsoids of a wing, from the shoulder out.
+  /// Number of ellipsoids of a wing; index 0 is the one nearest to the shoulder.
   static constexpr std::size_t kStrips = 2;
 
-  Mechanism(const Figures& figures, const Build& build, double step_s = kStep_s);
+  Mechanism(const RobotParameters& parameters, const Build& build, double step_s = kStep_s);
 
   mjModel& model() { return *model_; }
   const mjModel& model() const { return *model_; }
@@ -66,10 +66,10 @@ class Mechanism {
   double stroke_rate(std::size_t side) const { return data_->qvel[stroke_v_[side]]; }
   double rotation(std::size_t side) const { return data_->qpos[rotation_q_[side]]; }
   double rotation_rate(std::size_t side) const { return data_->qvel[rotation_v_[side]]; }
-  /// Of the rotor, behind the gear.
+  /// Angle and rate of the rotor, behind the gear.
   double drive_angle(std::size_t side) const { return data_->qpos[drive_q_[side]]; }
   double drive_rate(std::size_t side) const { return data_->qvel[drive_v_[side]]; }
-  /// Torque of all passive forces about the rotation hinge, in the step before; nearly all of it is the air's.
+  /// Torque of all passive forces about the rotation hinge in the previous step; the air causes almost all of it.
   double hinge_torque(std::size_t side) const { return data_->qfrc_passive[rotation_v_[side]]; }
   Eigen::Vector3d strip_position(std::size_t side, std::size_t strip) const;
   bool is_finite() const;
@@ -77,14 +77,14 @@ class Mechanism {
   void place(const Eigen::Vector3d& position_W, const Eigen::Quaterniond& q_WB);
   void move_torso(const Motion& motion);
   void set_wind(const Eigen::Vector3d& wind_W);
-  /// Scales all force of the air on one ellipsoid.
+  /// Sets the factor on all aerodynamic forces of one ellipsoid.
   void scale_air(std::size_t side, std::size_t strip, double factor);
-  /// Turns the outermost ellipsoid about the span.
+  /// Rotates the outermost ellipsoid about the span.
   void twist(std::size_t side, double angle_rad);
   void set_friction(std::size_t side, double torque_Nm);
 
-  /// One step under torques of the motors (behind the gear) and of the springs, and a wrench on the torso at its origin.
-  /// `held`: the torso's acceleration is this, whatever acts on it; motion() still tells what it would be if it were free.
+  /// Advances one step under torques of motors (behind the gear) and springs, and a wrench on the torso at its origin.
+  /// `held`: prescribes the torso's acceleration; motion() still returns the acceleration that a free torso would have.
   void step(const std::array<double, 2>& motor_Nm, const std::array<double, 2>& spring_Nm, const Wrench& wrench,
             const Motion* held = nullptr);
 
@@ -100,7 +100,7 @@ class Mechanism {
   double added_mass_ = 0;
 };
 
-/// Radius, as a share of the wing's length, and area, as a share of length times mean chord.
+/// Ellipsoid of a wing: radius over wing length, and area over length times mean chord.
 struct Strip {
   double radius, area;
 };

@@ -6,9 +6,9 @@ namespace flappy::blind::c {
 namespace {
 
 constexpr double kViscosity_Pa_s = 1.82e-5;  // air at 20 degC
-constexpr double kThickness_m = 0.2e-3;  // half of the ellipsoids'; it matters for nothing but their edges' projection
-// A stop gives under load as a spring that is the stiffer the heavier what runs into it: MuJoCo's constraints are set by their time.
-// The rotation's stop of the nominal robot gives by some 2 deg in mid-stroke.
+constexpr double kThickness_m = 0.2e-3;      // half thickness of the ellipsoids; it only affects their edge-on area
+// MuJoCo sets constraints by a time constant, so the stiffness of a stop grows with the inertia that hits it. The rotation stop of the
+// nominal robot yields by about 2 deg in mid-stroke.
 constexpr double kStopTime_s = 0.5e-3, kStopDamping = 0.7, kStopImpedance = 0.8;
 
 std::string numbers(std::initializer_list<double> values) {
@@ -24,7 +24,7 @@ std::string numbers(std::initializer_list<double> values) {
 std::string numbers(const Eigen::Vector3d& v) { return numbers({v.x(), v.y(), v.z()}); }
 
 std::string inertial(const RigidBody& body) {
-  // by principal axes of our own: MuJoCo's take products below 1e-12 kg m^2 for none
+  // with own principal axes: MuJoCo's would neglect products below 1e-12 kg m^2
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(body.inertia_kg_m2);
   Eigen::Matrix3d axes = principal.eigenvectors();
   if (axes.determinant() < 0) axes.col(0) *= -1;
@@ -33,7 +33,7 @@ std::string inertial(const RigidBody& body) {
          numbers({q.w(), q.x(), q.y(), q.z()}) + "\" diaginertia=\"" + numbers(principal.eigenvalues()) + "\"/>\n";
 }
 
-/// An ellipsoid without mass or, where its coefficients are zero, air: it keeps MuJoCo from making a box of the body.
+/// An ellipsoid without mass; without air, too, if its coefficients are zero. It keeps MuJoCo from using the inertia box of the body.
 std::string ellipsoid(const std::string& name, const Eigen::Vector3d& at, const Eigen::Vector3d& axes,
                       const FluidCoefficients& fluid) {
   return "<geom name=\"" + name + "\" type=\"ellipsoid\" mass=\"0\" pos=\"" + numbers(at) + "\" size=\"" +
@@ -46,7 +46,7 @@ std::string hinge(const std::string& name, const Eigen::Vector3d& axis, const st
 }
 
 std::string stops(const Hinge& range, double softness) {
-  // negative numbers are stiffness and damping; a softer stop keeps its share of critical damping
+  // negative values mean stiffness and damping; a softer stop keeps its damping ratio
   const double stiffness = 1 / (kStopTime_s * kStopTime_s * kStopDamping * kStopDamping) / softness;
   const double damping = 2 * kStopDamping * std::sqrt(stiffness);
   return "limited=\"true\" range=\"" + numbers({range.lower_rad, range.upper_rad}) + "\" solreflimit=\"" +
@@ -61,7 +61,7 @@ std::string wing_of(const Side& side, std::size_t number, const Build& build) {
   std::array<Strip, Mechanism::kStrips> strips = strips_of(side.planform);
   RigidBody body = side.wing;
   if (build.damage > 0 && number == build.damaged) {
-    // area is cut off the outer ellipse: its inner end stays, and mass goes with area
+    // the outer ellipse loses area at its tip: its inner end stays, and mass is lost in proportion
     Strip& tip = strips.back();
     const double half = tip.area * area / (M_PI * half_chord) / side.planform.length_m, lost = build.damage * tip.area;
     tip.radius -= half * build.damage;
@@ -95,7 +95,7 @@ std::string side_of(const Side& side, std::size_t number, const Build& build) {
   const Eigen::Vector3d up(0, 0, out);
   const bool one = build.backlash_rad == 0;
   std::string text;
-  if (!one)  // of next to no mass: its inertia is the armature
+  if (!one)  // a body of negligible mass: its inertia is the armature
     text += "<body name=\"" + name + "_rotor\" pos=\"" + numbers(side.shoulder_m) +
             "\">\n<inertial pos=\"0 0 0\" mass=\"1e-9\" diaginertia=\"1e-13 1e-13 1e-13\"/>\n" +
             hinge(name + "_rotor", up, rotor) + ellipsoid(name + "_rotor", {0, 0, 0}, {1e-6, 1e-6, 1e-6}, {}) +
@@ -117,7 +117,7 @@ std::string side_of(const Side& side, std::size_t number, const Build& build) {
 }  // namespace
 
 std::array<Strip, Mechanism::kStrips> strips_of(const Planform& p) {
-  // the nodes are the roots of the polynomial x^2 + b x + c that is orthogonal to 1 and x under the moments
+  // the nodes are the roots of the polynomial x^2 + b x + c that the moments make orthogonal to 1 and x
   const double determinant = p.r11 * p.r11 - p.r00 * p.r22;
   const double b = (p.r00 * p.r33 - p.r11 * p.r22) / determinant, c = (p.r22 * p.r22 - p.r11 * p.r33) / determinant;
   const double half = std::sqrt(b * b / 4 - c), inner = -b / 2 - half, outer = -b / 2 + half;
@@ -125,26 +125,26 @@ std::array<Strip, Mechanism::kStrips> strips_of(const Planform& p) {
   return {Strip{inner, p.r00 - outer_area}, Strip{outer, outer_area}};
 }
 
-std::string mjcf_text(const Figures& figures, const Build& build, double step_s) {
+std::string mjcf_text(const RobotParameters& parameters, const Build& build, double step_s) {
   std::string text =
       "<mujoco model=\"flapper\">\n<compiler angle=\"radian\" inertiafromgeom=\"false\"/>\n<option timestep=\"" +
       numbers({step_s}) + "\" gravity=\"0 0 " + numbers({-Mechanism::kGravity_m_s2}) + "\" density=\"" +
-      numbers({figures.density_kg_m3}) + "\" viscosity=\"" + numbers({kViscosity_Pa_s}) +
+      numbers({parameters.density_kg_m3}) + "\" viscosity=\"" + numbers({kViscosity_Pa_s}) +
       "\" integrator=\"Euler\" solver=\"Newton\" tolerance=\"1e-12\" iterations=\"30\">\n<flag "
       "contact=\"disable\"/>\n</option>\n"
       "<worldbody>\n<body name=\"torso\">\n<freejoint name=\"torso\"/>\n";
-  RigidBody torso = figures.torso;
+  RigidBody torso = parameters.torso;
   const Eigen::Vector3d foot(0, 0, -0.02);
-  if (build.leg_mass_kg > 0) {  // what is left has the same mass and centre of mass together with the leg
+  if (build.leg_mass_kg > 0) {  // torso and leg together keep mass and centre of mass
     torso.com_m = (torso.mass_kg * torso.com_m - build.leg_mass_kg * foot) / (torso.mass_kg - build.leg_mass_kg);
     torso.mass_kg -= build.leg_mass_kg;
   }
   text += inertial(torso);
   const Eigen::Vector3d axes(0.013, 0.013, 0.022);
   const double front = M_PI * axes.y() * axes.z();
-  const double blunt = build.body_drag_m2 / (2 * front);  // MuJoCo leaves out the half
+  const double blunt = build.body_drag_m2 / (2 * front);  // MuJoCo's drag law has no factor 1/2
   text += ellipsoid("torso", {0, 0, 0}, axes, {blunt, blunt / 2, build.body_drag_m2 > 0 ? 0.2 : 0, 0, 0});
-  for (std::size_t side = 0; side < 2; ++side) text += side_of(figures.sides[side], side, build);
+  for (std::size_t side = 0; side < 2; ++side) text += side_of(parameters.sides[side], side, build);
   if (build.leg_mass_kg > 0) {
     const double length = 0.012, inertia = build.leg_mass_kg * length * length, rate = 2 * M_PI * 20;
     const std::string flexure =

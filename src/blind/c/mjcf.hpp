@@ -1,4 +1,4 @@
-// The MJCF text of a robot.
+// Writes the MJCF text of a robot.
 #pragma once
 
 #include <string>
@@ -7,6 +7,6 @@
 
 namespace flappy::blind::c {
 
-std::string mjcf_text(const Figures& figures, const Build& build, double step_s);
+std::string mjcf_text(const RobotParameters& parameters, const Build& build, double step_s);
 
 }  // namespace flappy::blind::c

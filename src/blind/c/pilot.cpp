@@ -5,12 +5,12 @@
 namespace flappy::blind::c {
 namespace {
 
-// Tried out on the nominal robot and on 40 drawn ones.
-constexpr double kHover_V = 10.0, kClimb_V_s2_m = 0.75;  // V per m/s^2: the slope of thrust over voltage, per mass
+// Gains were tested on the nominal robot and on 40 drawn ones.
+constexpr double kHover_V = 10.0, kClimb_V_s2_m = 0.75;  // V per m/s^2: mass over the slope of thrust by voltage
 constexpr double kPlace_1_s = 3.2, kSpeed_1_s = 6, kSpeedHold_1_s2 = 4, kHeight_1_s = 5, kClimb_1_s = 8,
                  kClimbHold_1_s2 = 6;
 constexpr double kMaxAcceleration = 4.5;
-// V or split cycle per rad, per rad/s, and per rad s: roll, pitch, yaw
+// roll, pitch, yaw: V or split cycle per rad, per rad/s, and per rad s
 const Eigen::Vector3d kTurn(1.9, 2.6, 0.12), kTurnRate(0.15, 0.2, 0.012), kTurnHold(2.2, 3.0, 0.12);
 const Eigen::Vector3d kTurnHoldLimit(2.0, 2.5, 0.1);
 
@@ -25,16 +25,16 @@ Eigen::Vector3d rotation_between(const Eigen::Matrix3d& from, const Eigen::Matri
   return turn.angle() * turn.axis();
 }
 
-Pilot::Pilot(const Figures& figures, std::uint64_t seed, std::size_t flight)
-    : figures_(&figures), random_(seed, "pilot", flight) {
-  beat_ticks_ = static_cast<std::size_t>(std::max(1.0, std::round(1 / (figures.flapping_Hz * figures.hold_s))));
+Pilot::Pilot(const RobotParameters& parameters, std::uint64_t seed, std::size_t flight)
+    : parameters_(&parameters), random_(seed, "pilot", flight) {
+  beat_ticks_ = static_cast<std::size_t>(std::max(1.0, std::round(1 / (parameters.flapping_Hz * parameters.hold_s))));
   late_ticks_ = 2;
   past_.resize(beat_ticks_ + late_ticks_);
   trim_ = {kHover_V, 0, 0, 0};
 }
 
 void Pilot::look(const Motion& now, double tick_s) {
-  // an estimator's error of some millimetres and milliradians wanders slowly; rates carry a gyro's noise
+  // errors of an estimator: the position drifts slowly by some millimetres, the rates have a gyro's noise
   drift_ += -drift_ * tick_s / 2 + 2e-3 * std::sqrt(tick_s) * random_.normal3();
   const Eigen::Vector3d noise = 0.05 * random_.normal3();
   past_[next_] = {now.position_W + drift_, now.velocity_W, now.rate_B + noise, now.R_WB};
@@ -46,7 +46,7 @@ void Pilot::look(const Motion& now, double tick_s) {
   }
   View mean;
   mean.R_WB.setZero();
-  for (std::size_t i = 0; i < beat_ticks_; ++i) {  // the oldest are first; the newest have not come through yet
+  for (std::size_t i = 0; i < beat_ticks_; ++i) {  // oldest first; the newest samples are still delayed
     const Sample& sample = past_[(next_ + i) % past_.size()];
     mean.velocity_W += sample.velocity_W;
     mean.rate_B += sample.rate_B;
@@ -54,7 +54,7 @@ void Pilot::look(const Motion& now, double tick_s) {
   }
   mean.velocity_W /= static_cast<double>(beat_ticks_);
   mean.rate_B /= static_cast<double>(beat_ticks_);
-  // averages are half a beat late: place and attitude are led by their rates
+  // averages are half a beat late, so the attitude is extrapolated by its rate; so is the position, by its delay
   const double late_s = tick_s * (0.5 * static_cast<double>(beat_ticks_) + static_cast<double>(late_ticks_));
   Eigen::Quaterniond q(Eigen::Matrix3d(mean.R_WB / static_cast<double>(beat_ticks_)));
   q.normalize();
@@ -80,7 +80,7 @@ void Pilot::carry(const Eigen::Vector3d& about_W, double turn_rad, const Eigen::
 }
 
 Inputs Pilot::fly(const Target& target, double tick_s) {
-  // place -> speed -> acceleration
+  // position -> velocity -> acceleration
   Eigen::Vector3d speed = target.velocity_W + kPlace_1_s * (target.position_W - view_.position_W);
   speed.z() = target.velocity_W.z() + kHeight_1_s * (target.position_W.z() - view_.position_W.z());
   const double level = speed.head<2>().norm();
@@ -117,7 +117,7 @@ Inputs Pilot::fly(const Target& target, double tick_s) {
       (kHover_V + climb_V_ + kClimb_V_s2_m * (kClimb_1_s * error.z() + target.acceleration_W.z())) / std::sqrt(lean),
       out.x(), out.y(), out.z()};
   inputs.amplitude_V = std::clamp(inputs.amplitude_V, 6.0, 16.0);
-  return clipped(inputs, *figures_);
+  return clipped(inputs, *parameters_);
 }
 
 }  // namespace flappy::blind::c

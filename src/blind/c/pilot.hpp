@@ -1,4 +1,4 @@
-// The pilot of family C: a cascade from place to tilt to the inputs of the wing beat, on a view of the state that is late, noisy and
+// The pilot of family C: cascaded loops from position to tilt to the inputs of the wing beat. Its view of the state is delayed, noisy and
 // averaged over one beat.
 #pragma once
 
@@ -12,7 +12,7 @@ struct Target {
   double heading_rad = 0;
 };
 
-/// What the pilot takes for true.
+/// The state as the pilot sees it.
 struct View {
   Eigen::Vector3d position_W = Eigen::Vector3d::Zero(), velocity_W = Eigen::Vector3d::Zero(),
                   rate_B = Eigen::Vector3d::Zero();
@@ -21,26 +21,27 @@ struct View {
 
 class Pilot {
  public:
-  Pilot(const Figures& figures, std::uint64_t seed, std::size_t flight);
+  Pilot(const RobotParameters& parameters, std::uint64_t seed, std::size_t flight);
 
-  /// Once in a tick.
+  /// To be called once per tick, with the true motion.
   void look(const Motion& now, double tick_s);
-  /// Moves what is remembered, as if the robot had been elsewhere: turned about the world's z at `about`, then shifted.
+  /// Transforms the pilot's memory after a displacement of the robot: a turn about the world's z through `about_W`,
+  /// then a shift.
   void carry(const Eigen::Vector3d& about_W, double turn_rad, const Eigen::Vector3d& shift_m);
   const View& view() const { return view_; }
   Inputs fly(const Target& target, double tick_s);
-  /// What integrators and hover amount to, without feedback.
+  /// Inputs in hover: nominal values plus integrators, without feedback.
   Inputs trim() const { return trim_; }
 
  private:
-  const Figures* figures_;
+  const RobotParameters* parameters_;
   Random random_;
   std::size_t beat_ticks_, late_ticks_;
   struct Sample {
     Eigen::Vector3d position_W, velocity_W, rate_B;
     Eigen::Matrix3d R_WB;
   };
-  std::vector<Sample> past_;  ///< a ring
+  std::vector<Sample> past_;  ///< ring buffer
   std::size_t next_ = 0, filled_ = 0;
   View view_;
   Eigen::Vector3d drift_ = Eigen::Vector3d::Zero(), hold_acceleration_ = Eigen::Vector3d::Zero();
@@ -49,10 +50,10 @@ class Pilot {
   Inputs trim_;
 };
 
-/// Rotation vector, in the first's frame, from one attitude to another.
+/// Rotation vector from attitude `from` to attitude `to`, in the frame of `from`.
 Eigen::Vector3d rotation_between(const Eigen::Matrix3d& from, const Eigen::Matrix3d& to);
 double wrapped(double angle_rad);
-/// Of the nose, over the ground.
+/// Heading of the nose in the x-y plane of W.
 double heading_of(const Eigen::Matrix3d& R_WB);
 
 }  // namespace flappy::blind::c

@@ -1,5 +1,5 @@
-// Rich flights visit one surface each (flight 0 the ground, 1 the ceiling, 2 the wall) between legs through free air. Inputs are
-// excited by a telegraph of random levels, a fifth of a second each, and two tones below the beat's frequency.
+// Each rich flight visits one surface (flight 0 the ground, 1 the ceiling, 2 the wall) between legs through free air. The excitation is a
+// piecewise constant signal of random levels, 0.2 s each, plus two tones below the beat's frequency.
 #include "blind/c/programme.hpp"
 
 #include <algorithm>
@@ -19,7 +19,7 @@ double smooth_bend(double x) { return 60 * x * (1 - x) * (1 - 2 * x); }
 
 }  // namespace
 
-Programme::Programme(const Assignment& a, std::size_t flight, const Figures& figures)
+Programme::Programme(const Assignment& a, std::size_t flight, const RobotParameters& parameters)
     : proposed_(a.proposed), hover_(a.hover) {
   if (proposed_) {
     const auto goal = proposed_->goal(0);
@@ -38,9 +38,9 @@ Programme::Programme(const Assignment& a, std::size_t flight, const Figures& fig
   const auto near = [&] {
     const double close = random.uniform(0.03, 0.10);
     Eigen::Vector3d at(random.uniform(-0.6, 0.6), random.uniform(-0.5, 0.4), random.uniform(0.5, 1.5));
-    if (flight == 0) at.z() = Room::kGround_m + figures.below_m + close;
-    if (flight == 1) at.z() = Room::kCeiling_m - figures.above_m - 0.01 - close;
-    if (flight == 2) at.y() = Room::kWall_m - figures.around_m - 0.03 - close;
+    if (flight == 0) at.z() = Room::kGround_m + parameters.below_m + close;
+    if (flight == 1) at.z() = Room::kCeiling_m - parameters.above_m - 0.01 - close;
+    if (flight == 2) at.y() = Room::kWall_m - parameters.around_m - 0.03 - close;
     return at;
   };
   const double fast = random.uniform(0.8, 1.0);
@@ -70,7 +70,7 @@ Programme::Programme(const Assignment& a, std::size_t flight, const Figures& fig
 
 void Programme::add_leg(const Eigen::Vector3d& to_W, double heading, double speed_m_s) {
   const Leg& last = legs_.back();
-  const double mean_m_s = speed_m_s / smooth_rate(0.5);  // it is fastest half way
+  const double mean_m_s = speed_m_s / smooth_rate(0.5);  // the speed is highest half way
   const double takes_s =
       std::max({0.6, (to_W - last.to_W).norm() / mean_m_s, std::abs(heading - last.to_heading) * smooth_rate(0.5) / 3.0,
                 std::abs(to_W.z() - last.to_W.z()) * smooth_rate(0.5) / 0.45});
@@ -121,7 +121,7 @@ Inputs Programme::excitation(double t_s) const {
     for (const Tone& tone : tones_[input])
       sum[input] += kTones[input] * std::sin(2 * M_PI * tone.frequency_Hz * t_s + tone.phase);
   }
-  // beside the wall what pushes sideways is a third of it
+  // near the wall, inputs that push sideways are reduced to as little as 30 %
   const double free_m = Room::kWall_m - target(t_s).position_W.y() - 0.15, calm = std::clamp(free_m / 0.3, 0.3, 1.0);
   return {sum[0], calm * sum[1], calm * sum[2], calm * sum[3]};
 }

@@ -1,4 +1,4 @@
-// Where the robots of family C fly, and how their inputs are excited on the way.
+// Paths of family C's robots, and the excitation of their inputs.
 #pragma once
 
 #include "blind/c/pilot.hpp"
@@ -7,9 +7,9 @@ namespace flappy::blind::c {
 
 class Programme {
  public:
-  Programme(const Assignment& a, std::size_t flight, const Figures& figures);
+  Programme(const Assignment& a, std::size_t flight, const RobotParameters& parameters);
   Target target(double t_s) const;
-  /// To be added to the pilot's inputs; none before t = 0 and in hover.
+  /// Excitation to add to the pilot's inputs; zero before t = 0 and in hover.
   Inputs excitation(double t_s) const;
   Eigen::Vector3d start_W() const { return legs_.front().to_W; }
 
@@ -25,7 +25,7 @@ class Programme {
 
   void add_leg(const Eigen::Vector3d& to_W, double heading, double speed_m_s);
 
-  const ProposedFlight* proposed_;  ///< or none
+  const ProposedFlight* proposed_;  ///< may be null
   std::vector<Leg> legs_;
   bool hover_;
   std::array<std::vector<Tone>, 4> tones_;

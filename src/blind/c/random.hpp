@@ -1,5 +1,5 @@
-// Random numbers of family C: mersenne twister, whose bits the standard fixes, and a Box-Muller of our own, as those of
-// std::normal_distribution differ between libraries.
+// Random numbers of family C: a Mersenne twister, whose output the C++ standard fixes, and an own Box-Muller transform, as the standard
+// leaves the algorithm of std::normal_distribution to the library.
 #pragma once
 
 #include <Eigen/Dense>
@@ -12,20 +12,20 @@ namespace flappy::blind::c {
 
 class Random {
  public:
-  /// A stream of its own for each seed, purpose and number.
+  /// Each combination of seed, purpose and number has an independent stream.
   Random(std::uint64_t seed, std::string_view purpose, std::uint64_t number = 0) {
     std::uint64_t hash = 0xcbf29ce484222325ULL;  // FNV-1a
     for (const char letter : purpose) hash = (hash ^ static_cast<unsigned char>(letter)) * 0x100000001b3ULL;
     engine_.seed(scrambled(scrambled(seed) ^ hash) + scrambled(number + 1));
   }
 
-  /// In [0, 1).
+  /// Evenly distributed in [0, 1).
   double uniform() { return static_cast<double>(engine_() >> 11U) * 0x1p-53; }
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
   std::size_t below(std::size_t count) { return static_cast<std::size_t>(uniform() * static_cast<double>(count)); }
   double sign() { return uniform() < 0.5 ? -1.0 : 1.0; }
 
-  /// Of mean 0 and variance 1.
+  /// Standard normal number.
   double normal() {
     if (kept_) {
       kept_ = false;
@@ -36,7 +36,7 @@ class Random {
     kept_ = true;
     return radius * std::cos(angle);
   }
-  /// Cut at three standard deviations.
+  /// Standard normal number, rejected if beyond three standard deviations.
   double cut_normal() {
     for (;;) {
       const double value = normal();

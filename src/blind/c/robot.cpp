@@ -3,61 +3,63 @@
 namespace flappy::blind::c {
 namespace {
 
-/// The faults that are figures.
-Figures faulty(Figures f, const Sizes& sizes, std::uint64_t seed) {
+/// Applies the effects that only change parameters.
+RobotParameters faulty(RobotParameters f, const Magnitudes& magnitudes, std::uint64_t seed) {
   Random random(seed, "faults");
   const double heading = random.uniform(0, 2 * M_PI), sign = random.sign(), other = random.sign(), wing = random.sign();
-  f.torso.com_m += 1e-3 * sizes[Effect::kComOffset] * f.mass_kg() / f.torso.mass_kg *
+  f.torso.com_m += 1e-3 * magnitudes[Effect::kComOffset] * f.mass_kg() / f.torso.mass_kg *
                    Eigen::Vector3d(std::cos(heading), std::sin(heading), 0);
-  const double product = 0.05 * sizes[Effect::kInertiaProducts] * f.torso.inertia_kg_m2(0, 0);
+  const double product = 0.05 * magnitudes[Effect::kInertiaProducts] * f.torso.inertia_kg_m2(0, 0);
   for (const auto& [axis, way] : {std::pair{1, sign}, std::pair{2, other}}) {
     f.torso.inertia_kg_m2(0, axis) += way * product;
     f.torso.inertia_kg_m2(axis, 0) += way * product;
   }
   f.torso.inertia_kg_m2 = made_physical(f.torso.inertia_kg_m2);
-  const double shape = sizes[Effect::kWingInertia];
+  const double magnitude = magnitudes[Effect::kWingInertia];
   for (Side& side : f.sides) {
-    if (shape > 0) {
-      side.wing.com_m.z() *= 1 + 0.1 * shape * wing;
-      const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.1 * shape * wing, Eigen::Vector3d::UnitX()).toRotationMatrix();
+    if (magnitude > 0) {
+      side.wing.com_m.z() *= 1 + 0.1 * magnitude * wing;
+      const Eigen::Matrix3d turn =
+          Eigen::AngleAxisd(0.1 * magnitude * wing, Eigen::Vector3d::UnitX()).toRotationMatrix();
       side.wing.inertia_kg_m2 = turn * side.wing.inertia_kg_m2 * turn.transpose();
     }
-    side.rotation.friction_Nm += 6e-5 * sizes[Effect::kHingeStiction];
+    side.rotation.friction_Nm += 6e-5 * magnitudes[Effect::kHingeStiction];
   }
   return f;
 }
 
-Build build_of(const Sizes& sizes, std::uint64_t seed) {
+Build build_of(const Magnitudes& magnitudes, std::uint64_t seed) {
   Random random(seed, "build");
   Build build;
-  build.damage = 0.05 * sizes[Effect::kWingDamage];
+  build.damage = 0.05 * magnitudes[Effect::kWingDamage];
   build.damaged = random.below(2);
-  build.backlash_rad = kDegree * sizes[Effect::kGearBacklash];
-  const double half_weight_Nm = 0.0611 * 0.0507;  // half of 12.4 g at the planform's centre of pressure
-  if (sizes[Effect::kSparBending] > 0)
-    build.spar_stiffness_Nm_rad = half_weight_Nm / (0.5 * kDegree * sizes[Effect::kSparBending]);
-  build.leg_mass_kg = 0.4e-3 * sizes[Effect::kLegFlexure];
-  build.body_drag_m2 = 1.5e-3 * sizes[Effect::kBodyDrag];
-  build.rotational_lift = sizes[Effect::kRotationalLift];
-  build.added_mass = sizes[Effect::kAddedMass];
-  build.stop_softness = 1 + 4 * sizes[Effect::kStopCompliance];
+  build.backlash_rad = kDegree * magnitudes[Effect::kGearBacklash];
+  const double half_weight_Nm = 0.0611 * 0.0507;  // half the weight of 12.4 g at the planform's centre of pressure
+  if (magnitudes[Effect::kSparBending] > 0)
+    build.spar_stiffness_Nm_rad = half_weight_Nm / (0.5 * kDegree * magnitudes[Effect::kSparBending]);
+  build.leg_mass_kg = 0.4e-3 * magnitudes[Effect::kLegFlexure];
+  build.body_drag_m2 = 1.5e-3 * magnitudes[Effect::kBodyDrag];
+  build.rotational_lift = magnitudes[Effect::kRotationalLift];
+  build.added_mass = magnitudes[Effect::kAddedMass];
+  build.stop_softness = 1 + 4 * magnitudes[Effect::kStopCompliance];
   return build;
 }
 
 }  // namespace
 
-Robot::Robot(const Assignment& a, std::size_t flight) : sizes_(a.effects), figures_(read_figures(a.vehicle_file)) {
-  if (a.own_figures) figures_ = drawn_figures(figures_, a.seed);
-  figures_ = faulty(std::move(figures_), sizes_, a.seed);
-  steps_ = static_cast<std::size_t>(std::max(1.0, std::ceil(figures_.hold_s / Mechanism::kStep_s - 1e-6)));
-  step_s_ = figures_.hold_s / static_cast<double>(steps_);
-  mechanism_ = std::make_unique<Mechanism>(figures_, build_of(sizes_, a.seed), step_s_);
-  drive_ = std::make_unique<Drive>(figures_, sizes_, a.seed, flight);
-  air_ = std::make_unique<Air>(figures_, sizes_, a.seed, flight);
+Robot::Robot(const Assignment& a, std::size_t flight)
+    : magnitudes_(a.effects), parameters_(read_parameters(a.vehicle_file)) {
+  if (a.own_parameters) parameters_ = drawn_parameters(parameters_, a.seed);
+  parameters_ = faulty(std::move(parameters_), magnitudes_, a.seed);
+  steps_ = static_cast<std::size_t>(std::max(1.0, std::ceil(parameters_.hold_s / Mechanism::kStep_s - 1e-6)));
+  step_s_ = parameters_.hold_s / static_cast<double>(steps_);
+  mechanism_ = std::make_unique<Mechanism>(parameters_, build_of(magnitudes_, a.seed), step_s_);
+  drive_ = std::make_unique<Drive>(parameters_, magnitudes_, a.seed, flight);
+  air_ = std::make_unique<Air>(parameters_, magnitudes_, a.seed, flight);
   for (std::size_t side = 0; side < 2; ++side) {
-    const Motor& motor = figures_.sides[side].motor;
+    const Motor& motor = parameters_.sides[side].motor;
     friction_Nm_[side] =
-        motor.efficiency * motor.gear_ratio * motor.friction_Nm + figures_.sides[side].stroke.friction_Nm;
+        motor.efficiency * motor.gear_ratio * motor.friction_Nm + parameters_.sides[side].stroke.friction_Nm;
   }
 }
 
@@ -76,21 +78,21 @@ void Robot::tick_held(const std::array<double, 2>& voltages, const Motion* held,
 
 void Robot::step(const Motion* held) {
   Mechanism& m = *mechanism_;
-  if (!m.is_finite()) return;  // MuJoCo would complain in a file of its own
+  if (!m.is_finite()) return;  // otherwise MuJoCo writes warnings to a log file
   const double now_s = static_cast<double>(done_) * step_s_;
   const Wrench wrench = air_->act(m, step_s_);
   const std::array<double, 2> motor =
       drive_->torques(now_s, step_s_, {m.drive_angle(0), m.drive_angle(1)}, {m.drive_rate(0), m.drive_rate(1)});
-  const double creep = 2 * kDegree * sizes_[Effect::kSpringCreep] * (1 - std::exp(-now_s / 6));
-  const double harder = std::sqrt(6 * 0.1 * sizes_[Effect::kSpringHardening]),
-               stiction = sizes_[Effect::kCoulombFriction];
+  const double creep = 2 * kDegree * magnitudes_[Effect::kSpringCreep] * (1 - std::exp(-now_s / 6));
+  const double harder = std::sqrt(6 * 0.1 * magnitudes_[Effect::kSpringHardening]),
+               stiction = magnitudes_[Effect::kCoulombFriction];
   std::array<double, 2> spring{};
   for (std::size_t side = 0; side < 2; ++side) {
-    const Spring& of = figures_.sides[side].spring;
+    const Spring& of = parameters_.sides[side].spring;
     const double angle = m.stroke(side) - of.rest_rad - creep;
     const double give = harder > 0 ? std::sinh(harder * angle) / harder : angle;
     spring[side] = -(angle > 0 ? of.positive_Nm_rad : of.negative_Nm_rad) * give;
-    if (stiction > 0) {  // Stribeck's law: friction falls from its value at rest as exp(-(w/w_s)^2)
+    if (stiction > 0) {  // Stribeck: the excess friction at rest falls as exp(-(w/w_s)^2)
       const double slip = m.drive_rate(side) / 120;
       m.set_friction(side, friction_Nm_[side] * (1 + stiction * std::exp(-slip * slip)));
     }

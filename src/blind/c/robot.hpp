@@ -1,4 +1,4 @@
-// One robot: its figures, what is wrong with it, and its motion from tick to tick of the driver.
+// One robot: its parameters, its effects, and its motion from tick to tick of the driver.
 #pragma once
 
 #include <algorithm>
@@ -14,11 +14,11 @@ namespace flappy::blind::c {
 class Robot {
  public:
   Robot(const Assignment& assignment, std::size_t flight);
-  Robot(const Robot&) = delete;  // drive and air look at its figures
+  Robot(const Robot&) = delete;  // drive and air point to its parameters
   Robot& operator=(const Robot&) = delete;
 
-  const Figures& figures() const { return figures_; }
-  const Sizes& sizes() const { return sizes_; }
+  const RobotParameters& parameters() const { return parameters_; }
+  const Magnitudes& magnitudes() const { return magnitudes_; }
   Mechanism& mechanism() { return *mechanism_; }
   const Mechanism& mechanism() const { return *mechanism_; }
   const Drive& drive() const { return *drive_; }
@@ -26,16 +26,17 @@ class Robot {
   std::size_t steps_per_tick() const { return steps_; }
   bool is_finite() const { return mechanism_->is_finite(); }
 
-  /// The driver applies these voltages and holds them for a tick; `after` is called after each step.
+  /// Commands voltages to the driver, which holds them for a tick; calls `after` at the end of each step.
   void tick(const std::array<double, 2>& voltages, const std::function<void()>& after);
-  /// The same with the torso moving as it was: `held` has its motion at the start of each step and after the last.
+  /// A tick in which the torso follows a recorded motion: `held` has it at the start of each step and after the last.
+  /// Null: free.
   void tick_held(const std::array<double, 2>& voltages, const Motion* held, const std::function<void()>& after);
 
  private:
   void step(const Motion* held);
 
-  Sizes sizes_;
-  Figures figures_;
+  Magnitudes magnitudes_;
+  RobotParameters parameters_;
   double step_s_;
   std::size_t steps_;
   std::unique_ptr<Mechanism> mechanism_;
@@ -45,7 +46,7 @@ class Robot {
   long done_ = 0;
 };
 
-/// What an accelerometer at a place in B would measure if it were free of faults.
+/// Specific force at a point of B, in B (m/s^2): the reading of an ideal accelerometer.
 Eigen::Vector3d specific_force_B(const Motion& motion, const Eigen::Vector3d& place_B);
 
 }  // namespace flappy::blind::c

@@ -19,8 +19,8 @@ Eigen::Matrix3d turned(double angle, const Eigen::Vector3d& axis) {
 
 }  // namespace
 
-Sensors::Sensors(const Assignment& a, std::size_t flight, const Robot& robot, SensorFigures figures)
-    : f_(std::move(figures)),
+Sensors::Sensors(const Assignment& a, std::size_t flight, const Robot& robot, SensorParameters parameters)
+    : f_(std::move(parameters)),
       power_(a.power),
       wings_(a.wings),
       imu_noise_(a.seed, "imu", flight),
@@ -28,21 +28,21 @@ Sensors::Sensors(const Assignment& a, std::size_t flight, const Robot& robot, Se
       power_noise_(a.seed, "power", flight),
       wing_noise_(a.seed, "wings", flight),
       walk_(a.seed, "gyro walk", flight) {
-  const Sizes& sizes = robot.sizes();
-  bias_size_ = 0.03 * sizes[Effect::kGyroBias];
-  rectification_ = 1e-3 * sizes[Effect::kVibrationRectification];
-  g_sensitivity_ = 1e-3 * sizes[Effect::kGyroGSensitivity];
-  delay_s_ = 5e-3 * sizes[Effect::kMocapDelay];
+  const Magnitudes& magnitudes = robot.magnitudes();
+  bias_magnitude_ = 0.03 * magnitudes[Effect::kGyroBias];
+  rectification_ = 1e-3 * magnitudes[Effect::kVibrationRectification];
+  g_sensitivity_ = 1e-3 * magnitudes[Effect::kGyroGSensitivity];
+  delay_s_ = 5e-3 * magnitudes[Effect::kMocapDelay];
   Random once(a.seed, "sensor faults");
-  warm_ = bias_size_ * once.direction();
+  warm_ = bias_magnitude_ * once.direction();
   const Eigen::Vector3d axis = once.direction(), place = once.direction();
   const double level = once.uniform(0, 2 * M_PI);
-  if (sizes[Effect::kAccelerometerMisalignment] > 0)
-    misaligned_ = turned(0.02 * sizes[Effect::kAccelerometerMisalignment], axis);
-  if (sizes[Effect::kMocapTilt] > 0)
-    tilt_ = turned(0.01 * sizes[Effect::kMocapTilt], Eigen::Vector3d(std::cos(level), std::sin(level), 0));
-  marker_offset_ = 2e-3 * sizes[Effect::kMarkerOffset] * place;
-  const double foam = sizes[Effect::kImuMount];
+  if (magnitudes[Effect::kAccelerometerMisalignment] > 0)
+    misaligned_ = turned(0.02 * magnitudes[Effect::kAccelerometerMisalignment], axis);
+  if (magnitudes[Effect::kMocapTilt] > 0)
+    tilt_ = turned(0.01 * magnitudes[Effect::kMocapTilt], Eigen::Vector3d(std::cos(level), std::sin(level), 0));
+  marker_offset_ = 2e-3 * magnitudes[Effect::kMarkerOffset] * place;
+  const double foam = magnitudes[Effect::kImuMount];
   if (foam > 0) mount_rate_ = 2 * M_PI * 120 / std::sqrt(foam);
 }
 
@@ -54,14 +54,14 @@ void Sensors::after_step(const Robot& robot, double t_s) {
   if (wings_ && count_ % f_.wings.steps == 0) wings(robot, t_s);
 }
 
-// Chain: place and axes, foam, rectification, low-pass; then a sample's bias, noise, digits.
+// Signal chain: position, mount, misalignment, rectification, axes, low-pass; for each sample then bias, noise and resolution.
 void Sensors::imu(const Robot& robot, double t_s) {
   const Motion now = robot.mechanism().motion();
   const double step_s = robot.step_s();
   Eigen::Vector3d force = specific_force_B(now, f_.imu.position_m);
   Vector6 seen;
   seen << now.rate_B, force;
-  if (mount_rate_ > 0) {  // the unit follows its mount as a second-order system
+  if (mount_rate_ > 0) {  // the inertial unit follows the torso through its mount as a second-order system
     constexpr double damping = 0.2;
     if (!settled_) foam_ = seen;
     foam_rate_ += step_s * (mount_rate_ * mount_rate_ * (seen - foam_) - 2 * damping * mount_rate_ * foam_rate_);
@@ -77,8 +77,8 @@ void Sensors::imu(const Robot& robot, double t_s) {
   settled_ = true;
   passed_ += passed * (raw - passed_);
   sum_ += passed_;
-  if (bias_size_ > 0) walked_ += bias_size_ * std::sqrt(step_s / 10) * walk_.normal3();
-  // held: the sensor itself samples half an interval before, on its own clock
+  if (bias_magnitude_ > 0) walked_ += bias_magnitude_ * std::sqrt(step_s / 10) * walk_.normal3();
+  // kHeld: the sensor took its value half an interval earlier
   if (count_ % f_.imu.steps == f_.imu.steps / 2) held_ = passed_;
   if (count_ % f_.imu.steps != 0) return;
   Vector6 sample = f_.imu.sampling == Sampling::kInstant ? passed_
@@ -86,7 +86,7 @@ void Sensors::imu(const Robot& robot, double t_s) {
                                                          : Vector6(sum_ / static_cast<double>(f_.imu.steps));
   sum_.setZero();
   Eigen::Vector3d bias = f_.imu.gyro_bias;
-  if (bias_size_ > 0) bias += warm_ * (1 - std::exp(-std::max(0.0, t_s + 5) / 6)) + walked_;
+  if (bias_magnitude_ > 0) bias += warm_ * (1 - std::exp(-std::max(0.0, t_s + 5) / 6)) + walked_;
   sample.head<3>() += bias + f_.imu.gyro_noise * imu_noise_.normal3();
   sample.tail<3>() += f_.imu.accel_noise * imu_noise_.normal3();
   const double arrives_s = (t_s + f_.imu.latency_s) * (1 + f_.fast_imu);
@@ -99,7 +99,7 @@ void Sensors::imu(const Robot& robot, double t_s) {
                                 : digital(sample[i], kAccelLimit_m_s2, kAccelDigit_m_s2));
 }
 
-// A rigid body is fitted to the markers that two cameras see (Kabsch's solution by singular values).
+// Fits a rigid body to the markers that at least two cameras see (Kabsch's solution by singular values).
 void Sensors::mocap(const Robot& robot, double t_s) {
   const Motion now = robot.mechanism().motion();
   std::array<Eigen::Vector3d, 4> seen_W, model_B;
@@ -144,7 +144,7 @@ void Sensors::power(const Robot& robot, double t_s) {
   std::array<double, 2> currents{};
   for (std::size_t side = 0; side < 2; ++side) {
     double current = robot.drive().currents()[side];
-    // on the battery's side of the bridge it is what the switches let through
+    // on the battery's side of the bridge the mean current is scaled by the duty cycle
     if (f_.power.battery_side) current *= std::abs(robot.drive().voltages()[side]) / robot.drive().battery_V();
     currents[side] =
         digital(current + f_.power.offset_A[side] + f_.power.current_noise * power_noise_.normal(), 2, kCurrentDigit_A);
@@ -162,7 +162,7 @@ void Sensors::wings(const Robot& robot, double t_s) {
   flightlog::Column* columns[4] = {&wings_log_.left_stroke_rad, &wings_log_.left_rotation_rad,
                                    &wings_log_.right_stroke_rad, &wings_log_.right_rotation_rad};
   double read[4];
-  for (std::size_t i = 0; i < 4; ++i)  // a Hall sensor's field is no pure sine
+  for (std::size_t i = 0; i < 4; ++i)  // nonlinearity: a Hall sensor's field is not a pure sine
     read[i] = angles[i] + f_.wings.bend_rad[i] * std::sin(2 * angles[i] + f_.wings.bend_phase[i]) +
               f_.wings.noise_rad * wing_noise_.normal();
   if (t_s < 0) return;
@@ -176,7 +176,7 @@ void Sensors::finish(flightlog::FlightLog& log, double end_s) const {
   log.imu = imu_;
   if (power_) log.power = power_log_;
   if (wings_) log.wings = wings_log_;
-  // samples that would have arrived after the recording's end are not in it
+  // drops samples that arrive after the end of the recording
   const auto cut = [end_s](std::vector<flightlog::Column*> columns) {
     while (!columns[0]->empty() && columns[0]->back() > end_s)
       for (flightlog::Column* column : columns) column->pop_back();

@@ -1,10 +1,10 @@
-// What a laboratory records of a robot of family C: an inertial unit, markers seen by cameras, currents through a converter, strokes by
-// Hall sensors; and what it declares about them.
+// A laboratory's record of a robot of family C, and its declarations. Sensors: an inertial unit, cameras that see markers, a converter for
+// currents, Hall sensors for the wings' angles.
 //
-// Declarations are exact in the log format's meaning, or those of an assignment with conventions, where each departs from the truth
-// as laboratories' do, and within these bounds: latencies by up to 0.5 ms (half an averaging interval counted or not), rates
-// rounded, the place of the IMU by up to 2 mm, its mounting turned by up to 1 deg, noise 0.7 to 1.5 times the truth, the clock of
-// one stream up to 50 ppm fast; IMU samples that are instants, means or held; currents on the battery's side of the bridge.
+// Declarations are exact in the sense of the log format. In an assignment with conventions each departs from the truth, as those of real
+// laboratories do, within these bounds: latencies by up to 0.5 ms (half an averaging interval counted or not), rates rounded, position
+// of the IMU by up to 2 mm, its mounting rotated by up to 1 deg, noise 0.7 to 1.5 times the truth, the clock of one stream up to 50 ppm
+// fast; IMU samples instantaneous, averaged or held; currents measured on the battery's side of the bridge.
 #pragma once
 
 #include "blind/c/robot.hpp"
@@ -13,10 +13,10 @@ namespace flappy::blind::c {
 
 enum class Sampling { kInstant, kMean, kHeld };
 
-/// Everything drawn once for a robot's sensors: the truth, and beside it the declaration.
-struct SensorFigures {
+/// Properties of a robot's sensors, drawn once: the true values and the declaration.
+struct SensorParameters {
   struct Imu {
-    std::size_t steps = 10;  ///< between samples
+    std::size_t steps = 10;  ///< steps of the robot between samples
     double bandwidth_hz = 250, latency_s = 1e-3;
     Sampling sampling = Sampling::kInstant;
     Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
@@ -29,7 +29,7 @@ struct SensorFigures {
     std::size_t steps = 50;
     double latency_s = 0.01, marker_noise_m = 2e-4, loss = 0.004;
     std::array<Eigen::Vector3d, 4> markers_m;
-    std::array<Eigen::Vector3d, 6> cameras_W;  ///< directions to them
+    std::array<Eigen::Vector3d, 6> cameras_W;  ///< directions to the cameras
   } mocap;
   struct Power {
     std::size_t steps = 10;
@@ -42,18 +42,18 @@ struct SensorFigures {
     double noise_rad = 0.003;
     std::array<double, 4> bend_rad{}, bend_phase{};
   } wings;
-  double fast_imu = 0, fast_mocap = 0;  ///< shares by which a stream's clock runs fast
+  double fast_imu = 0, fast_mocap = 0;  ///< relative excess speed of the streams' clocks
   flightlog::FlightHeader declared;
 };
 
-SensorFigures sensor_figures(const Assignment& a, const Robot& robot);
+SensorParameters sensor_parameters(const Assignment& a, const Robot& robot);
 
 class Sensors {
  public:
-  Sensors(const Assignment& a, std::size_t flight, const Robot& robot, SensorFigures figures);
-  /// After each step of the robot, at the time of the log.
+  Sensors(const Assignment& a, std::size_t flight, const Robot& robot, SensorParameters parameters);
+  /// To be called when a step of the robot has ended, at `t_s` of the log.
   void after_step(const Robot& robot, double t_s);
-  /// Puts what was recorded from t = 0 on into a log whose commands are there.
+  /// Puts the record from t = 0 to `end_s` into a log that already has its commands.
   void finish(flightlog::FlightLog& log, double end_s) const;
 
  private:
@@ -62,11 +62,11 @@ class Sensors {
   void power(const Robot& robot, double t_s);
   void wings(const Robot& robot, double t_s);
 
-  SensorFigures f_;
+  SensorParameters f_;
   bool power_, wings_;
   Random imu_noise_, mocap_noise_, power_noise_, wing_noise_, walk_;
   // effects
-  double bias_size_, rectification_, g_sensitivity_, delay_s_;
+  double bias_magnitude_, rectification_, g_sensitivity_, delay_s_;
   Eigen::Vector3d warm_ = Eigen::Vector3d::Zero(), walked_ = Eigen::Vector3d::Zero(),
                   marker_offset_ = Eigen::Vector3d::Zero();
   Eigen::Matrix3d misaligned_ = Eigen::Matrix3d::Identity(), tilt_ = Eigen::Matrix3d::Identity();

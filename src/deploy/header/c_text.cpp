@@ -37,7 +37,7 @@ template std::string c_row(std::span<const float>);
 template std::string c_row(std::span<const std::int32_t>);
 
 std::string c_comment(const std::string& text) {
-  std::string closed = text;  // nothing in it ends the comment
+  std::string closed = text;  // `text` with every "*/" broken up, which would end the comment
   for (std::size_t at = 0; (at = closed.find("*/", at)) != std::string::npos;) closed.insert(at + 1, " ");
   std::istringstream lines(closed);
   std::string comment = "/* ";

@@ -1,4 +1,4 @@
-// Pieces of C source.
+// Writes pieces of C source.
 #pragma once
 
 #include <cstdint>
@@ -7,11 +7,11 @@
 
 namespace flappy::deploy {
 
-/// A number as C writes it, to the bit: hexadecimal, single precision ("-0x1.8p+3F").
+/// An exact C literal: a float as hexadecimal single precision ("-0x1.8p+3F").
 std::string c_number(float value);
 std::string c_number(std::int32_t value);
 
-/// Numbers in braces, over as many lines as they need, the first of them where the caller is.
+/// Numbers in braces, broken into lines.
 template <class N>
 std::string c_row(std::span<const N> numbers);
 /// `declaration = {...};`
@@ -23,16 +23,17 @@ std::string c_array(const std::string& declaration, std::span<const N> numbers) 
 extern template std::string c_row(std::span<const float>);
 extern template std::string c_row(std::span<const std::int32_t>);
 
-/// The lines of a text in one comment.
+/// A text as one C comment.
 std::string c_comment(const std::string& text);
 
-/// The end of what "#ifndef FLAPPY_NAME_H" begins: another header of the same prefix, with other numbers, is no silent copy of the first but an error.
+/// The end of a header that began with "#ifndef FLAPPY_NAME_H". Including a second header of the same name with another `crc` is a compile
+/// error instead of being skipped silently.
 std::string end_of_header(const std::string& name, std::uint32_t crc);
 
-/// A string literal.
+/// A C string literal.
 std::string c_string(const std::string& text);
 
-/// CRC-32 (IEEE 802.3) of the numbers' four bytes each, lowest first, after those that gave `crc`, or 0.
+/// CRC-32 (IEEE 802.3) of the numbers' four bytes each, lowest first. `crc` is the CRC of preceding numbers, or 0.
 std::uint32_t crc32(std::uint32_t crc, std::span<const std::int32_t> numbers);
 std::uint32_t crc32(std::uint32_t crc, std::span<const float> numbers);
 

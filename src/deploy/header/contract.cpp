@@ -43,7 +43,7 @@ bool sets_voltages(const FlyConfig& config) { return config.fleet.task.sets_volt
 
 std::string meaning_of_action(const FlyConfig& config) {
   if (sets_voltages(config)) return "It is the voltage of the left and of the right motor.\n";
-  std::string inputs;  // as the vehicle mixes them
+  std::string inputs;  // how the vehicle computes its inputs from the actions
   if (const auto mixed = model::mixed_inputs(config.vehicle); !mixed.empty()) {
     const auto actions = config.fleet.task.action();
     for (const model::BeatAveraged::Input& i : mixed) {
@@ -104,7 +104,7 @@ std::uint32_t contract_crc32(const FlyConfig& config) {
        << holds_trim(config) << "\n";
   for (const auto& signals : {config.fleet.task.observation(), config.fleet.task.action()})
     for (const Signal& s : signals) text << s.name << " " << s.unit << " " << s.frame << "\n";
-  std::vector<float> letters;  // each a number of its own: only equality matters
+  std::vector<float> letters;  // one number per letter, because only equality matters
   for (const char c : text.str()) letters.push_back(c);
   return crc32(0, letters);
 }

@@ -22,7 +22,7 @@ constexpr const char* kControllerCodes = R"(/* What flappy_controller_selftest()
 
 using Members = std::vector<std::pair<std::string, std::vector<float>>>;
 
-/// Arrays of the header, and the checksum over them in their order.
+/// Collects the arrays of the header and the checksum over them in their order.
 class Constants {
  public:
   void add(const std::string& name, const std::string& count, const std::vector<float>& numbers) {
@@ -33,7 +33,8 @@ class Constants {
     crc_ = crc32(crc_, words);
     text_ << c_array<std::int32_t>("static const int32_t flappy_controller_" + name + "[" + count + "]", words);
   }
-  /// A struct of named members, each in braces where it is several numbers; the first one is a struct too.
+  /// Adds a struct of named members, with braces where a member has several numbers; the first member is itself a
+  /// struct.
   void add_struct(const std::string& declaration, const std::string& first, const Members& members_of_first,
                   const Members& members) {
     text_ << declaration << " = {\n    {\n";
@@ -62,7 +63,7 @@ class Constants {
   std::uint32_t crc_ = 0;
 };
 
-/// Members of flappy_feedback_constants.
+/// The members of flappy_feedback_constants.
 template <class C>
 Members feedback_of(const flight::FlightConstants& all) {
   Members list;
@@ -76,7 +77,7 @@ Members feedback_of(const flight::FlightConstants& all) {
   return list;
 }
 
-/// Members of flappy_controller_constants.
+/// Adds the members of flappy_controller_constants.
 template <class C>
 void add_constants(const rollout::FlyConfig& config, Constants& to) {
   const flight::FlightConstants all = flight::flight_constants(config.fleet);
@@ -113,7 +114,7 @@ void add_constants(const rollout::FlyConfig& config, Constants& to) {
   one("hand_back_tilt_cos", h.tilt_cos);
   one("hand_back_body_rate_rad_s", h.body_rate_rad_s);
   one("hand_back_at_s", h.at_s);
-  std::vector<float> middle;  // as scaled_action() has it
+  std::vector<float> middle;  // the same rounding as in scaled_action()
   for (int i = 0; i < config.fleet.task.actions(); ++i)
     middle.push_back(static_cast<float>(0.5 * static_cast<double>(task.action_low[i] + task.action_high[i])));
   list.push_back({"start_added", middle});
@@ -223,7 +224,7 @@ std::string about(const rollout::FlyConfig& config, const policy::RunInfo& run, 
 std::string no_controller(const rollout::FlyConfig& config) {
   const flight::Task& task = config.fleet.task;
   if (task.sets_voltages()) return "the policy sets the motors' voltages by itself";
-  if (config.vehicle.beat_averaged) return "the vehicle is known by the beat, and has an autopilot of its own";
+  if (config.vehicle.beat_averaged) return "the vehicle is beat-averaged, and has an autopilot of its own";
   if (config.vehicle.jointed) return "the vehicle's wings have no motors to be set by it";
   if (config.fleet.controller.kind == flight::kNoController) return "the policy flies by itself";
   if (task.parts >> static_cast<int>(flight::Part::wings) & 1)

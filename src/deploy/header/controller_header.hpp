@@ -1,4 +1,4 @@
-// The estimator and feedback controller of a run as one header in C99 that tests itself.
+// Exports the estimator and feedback controller of a run as one header in C99 that tests itself.
 #pragma once
 
 #include "deploy/header/contract.hpp"
@@ -6,11 +6,11 @@
 
 namespace flappy::deploy {
 
-/// Why a policy of this task flies without flappy_controller.h; empty: it does not.
+/// The reason why no flappy_controller.h can be exported for this configuration; empty where it can.
 std::string no_controller(const rollout::FlyConfig& config);
 
-/// Text of flappy_controller.h: the same bytes for the same arguments. io::InputError where the controller is none that can
-/// be exported, there is none, or a period is no whole number of microseconds.
+/// The text of flappy_controller.h, which is the same to the byte for the same arguments. Throws io::InputError where the controller cannot be
+/// exported (no_controller()), or a period is not a whole number of microseconds.
 std::string controller_header(const rollout::FlyConfig& config, const policy::RunInfo& run,
                               const ControllerTrace& trace);
 

@@ -16,7 +16,7 @@ using Lane = model::Lanes<float, 1>;
 
 std::int32_t whole_us(double s) { return static_cast<std::int32_t>(std::lround(s * 1e6)); }
 
-/// The vehicle as it is and nothing but the controller's output, as on board.
+/// The configuration for the trace: nominal vehicle, no excitation, hand-back by the estimate, as on board.
 rollout::FlyConfig on_board(rollout::FlyConfig config) {
   config.randomisation.reset();
   config.excitation = {};
@@ -26,14 +26,14 @@ rollout::FlyConfig on_board(rollout::FlyConfig config) {
   return config;
 }
 
-/// Rows of a flight's block.
+/// `count` rows of a flight's block, from the byte `offset` on.
 std::vector<float> rows(const Fleet<float>& fleet, std::size_t offset, std::size_t count) {
   const auto all = fleet.snapshot(0).flight;
   const auto begin = all.begin() + static_cast<std::ptrdiff_t>(offset / sizeof(float[flight::kLanes<float>]));
   return {begin, begin + static_cast<std::ptrdiff_t>(count)};
 }
 
-/// When it is handed back, in control periods; half of the flight where it never is.
+/// The control period of the hand-back; the middle of the flight where there is none.
 int hand_back_period(const rollout::FlyConfig& config) {
   rollout::Rollout<float> flight(config, 1);
   while (!flight.over()) {
@@ -47,7 +47,7 @@ void copy(const auto& from, float* to) {
   for (const auto x : from) *to++ = static_cast<float>(x);
 }
 
-/// What the samples in [first, last) add up to.
+/// The sum of the samples in [first, last).
 ControllerTrace::Increment gathered(const std::vector<ControllerTrace::Imu>& samples, std::size_t first,
                                     std::size_t last) {
   flight::Increment<Lane> sum{{0, 0, 0}, {0, 0, 0}};
@@ -62,7 +62,7 @@ ControllerTrace::Increment gathered(const std::vector<ControllerTrace::Imu>& sam
           samples[last - 1].taken_us};
 }
 
-/// The increments that have arrived by the end of `period`, one for each that gathered something.
+/// The increments that have arrived by the end of `period`, one for each that contains a sample.
 std::vector<ControllerTrace::Increment> arrived(const std::vector<ControllerTrace::Imu>& samples, int period,
                                                 std::int32_t period_us, std::int32_t latency_us) {
   std::vector<ControllerTrace::Increment> list;
@@ -92,7 +92,7 @@ ControllerTrace record_controller(const rollout::FlyConfig& given, int periods, 
   const std::int32_t mocap_latency_us = whole_us(o.sensors.mocap.latency_s);
 
   ControllerTrace t;
-  std::vector<ControllerTrace::Imu> imu;  // times since the flight began, as in `frames`
+  std::vector<ControllerTrace::Imu> imu;  // times since the start of the flight, as in `frames`
   std::vector<ControllerTrace::Frame> frames;
   for (int period = 0; period < begin + periods; ++period) {
     if (period == begin) {
@@ -114,7 +114,7 @@ ControllerTrace record_controller(const rollout::FlyConfig& given, int periods, 
         if (i.to_us > t.horizon_us || i.to_us == t.last_imu_us - lag_us) t.ring.push_back(i);
       }
     }
-    if (period == begin && t.ring.empty()) t.ring.push_back({{}, {}, t.horizon_us, t.horizon_us});  // of no time
+    if (period == begin && t.ring.empty()) t.ring.push_back({{}, {}, t.horizon_us, t.horizon_us});  // zero duration
     flight.step();
     schedule.next();
     for (const auto& s : fleet.imu_samples(0)) {

@@ -1,4 +1,4 @@
-// What an exported feedback controller saw and did around a hand-back, as the lanes flew it: its self-test flies it again.
+// A recording of what the exported feedback controller sees and does around a hand-back in simulation; its self-test repeats it.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace flappy::deploy {
 
-/// Times in microseconds since its first period began.
+/// Times are in microseconds since the first recorded period began.
 struct ControllerTrace {
   struct Imu {
     std::int32_t taken_us, arrived_us;
@@ -24,29 +24,29 @@ struct ControllerTrace {
   };
   struct Period {
     float added[4], input[4];  // V, V, V, split cycle
-    float estimate[13];        // rows of Estimate at its end
-    std::int32_t handed_back;  //   the same
+    float estimate[13];        // rows of Estimate at the period's end
+    std::int32_t handed_back;  // whether the policy had handed back at its end
   };
   struct Update {
     float left_V, right_V;
   };
-  // before the first period
+  // the state before the first period
   std::vector<float> estimator, estimate, feedback;  // rows of Estimator, Estimate and the controller
   std::uint32_t tick = 0, phase = 0;
   std::int32_t handed_back = 0;
   std::int32_t horizon_us = 0, present_us = 0, last_imu_us = 0;
-  std::vector<Increment> ring;  // what has arrived, oldest first: beyond the horizon, and the newest at least
-  // and then
-  std::int32_t first_update_us = 0;  // of the driver
+  std::vector<Increment> ring;  // arrived increments, oldest first: after the horizon, and always the newest
+  // the recording
+  std::int32_t first_update_us = 0;  // time of the driver's first update
   std::vector<Imu> imu;
   std::vector<Frame> frames;
   std::vector<Period> periods;
   std::vector<Update> updates;
 };
 
-/// A flight of the configuration's vehicle under its actor, the nominal one. The hand-back is the estimate's, and the IMU's
-/// latency counts in whole control periods, as on board. Same bytes for any number of threads, on any processor. `begin`:
-/// control periods before the first that is recorded; -1: half of `periods` before the hand-back.
+/// Records a flight of the configuration's nominal vehicle under its actor. As on board, the hand-back is decided by the estimate, and the
+/// IMU's latency is a whole number of control periods. The result is the same to the byte for any number of threads and on any processor. `begin`:
+/// number of control periods before the recording; -1: chosen so that the hand-back is in the middle of the `periods` recorded ones.
 ControllerTrace record_controller(const rollout::FlyConfig& given, int periods = 50, int begin = -1);
 
 }  // namespace flappy::deploy

@@ -12,7 +12,7 @@ namespace {
 
 using flight::Signal;
 
-/// Differences that a test vector may show, of the range of each output.
+/// Largest accepted difference of a test vector, as a share of each output's range.
 constexpr float kTolerance = 1e-5F;
 
 constexpr const char* kSignalType = R"(/* One number of the observation or the action. */
@@ -36,7 +36,7 @@ std::string signals(const std::string& name, const char* count, const std::vecto
   return text + "};\n";
 }
 
-/// The numbers of a network: their declarations, CRC-32 and bytes, in the order in which the C code sums them up.
+/// The numbers of a network: their declarations, CRC-32 and bytes, in the order in which the C code computes the checksum.
 class Numbers {
  public:
   template <class N>
@@ -59,10 +59,10 @@ class Numbers {
   std::size_t bytes_ = 0;
 };
 
-/// What differs between numbers of 32 and of 8 bits.
+/// The differences between headers with numbers of 32 and of 8 bits.
 struct Kind {
   const char *title, *code, *hidden;
-  std::size_t scratch_bytes;  ///< for each neuron of the widest layer
+  std::size_t scratch_bytes;  ///< scratch memory for each neuron of the widest layer
   Numbers numbers;
 };
 

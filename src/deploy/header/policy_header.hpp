@@ -1,4 +1,4 @@
-// The trained actor as one header in C99 that tests itself.
+// Exports the trained actor as one header in C99 that tests itself.
 #pragma once
 
 #include "deploy/header/contract.hpp"
@@ -6,7 +6,7 @@
 
 namespace flappy::deploy {
 
-/// Text of flappy_policy.h: the same bytes for the same arguments. `vectors`: rows of its self-test.
+/// The text of flappy_policy.h, which is the same to the byte for the same arguments. `vectors`: test vectors of its self-test.
 std::string policy_header(const rollout::FlyConfig& config, const policy::RunInfo& run,
                           const policy::PolicyNetwork& network, const policy::PolicyVectors& vectors);
 std::string policy_header(const rollout::FlyConfig& config, const policy::RunInfo& run, const QuantisedNetwork& network,

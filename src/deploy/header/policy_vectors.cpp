@@ -31,7 +31,7 @@ policy::PolicyNetwork network_of(const rollout::FlyConfig& config) {
                           {},
                           {}};
   const auto& k = config.fleet.task.constants;
-  for (int i = 0; i < config.fleet.task.actions(); ++i) {  // as scaled_action() has them
+  for (int i = 0; i < config.fleet.task.actions(); ++i) {  // the same rounding as in scaled_action()
     const auto low = static_cast<float>(k.action_low[i]), high = static_cast<float>(k.action_high[i]);
     n.middle.push_back(static_cast<float>(0.5 * static_cast<double>(low + high)));
     n.half.push_back(static_cast<float>(0.5 * static_cast<double>(high - low)));
@@ -105,7 +105,7 @@ void append(policy::PolicyVectors& to, const policy::PolicyVectors& more) {
 
 policy::PolicyVectors corners(const policy::PolicyNetwork& network, const std::vector<flight::Signal>& observation) {
   policy::PolicyVectors v{network.inputs(), network.outputs(), {}, {}};
-  for (const float reach : {0.0F, 1.0F, 1000.0F, 1e30F})  // of half the range, about its middle
+  for (const float reach : {0.0F, 1.0F, 1000.0F, 1e30F})  // distance from the middle, in units of half the range
     for (unsigned pattern = 0; pattern < 4 && (reach > 0 || pattern == 0); ++pattern)
       for (std::size_t i = 0; i < observation.size(); ++i) {
         const auto middle = static_cast<float>((observation[i].low + observation[i].high) / 2);

@@ -17,10 +17,10 @@ std::int8_t rounded(float x) {
   return static_cast<std::int8_t>(model::nearest(limited));
 }
 
-/// The tanh of the lanes: there a product that meets a sum is fused.
+/// The simulator's tanh, in which a product and a sum are fused.
 float lane_tanh(float x) { return model::tanh(model::Lanes<float, 1>::load(&x)).raw[0]; }
 
-/// Mean square of what 8 bits with this step lose of the values.
+/// Error of rounding and clipping the values to 8 bits with this step, as a mean square.
 double loss(const std::vector<float>& values, double step) {
   double sum = 0;
   for (const float v : values) {
@@ -30,7 +30,7 @@ double loss(const std::vector<float>& values, double step) {
   return sum;
 }
 
-/// The step that loses least: from that which clips nothing down to a third of it.
+/// The step with the smallest loss, from the step that clips nothing down to a third of it.
 double best_step(const std::vector<float>& values) {
   float most = 0;
   for (const float v : values) most = std::max(most, std::abs(v));
@@ -52,7 +52,7 @@ QuantisedNetwork quantise(const policy::PolicyNetwork& n, const std::vector<floa
     throw std::invalid_argument("a network that whole numbers do not hold");
   const bool relu = n.hidden == policy::Activation::relu;
   QuantisedNetwork q{n.widths, relu, n.mean, n.scale, {}, {}, {}, n.middle, n.half};
-  // activations in real numbers; of the inputs, those of each in units of its largest
+  // activations as real numbers; `largest`: largest magnitude of each input
   std::vector<float> values(rows * inputs), largest(inputs, 0);
   for (std::size_t k = 0; k < values.size(); ++k) {
     const std::size_t i = k % inputs;
@@ -63,7 +63,7 @@ QuantisedNetwork quantise(const policy::PolicyNetwork& n, const std::vector<floa
     if (!(largest[i] > 0)) largest[i] = 1;
     q.scale[i] = n.scale[i] * kLargest / largest[i];
   }
-  std::vector<double> step(inputs);  // of each input of the layer
+  std::vector<double> step(inputs);  // resolution of each input of the layer
   for (std::size_t i = 0; i < inputs; ++i) step[i] = largest[i] / kLargest;
 
   const float* weights = n.weights.data();
@@ -82,7 +82,7 @@ QuantisedNetwork quantise(const policy::PolicyNetwork& n, const std::vector<floa
       const float* w = weights + o * (in + 1);
       double most = 0;
       for (std::size_t i = 0; i < in; ++i) most = std::max(most, std::abs(w[1 + i] * step[i]));
-      // of the sum: the weights fill 8 bits, and the bias stays what single precision holds
+      // unit of the sum: the weights fill 8 bits, and the bias stays within what single precision represents
       const double least = std::max(most / static_cast<double>(kLargest), std::abs(w[0]) * 0x1p-22);
       const double unit = least > 0 ? least : 1;
       for (std::size_t i = 0; i < in; ++i) q.weights.push_back(rounded(static_cast<float>(w[1 + i] * step[i] / unit)));

@@ -1,10 +1,10 @@
-// A policy in whole numbers: weights of 8 bits with a scale for each output (symmetric), activations of 8 bits with one scale
+// A policy in integer arithmetic: weights of 8 bits with a scale for each output (symmetric), activations of 8 bits with one scale
 // for each layer, sums of 32 bits.
 //
-//   q0 = round(clamp((observation - mean) scale, +-127))            scale: what flights showed fills the range
+//   q0 = round(clamp((observation - mean) scale, +-127))            scale: the values seen in flight fill the range
 //   sum = bias + W q         y = sum multiplier                     for each output of a layer
 //   q = round(clamp(max(y, 0), 127))   or   round(127 tanh y)       hidden layers: relu, tanh
-//   action = middle + half tanh y                                   the last
+//   action = middle + half tanh y                                   last layer
 #pragma once
 
 #include <cstdint>
@@ -17,20 +17,21 @@ struct QuantisedNetwork {
   std::vector<int> widths;
   bool relu = true;
   std::vector<float> mean, scale;
-  std::vector<std::int8_t> weights;  ///< of each layer: for every output one for each input
-  std::vector<std::int32_t> bias;    ///< of each layer's outputs
-  std::vector<float> multiplier;     ///<   the same
+  std::vector<std::int8_t> weights;  ///< [layer][output][input]
+  std::vector<std::int32_t> bias;    ///< [layer][output]
+  std::vector<float> multiplier;     ///< [layer][output]
   std::vector<float> middle, half;
 
   int inputs() const { return widths.front(); }
   int outputs() const { return widths.back(); }
 };
 
-/// Scales are fitted to `observation`, float[n][inputs]: inputs to the largest values seen, hidden activations to the least
-/// mean square of their rounding and clipping.
+/// Fits the scales to `observation`, float[n][inputs]: those of inputs to the largest values seen, those of hidden activations to the
+/// smallest mean square error of rounding and clipping. Throws std::invalid_argument for layer norm, a linear output, or activations other
+/// than relu and tanh.
 QuantisedNetwork quantise(const policy::PolicyNetwork& network, const std::vector<float>& observation);
 
-/// As the exported C computes it, to the bit.
+/// Evaluates the network exactly as the exported C does, to the bit.
 std::vector<float> evaluate(const QuantisedNetwork& network, const std::vector<float>& observation);
 
 }  // namespace flappy::deploy

@@ -26,7 +26,7 @@ std::vector<fs::path> folders_of_path() {
   return folders;
 }
 
-/// The N of `stem-N`; -1 for other names.
+/// The N in a name `stem-N`; -1 for other names.
 int version_in_name(const std::string& name, const std::string& stem) {
   if (!name.starts_with(stem + "-")) return -1;
   const std::string digits = name.substr(stem.size() + 1);
@@ -34,7 +34,7 @@ int version_in_name(const std::string& name, const std::string& stem) {
   return number ? std::stoi(digits) : -1;
 }
 
-/// Without the folders of file names: "/tmp/x/a.h:3: error" is "a.h:3: error".
+/// A line without the folders of file names: "/tmp/x/a.h:3: error" becomes "a.h:3: error".
 std::string without_folders(const std::string& line) {
   std::istringstream words(line);
   std::string text;

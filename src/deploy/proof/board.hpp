@@ -1,4 +1,4 @@
-// The microcontroller that qemu stands in for, and the compilers of C that may be there or not.
+// A microcontroller emulated by qemu, and C compilers, which may or may not be installed.
 #pragma once
 
 #include <filesystem>
@@ -10,38 +10,38 @@
 
 namespace flappy::deploy {
 
-/// A compiler of some other machine, as Debian has it.
+/// A compiler for another machine, as packaged by Debian.
 struct CrossCompiler {
-  std::string prefix;  ///< "arm-none-eabi-"; gcc and size begin with it
+  std::string prefix;  ///< prefix of its gcc and size, such as "arm-none-eabi-"
   std::string package;
 };
 CrossCompiler arm_compiler();
 CrossCompiler riscv_compiler();
 
-/// Programs of PATH: by its name, and those whose names are `stem` or `stem-12`, the former first.
+/// in_path(): whether PATH has a program of this name. versions_in_path(): the programs `stem` and `stem-12`, the former first.
 bool in_path(const std::string& name);
 std::vector<std::string> versions_in_path(const std::string& stem);
 
-/// The options that the exported headers have to pass without a warning, the includes of `folders` among them.
+/// Compiler options under which the exported headers must give no warning, with `folders` as include folders.
 std::vector<std::string> strict_options(const std::vector<std::filesystem::path>& folders);
-/// Of the output of a compiler, the first complaint, without the names of folders.
+/// The first error in a compiler's output, without the folders of file names.
 std::string first_complaint(const std::string& output);
-/// run() that ends after a minute, with exit code 124.
+/// io::run() with a limit of one minute; exit code 124 at the limit.
 io::Finished run_limited(std::vector<std::string> command, std::string_view input = {});
 void append(std::vector<std::string>& to, const std::vector<std::string>& more);
 
-/// Writes board.h and its sources into a folder; C of one's own is compiled beside them.
+/// Writes board.h and its sources into a folder, where a program's own C files can be compiled with them.
 void write_board(const std::filesystem::path& folder);
-/// "not installed: ..." where a program for the board cannot be compiled or run; otherwise empty.
+/// "not installed: ..." where a program for the board cannot be compiled or run; empty where it can.
 std::string board_missing();
-/// What makes the processor of the board, for the compiler.
+/// The compiler options that select the board's processor.
 std::vector<std::string> board_machine();
-/// The command that makes `program` of `sources` with the files of write_board(folder); `options` come with it.
+/// The command that builds `program` from `sources` and the files of write_board(folder), with additional `options`.
 std::vector<std::string> board_build(const std::filesystem::path& folder,
                                      const std::vector<std::filesystem::path>& sources,
                                      const std::vector<std::string>& options, const std::filesystem::path& program);
-/// The command that runs it: its serial line is stdin and stdout, and it ends with the code of its main(), 3 after a
-/// fault. `count`: its clock counts instructions, one in a nanosecond, instead of following the time of this machine.
+/// The command that runs it: the board's serial line is stdin and stdout; the exit code is that of its main(), or 3 after a
+/// fault. `count`: the board's clock counts instructions, one per nanosecond, instead of following the time of this machine.
 std::vector<std::string> board_run(const std::filesystem::path& program, bool count);
 
 }  // namespace flappy::deploy

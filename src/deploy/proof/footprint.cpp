@@ -1,4 +1,4 @@
-// Sizes as the linker has them, and stacks as the compiler tells them.
+// Footprints: sizes by the linker, stacks by the compiler's call graph.
 #include <algorithm>
 #include <map>
 #include <optional>
@@ -31,7 +31,7 @@ std::vector<Target> targets() {
           {"RV32IMAFC", riscv, {"-march=rv32imafc", "-mabi=ilp32f"}}};
 }
 
-/// Who calls whom, with frames in bytes; gcc's -fcallgraph-info=su, a line for each node and edge.
+/// Call graph with frame sizes in bytes, parsed from gcc's -fcallgraph-info=su, which has a line for each node and edge.
 class CallGraph {
  public:
   explicit CallGraph(const std::string& text) {
@@ -48,8 +48,8 @@ class CallGraph {
     }
   }
 
-  /// Bytes of the deepest path from the function of this name (a static one's title ends with ":name"); nothing for
-  /// recursion. Functions compiled elsewhere take none.
+  /// Stack of the deepest path from the function of this name (the title of a static function ends with ":name"), in
+  /// bytes; nothing for recursion or an unknown name. Functions compiled elsewhere count as 0.
   std::optional<long> deepest(const std::string& name) const {
     for (const auto& [title, bytes] : frame_)
       if (title == name || title.ends_with(":" + name)) return below(title, {});
@@ -86,7 +86,7 @@ struct Built {
   long flash = 0, ram = 0, stack = 0;
 };
 
-/// footprint.c for one target, with `call` as the macro that says what it calls, or empty.
+/// Builds footprint.c for one target; `call` is the macro that selects the function it calls, or empty.
 Built build(const fs::path& headers, const std::string& header, const io::TemporaryFolder& work, const Target& target,
             const std::string& optimisation, const std::string& call) {
   const std::string gcc = target.compiler.prefix + "gcc";
@@ -128,12 +128,12 @@ Built build(const fs::path& headers, const std::string& header, const io::Tempor
 }  // namespace
 
 std::vector<Footprint> footprints(const fs::path& folder, const std::string& header) {
-  io::read_text(folder / header);  // or a complaint that names it
+  io::read_text(folder / header);  // throws where the file is missing
   const fs::path headers = fs::absolute(folder);
   const io::TemporaryFolder work;
   for (const std::string name : {"footprint.c", "memory.c"}) io::write_atomically(work / name, kEmbedded.at(name));
   const std::string stem = header.substr(0, header.rfind('.'));
-  std::vector<std::pair<std::string, std::string>> functions;  // and the macro that makes footprint.c call it
+  std::vector<std::pair<std::string, std::string>> functions;  // name, and the macro that makes footprint.c call it
   const std::string work_of = stem + (stem == "flappy_policy" ? "_step" : "_period");
   functions.emplace_back(work_of, "FOOTPRINT_STEP=" + work_of);
   functions.emplace_back(stem + "_selftest", "FOOTPRINT_SELFTEST=" + stem + "_selftest");

@@ -20,14 +20,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostVectors = 30'000, kInferences = 1'000;
+constexpr std::size_t kMaxVectors = 30'000, kInferences = 1'000;
 
-/// One proof: the headers, the vectors and a folder to compile in.
+/// The inputs of a proof: the headers, the vectors, and a folder to compile in.
 struct Bench {
   const fs::path& headers;
   const policy::PolicyVectors& vectors;
   const io::TemporaryFolder& work;
-  std::size_t count, rounds;  ///< vectors, and how often all of them are flown against the clock
+  std::size_t count, rounds;  ///< number of vectors, and of rounds over all of them that are timed
 
   std::vector<fs::path> sources(const char* board) const {
     std::vector<fs::path> all = {work / "prove.c", work / "again.c"};
@@ -53,7 +53,7 @@ std::vector<std::string> words(const std::string& text) {
   return all;
 }
 
-/// What a compiler says of itself, one line; nothing where it does not run.
+/// The first line of a compiler's answer to an option; empty where it does not run.
 std::string answer(const std::string& compiler, const char* question) {
   std::string out = run_limited({compiler, question}).out;
   return out.substr(0, out.find('\n'));
@@ -77,7 +77,7 @@ Parity missing(const std::string& compiler, const std::string& why_not) {
   return row;
 }
 
-/// Counts the outputs that differ in a bit.
+/// Counts the outputs that differ in any bit.
 void compare(Parity& row, std::span<const float> expected, const char* found) {
   row.outputs = expected.size();
   for (std::size_t i = 0; i < expected.size(); ++i) {
@@ -91,7 +91,7 @@ void compare(Parity& row, std::span<const float> expected, const char* found) {
   }
 }
 
-/// Compiles and runs prove.c, and reads what it writes.
+/// Compiles and runs prove.c, and reads its output into `row`.
 void try_out(Parity& row, const Bench& bench, const std::vector<std::string>& build,
              const std::vector<std::string>& start, bool count) {
   const io::Finished built = run_limited(build);
@@ -102,7 +102,7 @@ void try_out(Parity& row, const Bench& bench, const std::vector<std::string>& bu
   const auto& seen = bench.vectors.observation;
   const io::Finished ran =
       run_limited(start, {reinterpret_cast<const char*>(seen.data()), seen.size() * sizeof(float)});
-  // two codes, two errors, the actions, two times
+  // the output: two codes, two errors, the actions, two times
   std::int32_t code[2];
   float error[2];
   std::uint32_t time_us[2];
@@ -125,7 +125,7 @@ void try_out(Parity& row, const Bench& bench, const std::vector<std::string>& bu
   row.controller_selftest = code[1];
   row.policy_error = static_cast<double>(error[0]);
   row.controller_error = static_cast<double>(error[1]);
-  if (count)  // an instruction takes a nanosecond there
+  if (count)  // the board's clock then advances a nanosecond per instruction
     row.instructions_per_inference = 1000. * (static_cast<double>(time_us[0]) - static_cast<double>(time_us[1])) /
                                      static_cast<double>(bench.count * bench.rounds);
 }
@@ -165,10 +165,10 @@ bool Parity::failed() const {
 
 std::vector<Parity> prove(const fs::path& folder, const policy::PolicyVectors& vectors, Reach reach) {
   const std::size_t count = vectors.action.size() / static_cast<std::size_t>(std::max(1, vectors.outputs));
-  if (count < 1 || count > kMostVectors || vectors.action.size() != count * static_cast<std::size_t>(vectors.outputs) ||
+  if (count < 1 || count > kMaxVectors || vectors.action.size() != count * static_cast<std::size_t>(vectors.outputs) ||
       vectors.observation.size() != count * static_cast<std::size_t>(vectors.inputs))
     throw std::invalid_argument("prove: the vectors do not have the sizes that they say");
-  io::read_text(folder / "flappy_policy.h");  // or a complaint that names it
+  io::read_text(folder / "flappy_policy.h");  // throws where the file is missing
   const fs::path headers = fs::absolute(folder);
   const io::TemporaryFolder work;
   write_board(work.path());
@@ -184,10 +184,10 @@ std::vector<Parity> prove(const fs::path& folder, const policy::PolicyVectors& v
   for (const std::string stem : {"gcc", "clang"}) {
     const std::vector<std::string> names = versions_in_path(stem);
     if (names.empty()) rows.push_back(missing(stem, "not installed: " + stem));
-    std::set<std::string> versions;  // gcc and gcc-12 may be one
+    std::set<std::string> versions;  // gcc and gcc-12 may be the same compiler
     for (const auto& name : names)
       if (versions.insert(row_of(name, "").version).second)
-        // C99 as the standard has it, and as these compilers have it, with contraction
+        // standard C99, and the compiler's default dialect with contraction of products and sums
         for (const char* options : {"-std=c99 -O0", "-std=c99 -O2", "-std=gnu99 -O3 -march=native"})
           rows.push_back(on_this_machine(bench, name, options));
   }

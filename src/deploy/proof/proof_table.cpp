@@ -1,4 +1,4 @@
-// Proofs as text and as JSON.
+// Writes proofs as text and as JSON.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -11,13 +11,13 @@ namespace {
 
 constexpr std::size_t kColumns = 100, kGap = 2;
 
-/// One line; `rest`, where it is not empty, stands instead of all columns from the `from`th on.
+/// One line of a table; a `rest` that is not empty replaces the remaining columns.
 struct Line {
   std::vector<std::string> cells;
   std::string rest;
 };
 
-/// Columns as wide as they need; text to the left, from column `numbers` on to the right.
+/// Aligns the lines: columns as wide as their cells need, text to the left, from column `numbers` on to the right.
 std::string text_of(const std::vector<Line>& lines, std::size_t numbers) {
   std::vector<std::size_t> widths;
   for (const auto& line : lines) {
@@ -46,7 +46,7 @@ std::string short_number(double value) {
   return text.data();
 }
 
-/// "passed", or who did not, with the code.
+/// "passed", or the part that failed with its code.
 std::string selftest_of(const Parity& row) {
   if (row.policy_selftest != 0) return "policy: " + std::to_string(row.policy_selftest);
   if (row.controller_selftest != 0) return "control: " + std::to_string(row.controller_selftest);
@@ -60,7 +60,7 @@ std::string table_of(const std::vector<Parity>& rows) {
   std::string counted;
   for (const auto& row : rows) {
     const std::string compiler = row.compiler + (row.version.empty() ? "" : " " + row.version);
-    // "-std=" goes without saying
+    // leave out "-std=" to save space
     const std::string options = row.options.starts_with("-std=") ? row.options.substr(5) : row.options;
     if (!row.why_not.empty()) {
       lines.push_back({{compiler, row.target, options}, row.why_not});

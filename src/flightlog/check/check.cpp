@@ -16,25 +16,26 @@ void check_stream(const StreamStatistics& s, double flapping_Hz, Findings& findi
   if (!s.declared_hz) return;
   const std::size_t before = findings.size();
   const double interval = 1 / s.rate_hz;
-  // Crystals agree to 1e-4 and a stream's mean rate is exact to 1 / samples: 5 % is another rate, or another unit.
+  // Crystals agree to 1e-4, and a mean rate is exact to 1 / samples: a deviation of 5 % means another rate or another
+  // unit.
   if (std::abs(s.rate_hz / *s.declared_hz - 1) > 0.05)
     warn(format("%.4g samples/s, %.4g declared: thinned out, repeated, or t_s not in seconds", s.rate_hz,
                 *s.declared_hz));
   const double missing = static_cast<double>(s.missing) / static_cast<double>(s.samples + s.missing);
   if (missing > 0.01)
     warn(format("%zu samples missing (%.1f %%), at most 1 %% expected: dropouts", s.missing, 100 * missing));
-  // Three beats unseen cannot be bridged: the body's motion within a beat is not smooth.
+  // Gaps of three beats cannot be interpolated: the motion of the body within a beat is not smooth.
   const double longest_s = std::max(10 * interval, flapping_Hz > 0 ? 3 / flapping_Hz : 0);
   if (s.longest_gap_s > longest_s)
     warn(format("a gap of %.3g s, at most %.3g s expected: lost tracking or a lost link", s.longest_gap_s, longest_s));
-  // Beyond this, samples begin to change places.
+  // Beyond this jitter, samples may change order.
   if (s.jitter_s > 0.3 * interval)
     warn(format("intervals vary by %.2g ms of %.2g ms: arrival times are not evenly spaced; a buffered link?",
                 1e3 * s.jitter_s, 1e3 * interval));
   if (findings.size() == before) findings.push_back({s.name, Verdict::ok, "rate, gaps and intervals as declared", {}});
 }
 
-/// Samples that repeat the one before to the last digit, which noise does not allow.
+/// Warns of samples that repeat the previous one to the last digit, which noise makes impossible.
 void check_repeats(const std::string& name, const std::vector<const Column*>& columns, double noise,
                    Findings& findings) {
   const std::size_t count = columns.front()->size();
@@ -51,7 +52,8 @@ void check_repeats(const std::string& name, const std::vector<const Column*>& co
 }
 
 void check_latencies(const FlightHeader& h, Findings& findings) {
-  // Cameras and radio links take a hundredth of a second; a tenth is three beats of open loop, which nobody flies.
+  // Cameras and radio links need some 0.01 s. With 0.1 s the controller would lag by three beats; no flapper can fly
+  // so.
   constexpr double kLargest_s = 0.1;
   std::string wrong;
   const auto look = [&](const char* key, double value) {
@@ -74,7 +76,7 @@ std::size_t index_before(const std::vector<double>& times, double t) {
 
 std::size_t line_at(const Column& t_s, double after_s) {
   const auto at = std::ranges::lower_bound(t_s, t_s.front() + after_s);
-  // below the line of names, counted from 1
+  // + 2: lines count from 1, and the first holds the names
   return static_cast<std::size_t>(std::min(at, t_s.end() - 1) - t_s.begin()) + 2;
 }
 
@@ -142,7 +144,7 @@ CheckReport check_flight(const FlightLog& log) {
 
 std::vector<CheckReport> check_flights(const std::vector<FlightLog>& logs) {
   std::vector<CheckReport> reports;
-  // Those of one robot: what is driven by other inputs is none of theirs.
+  // Compare only flights with the same inputs: others are of another robot.
   std::map<std::vector<std::string>, std::vector<std::size_t>> of_inputs;
   for (const FlightLog& log : logs) {
     of_inputs[log.header.inputs].push_back(reports.size());

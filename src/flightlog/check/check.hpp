@@ -1,5 +1,5 @@
-// Is a flight log what it declares to be? Rates, dropouts, clocks, axes and units, judged from the log alone: no model
-// of the vehicle, no diagnosis.
+// Checks whether a flight log agrees with its own header: rates, dropouts, clocks, axes and units. The checks use the log alone, no
+// model of the vehicle and no diagnosis.
 #pragma once
 
 #include <string>
@@ -13,18 +13,18 @@ namespace flappy::flightlog {
 
 enum class Verdict { ok, warning, not_tested };
 
-/// Where a fault of the data first shows: a file of the log and its line.
+/// The first place of a fault in the data: a file of the log and its line.
 struct LogPlace {
-  std::string file;  ///< empty: no such fault
+  std::string file;  ///< empty: no fault of the data
   std::size_t line = 2;
 };
 
 struct Finding {
   std::string check;
   Verdict verdict = Verdict::ok;
-  std::string text;  ///< what was seen; of a warning also what was expected and the likely cause
-  std::vector<std::pair<std::string, double>> values;  ///< the figures behind it
-  LogPlace fault = {};  ///< of a warning that forbids a diagnosis: no physics explains it
+  std::string text;  ///< what was seen; in a warning also what was expected and the likely cause
+  std::vector<std::pair<std::string, double>> values;  ///< the numbers on which the verdict rests
+  LogPlace fault = {};  ///< set where a warning forbids a diagnosis, because no physics explains it
 };
 
 struct CheckReport {
@@ -35,7 +35,8 @@ struct CheckReport {
 
 CheckReport check_flight(const FlightLog& log);
 
-/// The same of several flights of one robot, whose declared inputs are also compared with one another.
+/// Checks several flights of one robot, one report for each, and compares the declared inputs of the flights with one
+/// another.
 std::vector<CheckReport> check_flights(const std::vector<FlightLog>& logs);
 
 }  // namespace flappy::flightlog

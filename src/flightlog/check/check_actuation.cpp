@@ -1,4 +1,4 @@
-// Surroundings, voltages, currents and wings.
+// Checks of surroundings, voltages, currents and wings.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -11,7 +11,8 @@ namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
 
-/// Two crystals and a median of interpolated crossings agree far better; 2 % is another frequency.
+/// Two crystals and a median of interpolated crossings agree far better than this; a deviation of 2 % is another
+/// frequency.
 constexpr double kFrequencyTolerance = 0.02;
 
 double rms(const Column& values) {
@@ -20,7 +21,7 @@ double rms(const Column& values) {
   return std::sqrt(sum / static_cast<double>(values.size()));
 }
 
-/// Half the span that holds all but a hundredth of the values at each end.
+/// Half the span of the values without the lowest and highest hundredth.
 double amplitude(Column values) {
   std::ranges::sort(values);
   const std::size_t cut = values.size() / 100;
@@ -33,7 +34,7 @@ double median_interval(const Column& t_s) {
   return io::upper_median(intervals);
 }
 
-/// Amplitude and phase of the wave of the beat in a motor's voltage, and the share of its variance.
+/// Cosine and sine component of the voltage at the phase of the beat, and the share of the variance that they explain.
 struct FittedWave {
   double cosine = 0, sine = 0, explained = 0;
 };
@@ -66,7 +67,7 @@ void check_frequency(const FlightLog& log, Findings& findings) {
   };
   if (per_beat < 4)
     return add_finding(Verdict::not_tested, format("command.csv has %.2g samples a beat, 4 are needed", per_beat));
-  // of both wings together: in a robot that rocks one wave runs through the beat forwards, the other backwards
+  // Use the sum of both sides: in a robot that rolls periodically, the phase of one side advances while the other lags.
   const auto beat = beat_frequency(log.command.t_s, sum_of_voltages(log.command));
   if (!beat) return add_finding(Verdict::not_tested, "fewer than five beats in the voltages");
   const std::string seen = format("voltages beat at %.4g Hz, %.4g Hz declared", *beat, declared);
@@ -81,7 +82,7 @@ void check_phase(const FlightLog& log, Findings& findings) {
   if (!u.phase_rad) return;
   const std::string name = "wing-beat phase";
   const double interval = median_interval(u.t_s), f = log.header.flapping_Hz;
-  // The split cycle shifts left and right apart; their sum keeps the phase.
+  // The split cycle shifts left and right in opposite directions; their sum keeps the phase.
   const Column volts = sum_of_voltages(u);
   const auto add_finding = [&](Verdict verdict, const std::string& text) {
     findings.push_back({name, verdict, text, {}, verdict == Verdict::warning ? LogPlace{kCommand} : LogPlace{}});
@@ -91,7 +92,7 @@ void check_phase(const FlightLog& log, Findings& findings) {
   Column speeds;
   for (std::size_t i = 1; i < volts.size(); ++i)
     speeds.push_back(((*u.phase_rad)[i] - (*u.phase_rad)[i - 1]) / (u.t_s[i] - u.t_s[i - 1]));
-  const double speed = io::upper_median(speeds), ratio = speed / (kTurn * f);  // a wrap is one step of many
+  const double speed = io::upper_median(speeds), ratio = speed / (kTurn * f);  // the median ignores steps that wrap
   if (std::abs(ratio - 1) > kFrequencyTolerance) {
     const auto is = [&](double unit) { return std::abs(ratio / unit - 1) < kFrequencyTolerance; };
     const char* cause = is(360 / kTurn) ? "likely in degrees, not rad"
@@ -101,13 +102,13 @@ void check_phase(const FlightLog& log, Findings& findings) {
                        format("phase_rad advances by %.4g rad/s, %.4g expected: ", speed, kTurn * f) + cause);
   }
   const FittedWave wave = fit_wave(*u.phase_rad, volts);
-  // Changing amplitudes leave most of the variance to the wave; a wrong phase leaves nothing.
+  // With varying amplitude the wave still explains most of the variance; with a wrong phase it explains nothing.
   if (wave.explained < 0.5)
     return add_finding(Verdict::warning,
                        format("phase_rad explains %.0f %% of the voltages, at least 50 %% expected: another clock, "
                               "or an estimate that slipped",
                               100 * std::max(wave.explained, 0.0)));
-  // The voltage is A cos(phase), held for an interval: the driver may take its phase anywhere in it.
+  // The voltage is A cos(phase), held for an interval; the logged phase may be that of any instant in the interval.
   const double offset = std::atan2(wave.sine, wave.cosine), allowed = kTurn * f * interval + 0.1;
   const std::string seen = format("voltages lag phase_rad by %.2f rad, at most %.2f expected", offset, allowed);
   if (std::abs(offset) > allowed)
@@ -127,13 +128,13 @@ void check_inputs(const FlightLog& log, Findings& findings) {
     const double right =
         std::abs(u.right_voltage_V[i] - in.bias_V[i]) - std::abs(in.amplitude_V[i] - in.difference_V[i]);
     const double excess = std::max(left, right);
-    if (excess > 0.01 * std::abs(in.amplitude_V[i]) + 0.02) {  // rounding, and a digit dropped when logging
+    if (excess > 0.01 * std::abs(in.amplitude_V[i]) + 0.02) {  // tolerance for rounded logs
       ++beyond;
       first = std::min(first, i);
     }
     if (excess > worst) worst = excess, worst_t_s = u.t_s[i];
   }
-  // An input that changes within a beat may be logged a sample early or late.
+  // Tolerate 1 %: an input that changes within a beat may be logged one sample early or late.
   const double share = beyond / static_cast<double>(u.t_s.size());
   if (share > 0.01)
     findings.push_back(
@@ -156,7 +157,7 @@ void check_inputs(const FlightLog& log, Findings& findings) {
 void check_space(const FlightLog& log, Findings& findings) {
   const LogAmbient& a = log.header.ambient;
   const MocapStream& m = log.mocap;
-  const double slack = 0.005 + 6 * log.header.mocap.position_noise_m;  // markers are set by hand; 6 sd: one in 1e9
+  const double slack = 0.005 + 6 * log.header.mocap.position_noise_m;  // markers are placed by hand; 6 sd: one in 1e9
   std::vector<std::string> crossed;
   const auto look = [&](const std::string& what, const std::string& cause, const auto& height) {
     double deepest = 0, t_s = 0;
@@ -216,11 +217,11 @@ void check_power(const FlightLog& log, Findings& findings) {
       power += v * (*currents[side])[i], squares += v * v, ++n;
     }
     const double mean = n > 0 ? power / n : 0, current = rms(*currents[side]);
-    // Of noise alone the mean power has this standard deviation.
+    // kSigmas times the standard deviation of the mean power if the current is noise alone.
     const double least = n > 0 ? kSigmas * h.current_noise_A * std::sqrt(squares) / n : 0;
     const std::string figures = format("%.3g W on average, %.3g A rms", mean, current);
     const std::vector<std::pair<std::string, double>> values = {{"mean_power_W", mean}, {"current_rms_A", current}};
-    // A motor that lifts 6 g draws below an ampere.
+    // A motor for 6 g of lift draws less than 1 A.
     if (current > 10)
       findings.push_back({name, Verdict::warning, figures + ", below 10 A expected: likely in mA", values, {kPower}});
     else if (mean < -least)
@@ -242,7 +243,7 @@ void check_wings(const FlightLog& log, Findings& findings) {
     const double a = amplitude(angles), noise = log.header.wings->noise_rad;
     const std::string seen = format("amplitude %.3g rad", a);
     const std::vector<std::pair<std::string, double>> values = {{"amplitude_rad", a}};
-    // Stops hold strokes within 1.7 rad and rotations within 1.5.
+    // Stops limit strokes to 1.7 rad and rotations to 1.5 rad.
     if (a > std::numbers::pi)
       findings.push_back(
           {name, Verdict::warning, seen + ", below 1.8 rad expected: likely in degrees", values, {kWings}});

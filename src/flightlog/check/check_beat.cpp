@@ -1,4 +1,5 @@
-// What shakes, flows and strokes does so at the beat of the voltages, whatever the vehicle: where it does not, a clock is wrong.
+// In every vehicle, vibration, currents and strokes have the beat frequency of the voltages. A stream with another frequency has a wrong
+// clock.
 #include <cmath>
 #include <complex>
 #include <numbers>
@@ -10,9 +11,9 @@ namespace {
 
 using Phasor = std::complex<double>;
 
-constexpr int kBeats = 4;  ///< of a phasor; a beat that is off by an eighth turns half round meanwhile
+constexpr int kBeats = 4;  ///< beats in one phasor; a frequency error of 1/8 turns the phase by half a turn in them
 
-/// What a column has of a wave of `turn_rad_s`, for one stretch of whole beats after another.
+/// Complex amplitude of a column at the angular frequency `turn_rad_s`, for successive stretches of kBeats beats.
 std::vector<Phasor> phasors(const Column& t_s, const Column& values, double turn_rad_s) {
   const double stretch_s = kBeats * 2 * std::numbers::pi / turn_rad_s;
   std::vector<Phasor> list;
@@ -31,7 +32,8 @@ std::vector<Phasor> phasors(const Column& t_s, const Column& values, double turn
   return list;
 }
 
-/// How the wave in all of these columns turns from stretch to stretch, beyond `turn_rad_s`, and how steadily: 1 without noise.
+/// Angular frequency of the columns' common wave beyond `turn_rad_s`, from the phase change between stretches; `steady`
+/// is 1 without noise.
 struct PhasorTurn {
   double rad_s = 0, steady = 0;
 };
@@ -47,10 +49,10 @@ PhasorTurn turn_of(const Column& t_s, const std::vector<const Column*>& columns,
   return {std::arg(sum) * turn_rad_s / (2 * std::numbers::pi * kBeats), size > 0 ? std::abs(sum) / size : 0};
 }
 
-/// One stream against the voltages, whose own wave turns by `volts_rad_s`.
+/// Compares the beat frequency of one stream with that of the voltages, turn_rad_s + volts_rad_s.
 Finding compare(const std::string& name, const Column& t_s, const std::vector<const Column*>& columns,
                 double turn_rad_s, double volts_rad_s) {
-  // Changing inputs move the phase of what is felt by tenths of a radian, once over a flight of at least sixty beats.
+  // Changing inputs move the phase of the measured wave by tenths of a radian once in a flight: allow 0.18 beats.
   constexpr double kAllowed = 1e-3, kAllowedBeats = 0.18;
   const double duration_s = t_s.back() - t_s.front(), beat_s = 2 * std::numbers::pi / turn_rad_s;
   const double allowed = std::max(kAllowed, kAllowedBeats * beat_s / duration_s);
@@ -80,7 +82,8 @@ void check_beat(const FlightLog& log, Findings& findings) {
       findings.push_back({name, Verdict::not_tested, "fewer than five beats in the voltages, or not steady", {}});
     else findings.push_back(compare(name, t_s, columns, turn_rad_s, volts.rad_s));
   };
-  // Gyro and accelerometer shake by some rad/s and m/s^2 alike; units that are wrong leave their phases right.
+  // Gyro and accelerometer oscillate by similar numbers of rad/s and m/s^2, so they can be mixed; a wrong unit keeps
+  // the phases.
   const ImuStream& s = log.imu;
   look("imu beat", s.t_s,
        {&s.gyro_x_rad_s, &s.gyro_y_rad_s, &s.gyro_z_rad_s, &s.accel_x_m_s2, &s.accel_y_m_s2, &s.accel_z_m_s2});

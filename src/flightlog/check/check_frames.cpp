@@ -1,5 +1,5 @@
-// Attitude, accelerometer and positions against one another, and against a second estimator's attitude, where inputs are declared: of
-// such robots often neither gyro nor a model says which way an angle was meant.
+// Compares attitude, accelerometer and positions with one another and with a second estimator's attitude, for logs with declared inputs:
+// such robots often have neither a gyro nor a model that would determine the convention of an angle.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -25,14 +25,15 @@ Quaterniond from(const Angles& a) {
          Eigen::AngleAxisd(a.roll, Vector3d::UnitX());
 }
 
-/// A way in which an attitude may have been meant, or an accelerometer been mounted.
+/// A convention of the attitude, or a mounting of the accelerometer.
 struct Frames {
   std::string text;
   std::function<Quaterniond(const Quaterniond&)> attitude;
   Matrix3d accel = Matrix3d::Identity();
 };
 
-/// As declared first, then mistakes that people make, the likelier ones first; those of the accelerometer from `accel` on.
+/// The declared convention first, then common mistakes, the likelier ones first; index `accel` begins those of the
+/// accelerometer.
 struct Hypotheses {
   std::vector<Frames> all;
   std::size_t accel;
@@ -76,7 +77,7 @@ Hypotheses hypotheses() {
                       }),
                       one});
   const std::size_t accel = list.size();
-  // Whether z is what it is said to be, gravity tells.
+  // Only mountings with the right z axis: gravity decides about z.
   for (const Matrix3d& m : signed_permutations())
     if (m(2, 2) == 1 && !m.isIdentity()) {
       std::string text =
@@ -91,13 +92,13 @@ Hypotheses hypotheses() {
   return {std::move(list), accel};
 }
 
-// ---- by the motion
+// ---- by accelerations
 
-/// What positions did over some time, and which samples of the IMU felt it, at what attitude.
+/// Acceleration from positions over some time, and the samples of the IMU in that time.
 struct Shove {
-  Vector3d force_m_s2;  ///< mean specific force in W: acceleration and what gravity takes away
+  Vector3d force_m_s2;  ///< mean specific force in W: acceleration less gravity
   std::vector<std::size_t> samples;
-  std::vector<double> weights;  ///< of the samples; their sum is 1
+  std::vector<double> weights;  ///< weights of the samples, with sum 1
 };
 
 struct Shoves {
@@ -105,7 +106,8 @@ struct Shoves {
   std::vector<Quaterniond> attitude;  ///< as logged, at each sample of the IMU
 };
 
-/// Second differences of the position over a time weight the acceleration with a triangle of twice that.
+/// Second differences of the position over span_s equal the mean acceleration with triangular weights of width 2
+/// span_s.
 Shoves shoves_of(const Context& c) {
   const FlightHeader& h = c.log.header;
   const double span_s = h.flapping_Hz > 0 ? std::max(std::round(0.2 * h.flapping_Hz), 1.0) / h.flapping_Hz : 0.2;
@@ -139,7 +141,7 @@ Shoves shoves_of(const Context& c) {
   return s;
 }
 
-/// Mean square of what positions do beyond what the accelerometer felt, once a constant is taken off.
+/// Mean square of the specific force from positions less that from the accelerometer, less a constant.
 double remainder(const Context& c, const Shoves& shoves, const Frames& frames, double unit) {
   std::vector<Vector3d> felt(shoves.attitude.size());
   for (std::size_t k = 0; k < felt.size(); ++k)
@@ -156,7 +158,8 @@ double remainder(const Context& c, const Shoves& shoves, const Frames& frames, d
   return squares - mean.squaredNorm();
 }
 
-/// Leaves the way in which the attitude was meant, and the accelerometer's axes. Whether an attitude was misunderstood.
+/// Finds the convention of the attitude and the axes of the accelerometer; sets accel_axes. Returns the convention
+/// where it is not the declared one, else null.
 const Frames* check_axes(Context& c, const Hypotheses& h) {
   const auto not_tested = [&](const std::string& why) {
     c.add_finding("axes", Verdict::not_tested, why);
@@ -164,12 +167,12 @@ const Frames* check_axes(Context& c, const Hypotheses& h) {
   };
   if (c.motion.imu_t_s().empty()) return not_tested("there is no imu.csv");
   const Shoves shoves = shoves_of(c);
-  constexpr std::size_t kLeast = 20;
-  if (shoves.list.size() < kLeast) return not_tested("too short, or too many gaps");
-  // What is in g is found out by gravity, and must not hide what else is wrong.
+  constexpr std::size_t kMin = 20;
+  if (shoves.list.size() < kMin) return not_tested("too short, or too many gaps");
+  // An accelerometer in g is reported by the check of gravity; here it must not hide other mistakes.
   Vector3d mean = Vector3d::Zero();
   for (const Vector3d& f : c.motion.accel_m_s2()) mean += f / static_cast<double>(c.motion.accel_m_s2().size());
-  // What is not up at all, the mean alone says better.
+  // A wrong z axis is reported by the check of gravity, from the mean alone.
   if (mean.z() < 0.5 * mean.norm()) return not_tested("the accelerometer's +z is not up");
   const double gravity = c.log.header.gravity_m_s2;
   const bool in_g = gravity > 5 && mean.norm() > 0.7 && mean.norm() < 1.3;
@@ -178,7 +181,7 @@ const Frames* check_axes(Context& c, const Hypotheses& h) {
   const Values values = {{"remainder_m_s2", std::sqrt(left[0])},
                          {"pitch_inverted_m_s2", std::sqrt(left[1])},
                          {"roll_inverted_m_s2", std::sqrt(left[2])}};
-  // Noise and lever arms leave the same to all; half of it is far beyond what they differ by over so many windows.
+  // Noise and lever arms leave the same remainder in all hypotheses; over so many windows, chance never halves it.
   constexpr double kFar = 0.5, kNear = 1.2, kTells = 1.5;
   const double least = *std::ranges::min_element(left);
   const std::string seen =
@@ -203,7 +206,7 @@ const Frames* check_axes(Context& c, const Hypotheses& h) {
 
 // ---- by a second estimator
 
-/// Of both, where both have an attitude; mocap's as it was meant.
+/// Attitudes of both estimators at one instant; mocap's after conversion to the declared convention.
 struct Pair {
   Quaterniond mocap, other;
 };
@@ -217,7 +220,8 @@ std::vector<Pair> pairs_of(const FlightLog& log, const Frames& meant) {
   return pairs;
 }
 
-/// The usual angle between where one and the other have up in the body, which no offset of yaw changes, beyond a mounting's.
+/// Median angle between the up directions of both estimators in the body, less the constant angle of a mounting. It
+/// does not depend on a yaw offset.
 double usual_difference(const std::vector<Pair>& pairs) {
   std::array<std::vector<double>, 3> offset;
   std::vector<Vector3d> differences;
@@ -231,7 +235,7 @@ double usual_difference(const std::vector<Pair>& pairs) {
   return io::median(angles);
 }
 
-/// Whether both have up where they say.
+/// Compares the tilt of mocap and of the second estimator; true where they agree or there is no second one.
 bool check_second(Context& c, const Hypotheses& h, const Frames* meant, bool mocap_is_right) {
   if (!c.log.attitude) return true;
   const std::string name = "attitude";
@@ -247,9 +251,10 @@ bool check_second(Context& c, const Hypotheses& h, const Frames* meant, bool moc
     if (const double d = usual_difference(pairs_of(c.log, h.all[i])); d < 0.999 * least) best = i, least = d;
   const Values values = {{"tilt_difference_rad", usual}};
   const std::string seen = format("tilt usually differs by %.2g deg from attitude.csv", usual / kDegree);
-  // Two estimators of one motion agree far better than with one of them mirrored, whenever there is tilt of some degrees.
-  constexpr double kLeast_rad = 2 * kDegree;
-  const bool mirrored = least < 0.5 * usual && usual > kLeast_rad, apart = usual > 10 * kDegree;
+  // With some degrees of tilt, two estimators of one motion agree far better as declared than with one of them
+  // mirrored.
+  constexpr double kMin_rad = 2 * kDegree;
+  const bool mirrored = least < 0.5 * usual && usual > kMin_rad, apart = usual > 10 * kDegree;
   if (mirrored)
     c.add_finding(
         name, Verdict::warning,
@@ -264,8 +269,8 @@ bool check_second(Context& c, const Hypotheses& h, const Frames* meant, bool moc
 
 // ---- markers
 
-/// At most so many poses can be swapped, or frozen: what is between them is then a guess.
-constexpr double kMostLost = 0.2;
+/// Largest share of poses that may be swapped or frozen; beyond it, interpolation between the rest is a guess.
+constexpr double kMaxLost = 0.2;
 
 void check_swapped(Context& c, bool understood) {
   if (!understood) return c.add_finding("markers", Verdict::not_tested, "needs attitudes that are understood");
@@ -288,7 +293,7 @@ void check_swapped(Context& c, bool understood) {
       format("%zu of %zu poses (%.2g %%), up to %zu in a row, leap%s, from %.6g s on: markers taken for others", count,
              n, 100 * share, longest, c.log.attitude ? " or are turned against attitude.csv" : "",
              c.log.mocap.t_s[first]),
-      values, share > kMostLost ? LogPlace{kMocap, first + 2} : LogPlace{});
+      values, share > kMaxLost ? LogPlace{kMocap, first + 2} : LogPlace{});
 }
 
 void check_frozen(Context& c) {
@@ -307,11 +312,11 @@ void check_frozen(Context& c) {
     const Values values = {{"repeats", static_cast<double>(count)}, {"longest", static_cast<double>(longest)}};
     const std::string seen =
         format("%zu of %zu samples repeat the one before, up to %zu in a row", count, t_s.size(), longest);
-    // One or two may be a table filled up at another rate.
+    // One or two repeats in a row may come from resampling to another rate.
     if (share > 0.01 || longest > 2)
       c.add_finding(stream + " frozen", Verdict::warning,
                     seen + format(", from %.6g s on: tracking lost, or written faster than measured", t_s[first]),
-                    values, share > kMostLost ? LogPlace{file, first + 2} : LogPlace{});
+                    values, share > kMaxLost ? LogPlace{file, first + 2} : LogPlace{});
     else c.add_finding(stream + " frozen", Verdict::ok, seen, values);
   };
   const FlightLog& log = c.log;

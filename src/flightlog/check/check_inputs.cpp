@@ -1,4 +1,4 @@
-// Declared inputs: what they mean no check knows, but that they mean the same all the time, and in all flights of a robot.
+// Checks of declared inputs. Their meaning is unknown, but it must be the same during a flight and in all flights of a robot.
 #include <algorithm>
 #include <cmath>
 
@@ -8,7 +8,7 @@
 namespace flappy::flightlog {
 namespace {
 
-/// Middle, and how far nine tenths reach.
+/// Median, and the span between the 5 % and the 95 % quantile.
 struct Level {
   double middle = 0, spread = 0;
 };
@@ -17,7 +17,7 @@ Level level_of(const Column& values) {
   return {io::median(values), io::quantile(values, 0.95) - io::quantile(values, 0.05)};
 }
 
-/// Of an input in a flight: as a whole, and in each of equal parts of its samples.
+/// Level of an input in the whole flight and in each of kParts equal parts of its samples.
 struct Levels {
   Level all;
   std::vector<Level> parts;
@@ -36,11 +36,12 @@ Levels levels_of(const Column& values) {
   return levels;
 }
 
-/// A robot of a weight is carried by the same inputs in all its flights, but for battery, wear and wind, and for manoeuvres in a part
-/// of one; units differ by more. What is about 0 may well be used more in one flight than in another.
+/// Largest plausible ratios: of a flight's level, of a part's level, of the spread. A robot of constant weight needs
+/// about the same inputs in all flights; battery, wear and wind change the level somewhat, and manoeuvres change it in
+/// a part. Another unit changes it more. Inputs about 0 have no level, and their spread varies more between flights.
 constexpr double kOtherLevel = 1.5, kOtherPart = 2, kOtherSpread = 5;
 
-/// Whether a middle is far above what the input does beside it, so that it tells the scale.
+/// Whether the median exceeds the spread, so that it shows the scale of the input.
 bool has_level(const Level& usual) { return std::abs(usual.middle) > usual.spread; }
 
 double ratio(double value, double usual) { return usual != 0 ? value / usual : value != 0 ? INFINITY : 1; }
@@ -58,7 +59,7 @@ Level usual_of(const std::vector<Levels>& flights) {
 
 std::string check_of(const std::string& input) { return "input " + input; }
 
-/// What is odd of a flight beside the usual of several; empty: nothing.
+/// Describes how a flight deviates from the usual level of several flights; empty: it does not.
 std::string oddity(const Levels& flight, const Level& usual) {
   const auto odd = [&](const char* where, double value, double expected) {
     return format("%s%.4g, %.4g usual in these flights (%.3g x): a column in another scale", where, value, expected,
@@ -74,7 +75,7 @@ std::string oddity(const Levels& flight, const Level& usual) {
   return "";
 }
 
-/// A scale that changes within a flight; empty: none does. Only of an input that stands at a level all the time.
+/// Describes a scale that changes within a flight; empty: none. Tests only inputs that have a level in all parts.
 std::string change_of_scale(const Levels& flight) {
   for (std::size_t k = 0; k < flight.parts.size(); ++k)
     if (!has_level(flight.parts[k])) return "";
@@ -85,7 +86,7 @@ std::string change_of_scale(const Levels& flight) {
   return "";
 }
 
-/// Means over 0.2 s: what a controller asks for faster than that is noise.
+/// Means over 0.2 s: faster changes of a controller's commands are noise.
 Column slow(const Column& t_s, const Column& values) {
   constexpr double kSlow_s = 0.2;
   const double per_s = static_cast<double>(t_s.size() - 1) / (t_s.back() - t_s.front());
@@ -103,7 +104,8 @@ double correlation(const Column& a, const Column& b) {
   return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : 0;
 }
 
-/// How two inputs go along with one another depends on what is flown, but not so much.
+/// Largest plausible difference of a correlation from the median of the flights. Correlations depend on the manoeuvres,
+/// but less.
 constexpr double kOtherCorrelation = 0.8;
 
 Finding dead(const std::string& input, double value) {
@@ -141,7 +143,7 @@ void compare_inputs(const std::vector<const FlightLog*>& logs, const std::vector
     for (std::size_t i = 0; i < logs.size(); ++i) {
       Finding& own = *std::ranges::find(*findings[i], check_of(inputs[k]), &Finding::check);
       const std::string odd = oddity(flights[i], usual);
-      // Of two that differ nobody knows which is right.
+      // With only two flights it is unknown which one is right, so no fault is set.
       if (!odd.empty() && own.verdict == Verdict::ok)
         own = {own.check, Verdict::warning, odd, own.values, logs.size() > 2 ? LogPlace{kCommand} : LogPlace{}};
     }

@@ -1,5 +1,5 @@
-// Gyro, attitude, accelerometer and position against one another: they saw one motion, so what one says of it the others
-// must. Noise is as declared; a mistake of axes, units or clocks is much larger.
+// Compares gyro, attitude, accelerometer and position: they measured one motion, so they must agree within the declared noise. Mistakes
+// of axes, units or clocks are much larger.
 #include "flightlog/check/check_motion.hpp"
 
 #include <algorithm>
@@ -10,10 +10,11 @@
 namespace flappy::flightlog {
 namespace {
 
-/// Of a robot without wings: windows of 0.2 s, in which it turns by more than motion capture wanders.
+/// Replaces the beat frequency for a robot without wings: windows of 0.2 s, in which it turns by more than motion
+/// capture drifts.
 constexpr double kUnflapped_Hz = 5;
 
-/// What a second estimator says that motion capture did not see is none of the motion.
+/// The motion without poses whose markers were swapped, where a second estimator can show that.
 SensorMotion motion_of(const FlightLog& log) {
   if (!log.attitude) return SensorMotion(log);
   const std::vector<char> swapped = swapped_poses(log);
@@ -32,7 +33,8 @@ SensorMotion motion_of(const FlightLog& log) {
 
 void check_motion(const FlightLog& log, Findings& findings) {
   const FlightHeader& h = log.header;
-  // Whole beats, in which what the beat shakes averages out; about 50 ms, and two samples of mocap or more.
+  // Windows of whole beats, in which the oscillation of the beat averages out: about 50 ms, and at least 2.5 intervals
+  // of mocap.
   const double per_s = h.flapping_Hz > 0 ? h.flapping_Hz : kUnflapped_Hz;
   const double window_s = std::max(std::round(0.05 * per_s), std::ceil(2.5 / h.mocap.rate_hz * per_s)) / per_s;
   Context c{log, findings, motion_of(log), {}, std::max(window_s, 1 / per_s), 0, 0, {}, {}};
@@ -40,8 +42,9 @@ void check_motion(const FlightLog& log, Findings& findings) {
   double squares = 0;
   for (const BeatWindow& w : c.windows)
     squares += w.rate_rad_s[0].squaredNorm() / static_cast<double>(c.windows.size());
-  // Two attitudes a window apart; how far the body turns while arrival times jitter; and what interpolation between two
-  // samples misses, a quarter of what it misses across a third one, noise sqrt(1.5) of one taken off.
+  // Noise of a window's rate: noise of two attitudes; turning of the body during the jitter of arrival times; and the
+  // error of interpolating between two samples. That is a quarter of the error across a third sample (roughness_rad()),
+  // which also contains noise of sqrt(1.5) times that of one attitude.
   const auto jitter_of = [](const Column& t_s) {
     return t_s.empty() ? 0 : stream_statistics("", t_s, std::nullopt).jitter_s;
   };

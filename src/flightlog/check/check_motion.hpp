@@ -1,4 +1,4 @@
-// The parts of check_motion(), and what one finds out and the next needs.
+// The parts of check_motion(), and the context in which each part leaves results for the next.
 #pragma once
 
 #include <numbers>
@@ -19,11 +19,11 @@ struct Context {
   SensorMotion motion;
   std::vector<BeatWindow> windows;
   double window_s;
-  double rate_noise;  ///< rad/s, of a window's mean rate, from mocap
-  double gyro_noise;  ///< rad/s, of a window's mean rate, from the gyro
-  SensorFrame frame;  ///< as found; as declared where that fits or nothing was found
+  double rate_noise;  ///< standard deviation of a window's mean rate from mocap, rad/s
+  double gyro_noise;  ///< standard deviation of a window's mean rate from the gyro, rad/s
+  SensorFrame frame;  ///< the frame found; the declared one where it fits or none was found
   Lag lag;
-  Matrix3d accel_axes = Matrix3d::Identity();  ///< the accelerometer's, where they are others than declared
+  Matrix3d accel_axes = Matrix3d::Identity();  ///< axes found for the accelerometer: columns to body
 
   void add_finding(const std::string& check, Verdict verdict, const std::string& text, Values values = {},
                    LogPlace fault = {}) {
@@ -31,12 +31,12 @@ struct Context {
   }
 };
 
-/// Attitude, accelerometer, positions and a second estimator, where inputs are declared; leaves accel_axes. False where the attitude
-/// was meant otherwise.
+/// For logs with declared inputs: compares attitude, accelerometer, positions and a second estimator with one another;
+/// sets accel_axes. Returns false where the attitude follows another convention than declared.
 bool check_frames(Context& c);
-/// Clock and gyro against the attitude; leaves frame and lag.
+/// Compares the gyro and its clock with the attitude; sets frame and lag.
 void check_rotation(Context& c);
-/// Accelerometer and position, by the attitude as it was understood.
+/// Compares accelerometer and position, using the attitude, frame and lag found before.
 void check_translation(Context& c);
 
 }  // namespace flappy::flightlog

@@ -9,7 +9,7 @@
 
 namespace flappy::flightlog {
 
-/// What a deviation must exceed to be no accident, in standard deviations: one in 16,000.
+/// A deviation beyond this many standard deviations is significant: noise exceeds it once in 16,000.
 inline constexpr double kSigmas = 4;
 
 using io::format;
@@ -17,31 +17,31 @@ using log_file::kAttitude, log_file::kCommand, log_file::kImu, log_file::kMocap,
 
 using Findings = std::vector<Finding>;
 
-/// Index of the last time not after t; times.size() where there is none.
+/// Index of the last time not after t; times.size() if all are after it.
 std::size_t index_before(const std::vector<double>& times, double t);
 
-/// The line of a stream's file at a time since its first sample.
+/// Line in a stream's file of the first sample at least `after_s` after the first one; else its last line.
 std::size_t line_at(const Column& t_s, double after_s);
 
-/// Rate of rises through the mean, from the median of the time between them; nothing with fewer than five.
+/// Frequency, Hz, from the median time between upward crossings of the mean; nothing with fewer than five crossings.
 std::optional<double> beat_frequency(const Column& t_s, const Column& values);
 
-/// Gyro, attitude, accelerometer, position and their clocks.
+/// Compares gyro, attitude, accelerometer, position and their clocks with one another.
 void check_motion(const FlightLog& log, Findings& findings);
-/// Positions against the ground, the ceiling and the walls.
+/// Compares positions with the ground, the ceiling and the walls.
 void check_space(const FlightLog& log, Findings& findings);
-/// The beat of the other streams against that of the voltages: their clocks.
+/// Compares the beat frequency of IMU, power and wings with that of the voltages: a difference shows a wrong clock.
 void check_beat(const FlightLog& log, Findings& findings);
-/// Voltages against the frequency, inputs and phase of the beat.
+/// Compares the voltages with the declared frequency and with the logged inputs and phase of the beat.
 void check_command(const FlightLog& log, Findings& findings);
-/// Declared inputs, each against itself over the flight; a finding for each, "input NAME".
+/// Checks that each declared input keeps its meaning over the flight; adds one finding for each, "input NAME".
 void check_inputs_apart(const FlightLog& log, Findings& findings);
-/// The same inputs of several flights against one another, in those findings.
+/// Compares the levels of each input between flights; changes the findings of check_inputs_apart().
 void compare_inputs(const std::vector<const FlightLog*>& logs, const std::vector<Findings*>& findings);
-/// How they go along with one another, of three flights or more.
+/// Compares the correlations between inputs across three flights or more; changes the same findings.
 void compare_correlations(const std::vector<const FlightLog*>& logs, const std::vector<Findings*>& findings);
-/// The middle of the window after the one at `middle_s`, of windows side by side, `span_s` each. A gap in `t_s` of more than a thousand windows is passed over
-/// at once: no work grows with its length.
+/// The middle of the window that follows the one at `middle_s`; windows adjoin and last `span_s`. A gap in `t_s` of
+/// more than a thousand windows is skipped in one step, so that the work does not grow with the length of a gap.
 double next_window(const Column& t_s, double middle_s, double span_s);
 void check_power(const FlightLog& log, Findings& findings);
 void check_wings(const FlightLog& log, Findings& findings);

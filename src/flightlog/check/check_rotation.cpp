@@ -39,21 +39,21 @@ std::string describe_axes(const std::string& sensor, const Matrix3d& axes) {
 
 // ---- the clock
 
-/// Delays up to this are an effect that a diagnosis finds (mocap_delay, 0.02 s); beyond it clocks are apart.
+/// Delays up to this are an effect that a diagnosis finds (mocap_delay, 0.02 s); beyond it the clocks are wrong.
 constexpr double kLargestDelay_s = 0.03;
-/// Of logs with declared inputs, of which means over beats and some Hz are used, much less.
+/// Largest delay for logs with declared inputs: a diagnosis uses only beat-averaged motion of some Hz, which tolerates more.
 constexpr double kLargestSlowDelay_s = 0.1;
-/// Crystals agree to 1e-4; beyond ten times that a clock is wrong.
+/// Crystals agree to 1e-4; a clock with ten times that drift is wrong.
 constexpr double kLargestDrift = 1e-3;
 
-/// The whole lag at `start`'s middle, from a first one.
+/// Refines a first estimate; returns the total lag at the middle of `start`.
 std::optional<LagEstimate> refine_from(const Context& c, const std::vector<BeatWindow>& windows, const Lag& start) {
   auto lag = refine_lag(c.motion, windows, c.frame, start, c.rate_noise);
   if (lag) lag->value += start.at_middle_s;
   return lag;
 }
 
-/// Whether the gyro's clock could be told against mocap's; leaves lag and frame.
+/// Estimates the lag of the gyro's clock behind mocap's; sets lag and frame. False where it cannot be estimated.
 bool check_clock(Context& c) {
   const ImuHeader& imu = c.log.header.imu;
   const auto not_tested = [&](const std::string& why) {
@@ -63,11 +63,11 @@ bool check_clock(Context& c) {
   if (c.windows.size() < 20) return not_tested("too short, or too many gaps");
   const Pairs here = pair_up(c.motion, c.windows, Order::wxyz, {});
   if (here.mocap.size() < 20) return not_tested("mocap and gyro have too little time in common");
-  // The mean of N windows is known to noise / sqrt(N); motion of a few times the noise of one is seen in any case.
+  // Rotation is visible if its spread exceeds three times the noise of one window.
   const double mocap = spread(here.mocap), gyro = spread(here.gyro);
   const bool mocap_turns = mocap > 3 * std::sqrt(3.0) * c.rate_noise,
              gyro_turns = gyro > 3 * std::sqrt(3.0) * c.gyro_noise;
-  // Where only one of them moves, it must do so by far more than its noise to be believed.
+  // If only one of them turns, its rotation must exceed the noise by far.
   if (!(mocap_turns && gyro_turns) && std::max(mocap / c.rate_noise, gyro / c.gyro_noise) < 50)
     return not_tested("too little rotation");
   const std::size_t third = c.windows.size() / 3;
@@ -75,8 +75,8 @@ bool check_clock(Context& c) {
   const std::vector<BeatWindow> end(c.windows.end() - static_cast<std::ptrdiff_t>(third), c.windows.end());
   auto sync = find_lag(c.motion, c.windows);
   auto early = find_lag(c.motion, beginning), late = find_lag(c.motion, end);
-  // Noise alone takes the correlation of one motion with itself down to this; three quarters of it are left for clocks
-  // whose lag changes in the flight.
+  // Noise reduces the correlation of mocap and gyro to this value even if they see one motion; a further quarter allows
+  // for a lag that changes in the flight.
   const double noise_share = 3 * c.rate_noise * c.rate_noise / (mocap * mocap);
   const double least = 0.75 * std::sqrt(std::max(1 - noise_share, 0.1));
   const auto alike = [&](const std::optional<Sync>& s) { return s && s->correlation >= least; };
@@ -102,7 +102,8 @@ bool check_clock(Context& c) {
                end_s = c.windows[c.windows.size() - 1 - third / 2].middle_s();
   const auto noticed_s = [&] { return 1e-3 + kSigmas * std::hypot(first->sd, last->sd); };
   const bool drifts = first && last && std::abs(last->value - first->value) > noticed_s();
-  // A line through both, then both once more: a lag that changes within a third blurs it.
+  // Fit a line through the lags of the first and last third, then refine both: a lag that changes within a third blurs
+  // it.
   for (int pass = 0; pass < 2 && drifts; ++pass) {
     c.lag = {begin_s, first->value, (last->value - first->value) / (end_s - begin_s)};
     const auto nearer = refine_from(c, beginning, c.lag), nearer_last = refine_from(c, end, c.lag);
@@ -114,8 +115,9 @@ bool check_clock(Context& c) {
   if (!lag || (lag->sd > 0.0025 && !drifts)) return not_tested("too little rotation");
   if (!drifts) c.lag = {0, lag->value, 0};
 
-  // A first-order low-pass delays slow motion by 1 / (2 pi bandwidth). Whether the declared latency has it in, and of
-  // which order the filter is, the log does not say: from nothing to twice that. 0.5 ms more for how samples are stamped.
+  // A first-order low-pass delays slow motion by 1 / (2 pi bandwidth). The log does not say whether the declared
+  // latency includes this delay nor which order the filter has, so 0 to twice the delay is accepted, and 0.5 ms for the
+  // way samples are stamped.
   const double filter_s = 1 / (2 * std::numbers::pi * imu.bandwidth_hz),
                allowed_s = filter_s + kSigmas * lag->sd + 5e-4;
   const double declared_s = imu.latency_s - c.log.header.mocap.latency_s;
@@ -134,7 +136,7 @@ bool check_clock(Context& c) {
       {{"lag_s", lag->value}, {"lag_sd_s", lag->sd}, {"correlation", sync->correlation}},
       off_s > allowed_s + (slow ? kLargestSlowDelay_s : kLargestDelay_s) && !runs_off ? LogPlace{kImu} : LogPlace{});
 
-  // A millisecond over a flight is a fifth of a radian of the beat, which no check here minds.
+  // A lag that changes by a millisecond in a flight is a fifth of a radian of the beat, which no check here notices.
   if (!drifts && (!first || !last || std::hypot(first->sd, last->sd) > 0.0025)) {
     c.add_finding("clock speed", Verdict::not_tested, "too short, or too little rotation at the beginning or the end");
     return true;
@@ -156,7 +158,7 @@ struct FrameHypothesis {
   std::string text;
 };
 
-/// Mistakes that people make, the likelier ones first.
+/// Common mistakes, the likelier ones first.
 std::vector<FrameHypothesis> mistakes() {
   const Matrix3d one = Matrix3d::Identity();
   std::vector<FrameHypothesis> list = {
@@ -188,7 +190,7 @@ std::vector<FrameHypothesis> mistakes() {
   return list;
 }
 
-/// The mistake that explains the rates, if any does, and in which file; leaves the frame.
+/// The mistake that explains the rates, and the file that has it; empty if none does. Sets the frame.
 std::pair<std::string, LogPlace> find_mistake(Context& c) {
   const std::vector<FrameHypothesis> all = mistakes();
   std::vector<double> left;
@@ -199,7 +201,8 @@ std::pair<std::string, LogPlace> find_mistake(Context& c) {
     total = remainder(pairs, Matrix3d::Identity(), 0);
     noise = 3 * static_cast<double>(pairs.mocap.size()) * c.rate_noise * c.rate_noise;
   }
-  // Some mistakes look alike near level flight. Within what noise does to a sum of squares, the likelier one counts.
+  // Some mistakes look alike near level flight. Among those that noise does not tell apart, the likelier one is
+  // reported.
   const double least = *std::ranges::min_element(left);
   const auto near = [&](double r) { return r <= 2 * least + 2 * noise; };
   const double declared = remainder(pair_up(c.motion, c.windows, Order::wxyz, c.lag), Matrix3d::Identity(), 1);
@@ -218,14 +221,15 @@ void check_gyro(Context& c) {
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) values.emplace_back(std::string("gain_") + kAxes[i] + kAxes[j], fit.gain(i, j));
   }
-  // Scale errors and misalignment of a mounted sensor stay below a tenth; no mistake of axes or units does.
+  // Scale errors and misalignment of a mounted sensor are below 0.1; every mistake of axes or units is larger.
   bool good = true;
   for (int j = 0; j < 3; ++j) {
     if (!fit.tested[static_cast<std::size_t>(j)]) continue;
     const Vector3d error = fit.gain.col(j) - Vector3d::Unit(j);
     good &= error.cwiseAbs().maxCoeff() <= 0.1 + kSigmas * fit.gain_sd(j);
   }
-  // What gains leave over: noise of both, and a twentieth for what a constant gain cannot explain.
+  // Expected residual: noise of both, and a twentieth of the rotation for errors that a constant gain does not
+  // describe.
   Vector3d expected;
   for (int i = 0; i < 3; ++i) expected(i) = std::hypot(c.rate_noise, c.gyro_noise, 0.05 * fit.spread.norm());
   std::string odd;
@@ -244,13 +248,14 @@ void check_gyro(Context& c) {
                       j == 0 ? values : Values{});
       else c.add_finding(name, Verdict::not_tested, "too little rotation");
     }
-    // Bias: the difference of the means, whose noise averages out.
+    // The bias is the difference of the means, in which noise averages out.
     Vector3d bias = Vector3d::Zero(), rate = Vector3d::Zero(), coning = Vector3d::Zero();
     const double n = static_cast<double>(pairs.mocap.size());
     for (std::size_t i = 0; i < pairs.mocap.size(); ++i)
       bias += (pairs.gyro[i] - pairs.mocap[i]) / n, rate += pairs.mocap[i] / n,
           coning += (pairs.gyro[i] - means.gyro[i]) / n;
-    // A first-order low-pass takes this share of what the beat's rates, once and twice a beat, turn by coning.
+    // Share of the coning of the beat's rates, at once and twice the beat frequency, that a first-order low-pass
+    // removes.
     const double beat = 1.5 * c.log.header.flapping_Hz / c.log.header.imu.bandwidth_hz, hidden = beat * beat;
     std::string wrong;
     for (int i = 0; i < 3; ++i) {

@@ -14,7 +14,8 @@ std::string axis_name(const Vector3d& v) {
   return std::string(v(i) > 0 ? "+" : "-") + kAxes[i];
 }
 
-/// What makes the accelerometer's columns a specific force in B: axes and unit. Nothing where that is not known.
+/// Finds the matrix (axes and unit) that turns the accelerometer's columns into a specific force in B; nothing where it
+/// is unknown.
 std::optional<Matrix3d> check_gravity(Context& c) {
   const double gravity = c.log.header.gravity_m_s2;
   const auto not_tested = [&](const char* why) {
@@ -47,8 +48,8 @@ std::optional<Matrix3d> check_gravity(Context& c) {
   const Vector3d up = mean_with(one), weight(0, 0, gravity);
   Vector3d body = Vector3d::Zero();
   for (const Vector3d& f : felt) body += f / n;
-  // Accelerations average out: 3 m/s more at the end than at the beginning leaves 3 / duration, the noise
-  // sd / sqrt(n). A fifth of gravity for bias and for what vibration rectifies, which no log declares.
+  // Accelerations average out, except 3 / duration for a velocity that changes by 3 m/s in the flight; noise averages
+  // to sd / sqrt(n). A fifth of gravity allows for bias and vibration rectification, which no log declares.
   const double allowed =
       0.2 * gravity + 3 / (end_s - begin_s) + kSigmas * c.log.header.imu.accel_noise_m_s2 / std::sqrt(n);
   const Values values = {{"mean_x_m_s2", up(0)}, {"mean_y_m_s2", up(1)}, {"mean_z_m_s2", up(2)}};
@@ -79,7 +80,8 @@ std::optional<Matrix3d> check_gravity(Context& c) {
     return Matrix3d(-one * gravity);
   }
   if (body.norm() <= allowed && up.norm() <= allowed && body.norm() < 0.5 * gravity) {
-    // In g it would be a tenth of gravity whichever way it points; that was ruled out for the vertical only.
+    // An accelerometer in g would also read about a tenth of gravity, in any direction; above that was excluded for the
+    // vertical only.
     warn("gravity is missing: acceleration instead of specific force");
     return one;
   }
@@ -102,7 +104,8 @@ void check_scale(Context& c, const std::optional<Matrix3d>& correction) {
   const auto not_tested = [&](const std::string& why) { c.add_finding("position scale", Verdict::not_tested, why); };
   if (!correction) return not_tested("needs an accelerometer that is understood");
   const FlightHeader& h = c.log.header;
-  // Second differences of the position over T against the acceleration weighted with a triangle of 2 T.
+  // Second differences of the position over span_s equal the acceleration integrated with triangular weights of width 2
+  // span_s.
   const double span_s = h.flapping_Hz > 0 ? std::max(std::round(0.2 * h.flapping_Hz), 1.0) / h.flapping_Hz : 0.2;
   const std::vector<double>& t = c.motion.imu_t_s();
   const Vector3d arm(h.imu.position_m[0], h.imu.position_m[1], h.imu.position_m[2]);
@@ -141,7 +144,7 @@ void check_scale(Context& c, const std::optional<Matrix3d>& correction) {
     const Vector3d m = moved[i] - m0, f = felt[i] - f0;
     mm += m.squaredNorm(), mf += m.dot(f), ff += f.squaredNorm();
   }
-  // Noise of a triangle-weighted mean of the accelerometer, and of gravity seen through a noisy attitude.
+  // Noise of the triangle-weighted accelerometer, and of gravity turned by a noisy attitude.
   const double triangle = std::sqrt(2.0 / 3 * span_s * span_s * span_s);
   const double felt_noise =
       triangle * std::hypot(h.imu.accel_noise_m_s2 / std::sqrt(h.imu.rate_hz),
@@ -153,7 +156,7 @@ void check_scale(Context& c, const std::optional<Matrix3d>& correction) {
   const std::string seen =
       format("positions accelerate %.4g x as the accelerometer feels (alike by %.2f)", gain, alike);
   const Values values = {{"gain", gain}, {"gain_sd", sd}, {"correlation", alike}};
-  // A quarter for vibration and for flexible mounts; no unit is that near to another.
+  // A quarter allows for vibration and flexible mounts; different units differ by more.
   const double allowed = 0.25 + kSigmas * sd;
   const auto is = [&](double unit) { return std::abs(gain / unit - 1) <= allowed; };
   if (is(1)) return c.add_finding("position scale", Verdict::ok, seen, values);
@@ -178,7 +181,7 @@ void check_speed(Context& c) {
   }
   std::ranges::sort(speeds);
   const double usual = speeds[speeds.size() * 9 / 10], largest = speeds.back();
-  // Twice what a hummingbird flies, and noise of two samples at 6 sd: one in 1e9.
+  // Twice the speed of a hummingbird, and the noise of two samples at 6 sd: one in 1e9.
   const double fastest = 20 + 6 * std::numbers::sqrt2 * c.log.header.mocap.position_noise_m / (0.5 * usual_s);
   const Values values = {{"largest_m_s", largest}};
   const std::string seen = format("up to %.3g m/s", largest),
@@ -198,7 +201,7 @@ void check_upright(Context& c) {
   up.normalize();
   const double tilt = std::acos(std::clamp(up(2), -1.0, 1.0));
   const std::string seen = format("the body's z axis points %.0f deg off +z of W on average", tilt / kDegree);
-  // Wings lift along the body's z: on average it points up, or the flight is a fall.
+  // Wings lift along the body's z axis, so it points up on average, or the flight is a fall.
   if (tilt < std::numbers::pi / 3) c.add_finding("upright", Verdict::ok, seen, {{"tilt_rad", tilt}});
   else
     c.add_finding("upright", Verdict::warning,

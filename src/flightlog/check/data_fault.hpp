@@ -1,4 +1,3 @@
-// A fault of the data, with its place.
 #pragma once
 
 #include <cstddef>
@@ -7,8 +6,8 @@
 namespace flappy::flightlog {
 
 struct DataFault {
-  std::string file;  ///< of the log, in its folder
-  std::size_t line;  ///< where it first shows
+  std::string file;  ///< a file of the log
+  std::size_t line;  ///< the first line that shows the fault
   std::string what;
 };
 

@@ -9,23 +9,24 @@
 namespace flappy::flightlog {
 namespace {
 
-/// The least share of a stream that is to be there, and the most by which its rate may be another than declared.
-constexpr double kLeastShare = 0.5, kRateTolerance = 0.2;
+/// Least share of a stream's samples that must exist, and largest relative deviation of its rate from the declared one.
+constexpr double kMinShare = 0.5, kRateTolerance = 0.2;
 
 struct DeclaredStream {
   std::string file;
   const Column* t_s;
-  double rate_hz;                       ///< as declared
-  std::vector<const Column*> measured;  ///< what noise keeps from repeating; none where nothing does
+  double rate_hz;                       ///< declared rate
+  std::vector<const Column*> measured;  ///< columns that noise prevents from repeating; empty without declared noise
   double begin_s() const { return t_s->front(); }
   double end_s() const { return t_s->back(); }
   std::size_t last_line() const { return t_s->size() + 1; }
 };
 
-/// The rate at which commands come where none are missing: nothing declares it.
+/// Rate of the commands, missing ones included; no header declares it.
 double command_rate_hz(const Column& t_s) { return stream_statistics(kCommand, t_s, 1).rate_hz; }
 
-/// Commands, motion capture and, of a flight with voltages, IMU, which every diagnosis needs, then the others.
+/// All streams: first those that every diagnosis needs (commands, motion capture and, in a flight with voltages, IMU),
+/// then the others.
 std::vector<DeclaredStream> streams_of(const FlightLog& log) {
   const MocapStream& m = log.mocap;
   const ImuStream& s = log.imu;
@@ -51,8 +52,8 @@ bool repeats(const DeclaredStream& s, std::size_t i) {
          std::ranges::all_of(s.measured, [&](const Column* c) { return (*c)[i] == (*c)[i - 1]; });
 }
 
-/// When two of the three streams that a diagnosis needs had begun, and when all but one had ended: the flight, whatever
-/// the third does.
+/// Begin and end of the flight, s: medians over the first three streams, so that one faulty stream does not change
+/// them.
 std::pair<double, double> flight_of(const std::vector<DeclaredStream>& streams) {
   std::vector<double> begins, ends;
   for (std::size_t k = 0; k < std::min<std::size_t>(3, streams.size()); ++k)
@@ -71,7 +72,7 @@ std::vector<DataFault> missing(const std::vector<DeclaredStream>& streams) {
       if (line == 0 && (again || (*s.t_s)[i] - (*s.t_s)[i - 1] > 1.5 / s.rate_hz)) line = i + 2;
     }
     const double expected = s.rate_hz * std::max(end_s - begin_s, 0.0);
-    if (static_cast<double>(fresh) >= kLeastShare * expected) {
+    if (static_cast<double>(fresh) >= kMinShare * expected) {
       const StreamStatistics seen = stream_statistics(s.file, *s.t_s, s.rate_hz);
       if (std::abs(seen.rate_hz / s.rate_hz - 1) > kRateTolerance && s.file != kCommand)
         faults.push_back({s.file, 2,
@@ -82,14 +83,14 @@ std::vector<DataFault> missing(const std::vector<DeclaredStream>& streams) {
     if (line == 0) line = s.begin_s() > begin_s + 0.1 * (end_s - begin_s) ? 2 : s.last_line();
     faults.push_back({s.file, line,
                       format("%.0f %% of the flight's samples are missing, at most %.0f %% can be",
-                             100 * (1 - static_cast<double>(fresh) / expected), 100 * (1 - kLeastShare))});
+                             100 * (1 - static_cast<double>(fresh) / expected), 100 * (1 - kMinShare))});
   }
   return faults;
 }
 
 std::vector<DataFault> too_short(std::vector<DeclaredStream> streams, double flapping_Hz, bool voltages) {
   streams.erase(streams.begin() + (voltages ? 3 : 2), streams.end());
-  const double least_s = std::max(flapping_Hz > 0 ? kLeastBeats / flapping_Hz : 0, kLeastTime_s);
+  const double least_s = std::max(flapping_Hz > 0 ? kMinBeats / flapping_Hz : 0, kMinTime_s);
   const auto& last = *std::ranges::max_element(streams, {}, &DeclaredStream::begin_s);
   const auto& first = *std::ranges::min_element(streams, {}, &DeclaredStream::end_s);
   const double common_s = first.end_s() - last.begin_s();
@@ -117,11 +118,11 @@ double value(const Finding& f, const std::string& name) {
   return std::ranges::find(f.values, name, &std::pair<std::string, double>::first)->second;
 }
 
-/// The clock that runs at another speed than those of the others, of command, mocap, imu, power and wings.
+/// The streams among command, mocap, imu, power and wings whose clocks run at another speed than the others.
 std::vector<DataFault> wrong_clocks(const FlightLog& log, const CheckReport& report) {
   std::vector<DataFault> faults;
   const auto blame = [&](const std::string& file, const Column& t_s, double speed) {
-    // a millisecond is what no check minds
+    // The first line at which the clock is off by 1 ms, which no check notices yet.
     faults.push_back({file, line_at(t_s, 1e-3 / speed),
                       format("its clock runs off those of the other streams by %.2g %%", 100 * speed)});
   };
@@ -132,7 +133,8 @@ std::vector<DataFault> wrong_clocks(const FlightLog& log, const CheckReport& rep
     const double ratio = value(*imu, "ratio");
     const Finding *frequency = find(report, "flapping frequency"), *power = find(report, "power beat"),
                   *wings = find(report, "wings beat");
-    // Whose clock it is the third stream says, or, where none does, the frequency declared.
+    // A third stream decides whether the clock of the commands or of the IMU is wrong; without one, the declared
+    // frequency does.
     bool of_command = off(power) || off(wings) || (against_mocap && !mocap_off);
     if (!of_command && !against_mocap && !power && !wings && frequency) {
       const double driven = value(*frequency, "frequency_Hz") / log.header.flapping_Hz;
@@ -158,12 +160,12 @@ std::vector<DataFault> wrong_clocks(const FlightLog& log, const CheckReport& rep
 std::vector<DataFault> data_faults(const FlightLog& log, const CheckReport& report,
                                    const std::filesystem::path& folder) {
   const std::vector<DeclaredStream> streams = streams_of(log);
-  // What is not there cannot be judged further.
+  // With missing samples, no further check is meaningful.
   std::vector<DataFault> faults = missing(streams);
   if (faults.empty()) faults = too_short(streams, log.header.flapping_Hz, log.header.inputs.empty());
   if (faults.empty()) {
     faults = wrong_clocks(log, report);
-    const bool clocks_off = !faults.empty();  // so currents go with other voltages
+    const bool clocks_off = !faults.empty();  // then currents are compared with the wrong voltages
     for (const Finding& f : report.findings) {
       const bool named = f.fault.file.empty() || f.check == "clock speed" || (clocks_off && f.fault.file == kPower) ||
                          std::ranges::find(faults, f.fault.file, &DataFault::file) != faults.end();

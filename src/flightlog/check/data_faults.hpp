@@ -1,4 +1,4 @@
-// Faults of the data that forbid a diagnosis: what no vehicle and no effect explains, found before anything is fitted.
+// Faults of the data that forbid a diagnosis, because no vehicle and no effect explains them. They are found before any fit.
 #pragma once
 
 #include <filesystem>
@@ -10,21 +10,22 @@
 
 namespace flappy::flightlog {
 
-/// A flight must have this many beats seen by voltages, motion capture and IMU alike (by inputs and motion capture, where inputs
-/// are declared): ten in which the wings settle, and
-/// fifty of which mean, harmonics and noise are told apart. Nor does gravity show in less than the time.
-inline constexpr double kLeastBeats = 60, kLeastTime_s = 2;
+/// Shortest time that command, motion capture and IMU must have in common (command and motion capture alone where
+/// inputs are declared). Ten beats let the wings settle, and fifty tell mean, harmonics and noise apart. In less than
+/// kMinTime_s the accelerometer does not show gravity clearly enough.
+inline constexpr double kMinBeats = 60, kMinTime_s = 2;
 
-/// At most one for each file, the one that explains the others; none where the log can be diagnosed. `report`: of the
-/// log; `folder` stands for the place in `file`. Effects of sensors within their priors are none, but for
-/// a vibration rectification of several times its typical size: the mean force is bent as by another attitude.
+/// The faults of a log, empty where it can be diagnosed. Missing samples come first, then flights that are too short,
+/// then all others, one for each file. `report`: check_flight() of the log; `folder`: the place that DataFault::file
+/// names. Sensor effects within their priors are no fault, with one exception: a vibration rectification of several
+/// times its typical magnitude, which changes the mean force like a wrong attitude.
 std::vector<DataFault> data_faults(const FlightLog& log, const CheckReport& report,
                                    const std::filesystem::path& folder);
 inline std::vector<DataFault> data_faults(const FlightLog& log, const std::filesystem::path& folder) {
   return data_faults(log, check_flight(log), folder);
 }
 
-/// Of several flights of one robot, compared with one another as well.
+/// The faults of several flights of one robot, whose declared inputs are also compared with one another.
 std::vector<DataFault> data_faults(const std::vector<FlightLog>& logs, const std::vector<std::string>& folders);
 
 }  // namespace flappy::flightlog

@@ -23,7 +23,7 @@ Vector3d mean_of(const std::vector<Vector3d>& values) {
   return sum / static_cast<double>(values.size());
 }
 
-/// The sums that all hypotheses about frames need.
+/// Centred sums over the pairs that all hypotheses about frames need.
 struct Moments {
   Matrix3d cross = Matrix3d::Zero();  ///< mocap x gyro
   double mocap = 0, gyro = 0;
@@ -137,7 +137,8 @@ std::optional<Vector3d> SensorMotion::mean_turn(double begin_s, double end_s) co
   for (std::size_t k = index_before(imu_t_s_, begin_s); from_s < end_s; ++k) {
     const double to_s = std::min(end_s, imu_t_s_[k + 1]), dt = to_s - from_s;
     const Vector3d first = gyro_at(k, from_s), last = gyro_at(k, to_s);
-    // of a rate on a line, coning within the interval included: Savage, J. Guidance, Control and Dynamics 21 (1998)
+    // Rotation vector for a linear rate, coning within the interval included: Savage, J. Guidance, Control and Dynamics
+    // 21 (1998).
     turn = turn * exponential((first + last) * (dt / 2) + first.cross(last) * (dt * dt / 12));
     from_s = to_s;
   }
@@ -210,7 +211,8 @@ Pairs with_turns(const SensorMotion& motion, const std::vector<BeatWindow>& wind
 
 std::optional<Sync> find_lag(const SensorMotion& motion, const std::vector<BeatWindow>& windows) {
   constexpr double kRange_s = 1, kStep_s = 0.005;
-  // Of nearly periodic motion, the lag that is nearer and the frame that is declared.
+  // In nearly periodic motion several lags and frames match: these penalties prefer the smaller lag and the declared
+  // frame.
   constexpr double kPenalty_per_s = 0.1, kOtherFrame = 0.01;
   std::optional<Sync> best;
   double best_score = 0;
@@ -225,7 +227,7 @@ std::optional<Sync> find_lag(const SensorMotion& motion, const std::vector<BeatW
       const Moments m = moments(pairs);
       if (!(m.mocap > 0 && m.gyro > 0)) continue;
       for (const Matrix3d& axes : signed_permutations()) {
-        if (order != Order::wxyz && !axes.isIdentity()) break;  // one mistake at a time
+        if (order != Order::wxyz && !axes.isIdentity()) break;  // test one mistake at a time
         const double correlation = overlap(axes, m.cross) / std::sqrt(m.mocap * m.gyro);
         const bool as_declared = order == Order::wxyz && axes.isIdentity();
         const double score = correlation - kPenalty_per_s * std::abs(lag_s) - (as_declared ? 0 : kOtherFrame);
@@ -242,7 +244,7 @@ std::optional<LagEstimate> refine_lag(const SensorMotion& motion, const std::vec
                                       const SensorFrame& frame, Lag start, double noise) {
   double moved_s = 0, sd = 0;
   for (int iteration = 0; iteration < 4; ++iteration) {
-    // mocap = a gyro + a step gyro_change + constant, for a and a step
+    // Linear fit mocap = a gyro + (a step) gyro_change + constant, for a and (a step).
     const Pairs pairs = pair_up(motion, windows, frame.order, start);
     if (pairs.mocap.size() < 10) return std::nullopt;
     const Vector3d m0 = mean_of(pairs.mocap), g0 = mean_of(pairs.gyro), c0 = mean_of(pairs.gyro_change);
@@ -261,7 +263,7 @@ std::optional<LagEstimate> refine_lag(const SensorMotion& motion, const std::vec
     const double gain = x(0), step = x(1) / gain;
     const double residual =
         std::sqrt(std::max(squares - x.dot(right), 0.0) / (3.0 * static_cast<double>(pairs.mocap.size())));
-    // the noise declared or seen, whichever is larger: here too small a figure would cry wolf
+    // The larger of the expected and the observed noise: too small a value would cause false alarms.
     sd = std::max(noise, residual) * std::sqrt(normal.inverse()(1, 1)) / std::abs(gain);
     if (!(std::abs(step) < 0.1)) return std::nullopt;
     start.at_middle_s += step;
@@ -276,9 +278,9 @@ double remainder(const Pairs& pairs, const Matrix3d& axes, double scale) {
 }
 
 Gains fit_gains(const Pairs& pairs, double mocap_noise, double gyro_noise) {
-  // A gain known to a twentieth tells every mistake there is from none; a gyro spread of ten times its own noise
-  // biases it by a hundredth.
-  constexpr double kLargestSd = 0.05, kLeastSpread = 10;
+  // A gain with a standard deviation of 1/20 reveals every mistake of axes or units; noise of a tenth of the gyro's
+  // spread biases it by 1/100.
+  constexpr double kLargestSd = 0.05, kMinSpread = 10;
   const double n = static_cast<double>(pairs.mocap.size());
   const Vector3d m0 = mean_of(pairs.mocap), g0 = mean_of(pairs.gyro);
   Matrix3d square = Matrix3d::Zero(), cross = Matrix3d::Zero();
@@ -291,9 +293,9 @@ Gains fit_gains(const Pairs& pairs, double mocap_noise, double gyro_noise) {
   fit.spread = (square.diagonal() / n).cwiseSqrt();
   std::vector<int> axes;
   for (int i = 0; i < 3; ++i) {
-    if (fit.spread(i) > kLeastSpread * gyro_noise && fit.spread(i) > 0) axes.push_back(i);
+    if (fit.spread(i) > kMinSpread * gyro_noise && fit.spread(i) > 0) axes.push_back(i);
   }
-  // Drops the axis that is least known until all are known well enough.
+  // Drop the axis with the largest standard deviation until all are below the limit.
   Eigen::MatrixXd inverse;
   while (!axes.empty()) {
     inverse = Eigen::MatrixXd(square(axes, axes)).inverse();
@@ -302,7 +304,7 @@ Gains fit_gains(const Pairs& pairs, double mocap_noise, double gyro_noise) {
     if (mocap_noise * std::sqrt(variance) <= kLargestSd) break;
     axes.erase(axes.begin() + worst);
   }
-  // What an axis turns that is not tested goes along with what others turn: it is taken as it stands.
+  // Rotation about an untested axis may correlate with that about others: subtract it with gain 1.
   for (int i = 0; i < 3; ++i) {
     if (std::ranges::find(axes, i) != axes.end()) continue;
     fit.gain(i, i) = 1;

@@ -1,5 +1,5 @@
-// What gyro, accelerometer and mocap say of one motion, on one clock: samples at the instants they were measured, means
-// over windows of whole beats, and the frames that a log can be in by mistake.
+// The motion as gyro, accelerometer and mocap measured it: samples at their measured instants, means over windows of whole
+// beats, the lag between the two clocks, and the frames in which a log may be by mistake.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -16,15 +16,15 @@ using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-/// How the four numbers of a quaternion may have been meant.
+/// Conventions in which the four numbers of a logged quaternion may be.
 enum class Order { wxyz, xyzw, wxyz_inverse, xyzw_inverse };
 inline constexpr std::array kOrders = {Order::wxyz, Order::xyzw, Order::wxyz_inverse, Order::xyzw_inverse};
 
-/// The 48 matrices that permute and flip axes; the first is the identity.
+/// The 48 matrices that permute and flip the axes; the first is the identity.
 const std::vector<Matrix3d>& signed_permutations();
 
-/// Times of the IMU and of mocap less their declared latencies, from the first mocap sample on. A pose that repeats the
-/// one before is none.
+/// Samples of IMU and mocap. Times are less the declared latencies and count from the first mocap sample. Lost and
+/// swapped poses are left out (pose_readings()).
 class SensorMotion {
  public:
   explicit SensorMotion(const FlightLog& log);
@@ -33,95 +33,100 @@ class SensorMotion {
   const std::vector<double>& imu_t_s() const { return imu_t_s_; }
   const std::vector<Vector3d>& accel_m_s2() const { return accel_m_s2_; }
   Quaterniond attitude(std::size_t sample, Order order) const;
-  /// Between samples; nothing in a gap or outside.
+  /// Interpolated between samples; nothing in a gap or outside.
   std::optional<Quaterniond> attitude_at(double t_s, Order order) const;
   std::optional<Vector3d> position_at(double t_s) const;
-  /// Rms per axis by which an attitude differs from the middle of its neighbours: noise, and what goes on in between.
+  /// Rms per axis, rad, of an attitude less the interpolation of its neighbours: noise plus motion between the samples.
   double roughness_rad() const;
   /// Mean of the gyro over an interval; nothing across a gap or outside.
   std::optional<Vector3d> mean_rate(double begin_s, double end_s) const;
-  /// The turn that the gyro made of an interval, as a rotation vector over its time; nothing as above.
+  /// Rotation over an interval, integrated from the gyro, as a rotation vector divided by the time; nothing across a
+  /// gap or outside.
   std::optional<Vector3d> mean_turn(double begin_s, double end_s) const;
 
  private:
   Vector3d gyro_at(std::size_t k, double t_s) const;
   Vector3d gyro_integral(std::size_t k, double t_s) const;
-  /// The mocap samples around an instant.
+  /// Index of the mocap sample before an instant; nothing in a gap or outside.
   std::optional<std::size_t> bracket(double t_s) const;
 
   double longest_mocap_s_, longest_imu_s_;
   std::vector<double> mocap_t_s_, imu_t_s_;
   std::vector<Vector3d> position_m_, gyro_rad_s_, accel_m_s2_, gyro_integral_rad_;
   std::vector<std::array<double, 4>> quaternion_;
-  std::vector<std::size_t> gaps_before_;  ///< of the IMU, up to each sample
+  std::vector<std::size_t> gaps_before_;  ///< number of gaps of the IMU up to each sample
 };
 
-/// Whole beats, in which the shaking of the beat cancels: it repeats, and would match at the wrong lag.
+/// A window of whole beats. Oscillations at the beat frequency cancel in its mean; they are periodic and would match at
+/// wrong lags.
 struct BeatWindow {
   double begin_s, end_s;
-  std::array<Vector3d, 4> rate_rad_s;  ///< mean from mocap, in the body, for each Order
+  std::array<Vector3d, 4> rate_rad_s;  ///< mean from mocap, in B, for each Order
   double middle_s() const { return (begin_s + end_s) / 2; }
 };
 
-/// One after another, each of `length_s`, without gaps.
+/// Successive windows of `length_s`, without those in which mocap has a gap.
 std::vector<BeatWindow> make_windows(const SensorMotion& motion, double length_s);
 
-/// The frame a log is in: mocap's rate = scale x axes x gyro's.
+/// The convention in which a log is: rate of mocap = scale x axes x rate of the gyro.
 struct SensorFrame {
   Order order = Order::wxyz;
   Matrix3d axes = Matrix3d::Identity();
   bool operator==(const SensorFrame&) const = default;
 };
 
-/// The IMU's clock against mocap's, beyond the latencies declared: gyro(t + lag_s(t)) belongs to mocap(t).
+/// Lag of the IMU's clock behind mocap's, beyond the declared latencies: gyro(t + at(t)) belongs to mocap(t).
 struct Lag {
   double middle_s = 0, at_middle_s = 0, per_s = 0;
   double at(double t_s) const { return at_middle_s + per_s * (t_s - middle_s); }
 };
 
-/// Rates of both in the windows where both have them.
+/// Rates of mocap and gyro, rad/s, in the windows that both cover.
 struct Pairs {
-  std::vector<Vector3d> mocap, gyro, gyro_change;  ///< change of the gyro's rate per second of lag
-  std::vector<std::size_t> window;                 ///< of which window
+  std::vector<Vector3d> mocap, gyro, gyro_change;  ///< gyro_change: derivative of the gyro's rate by the lag
+  std::vector<std::size_t> window;                 ///< index of the window
 };
 Pairs pair_up(const SensorMotion& motion, const std::vector<BeatWindow>& windows, Order order, const Lag& lag);
 
 struct Sync {
   double lag_s = 0;
-  double correlation = 0;  ///< of the rates at that lag, in the best frame
-  SensorFrame frame;       ///< at which it is best
+  double correlation = 0;  ///< between the rates at this lag in `frame`
+  SensorFrame frame;       ///< the frame with the best score
 };
 
-/// `pairs` with the gyro's turns in place of its mean rates, where it has them.
+/// `pairs` with the gyro's mean_turn() in place of its mean rates.
 //
-// A body that shakes about two axes out of phase turns about the third though its mean rate there is 0 (coning): the
-// rotation vector p of a rate w has p' = w + p x w / 2 + ... (Bortz, IEEE Trans. AES-7, 1971), so that a beat of rates
-// a cos and b sin about two axes adds a b / (2 x 2 pi f) to the third: 0.1 rad/s where these are 7 rad/s at 34 Hz.
+// Coning: a body that oscillates about two axes out of phase also turns about the third, although its mean rate there is 0.
+// The rotation vector p of a rate w has p' = w + p x w / 2 + ... (Bortz, IEEE Trans. AES-7, 1971). Rates a cos and b sin
+// about two axes at the beat frequency f add a mean of a b / (2 x 2 pi f) to the third: 0.1 rad/s for 7 rad/s at 34 Hz.
 Pairs with_turns(const SensorMotion& motion, const std::vector<BeatWindow>& windows, const Pairs& pairs,
                  const Lag& lag);
 
-/// The lag, within a second, and frame at which mocap follows the gyro best; nothing without common windows.
+/// The lag, within one second, and the frame at which the rates of mocap and gyro agree best; nothing with fewer than
+/// ten common windows.
 std::optional<Sync> find_lag(const SensorMotion& motion, const std::vector<BeatWindow>& windows);
 
 struct LagEstimate {
   double value = 0, sd = 0;
 };
-/// What is to be added to a first lag, to a fraction of a sample, by least squares; `noise` of a window's mean mocap rate.
+/// Correction to the lag `start`, to a fraction of a sample, by least squares. `noise`: standard deviation of a
+/// window's mean rate from mocap. Nothing where the rates do not determine a lag.
 std::optional<LagEstimate> refine_lag(const SensorMotion& motion, const std::vector<BeatWindow>& windows,
                                       const SensorFrame& frame, Lag start, double noise);
 
-/// Sum of squares that mocap's rates keep once `scale x axes x gyro` and a constant are taken off.
+/// Sum of squares of mocap's rates less `scale x axes x gyro` and less a constant.
 double remainder(const Pairs& pairs, const Matrix3d& axes, double scale);
 
-/// mocap = gain x gyro + offset, by least squares; a gyro axis with too little rotation is taken as it stands.
+/// mocap = gain x gyro + offset, by least squares. A gyro axis with too little rotation is not tested: its gain is
+/// fixed to 1.
 struct Gains {
   Matrix3d gain = Matrix3d::Zero();
-  Vector3d gain_sd = Vector3d::Zero();  ///< of each column
+  Vector3d gain_sd = Vector3d::Zero();  ///< for each column of `gain`
   std::array<bool, 3> tested = {false, false, false};
   Vector3d offset = Vector3d::Zero();
   Vector3d offset_sd = Vector3d::Zero();
-  Vector3d residual = Vector3d::Zero();  ///< rms of each row
-  Vector3d spread = Vector3d::Zero();    ///< of the gyro, rms about its mean
+  Vector3d residual = Vector3d::Zero();  ///< rms of mocap's rates less the fit, for each axis
+  Vector3d spread = Vector3d::Zero();    ///< rms of the gyro's rates about their mean
 };
 Gains fit_gains(const Pairs& pairs, double mocap_noise, double gyro_noise);
 

@@ -18,7 +18,7 @@ namespace flappy::flightlog {
 namespace {
 
 constexpr double kQuaternionTolerance = 1e-3;
-/// No message that is received at all is so late.
+/// A larger least delay is implausible for messages that arrive at all: the stamps are probably of another clock.
 constexpr double kOddOffset_s = 0.5;
 using Columns = std::map<std::string, Column>;
 
@@ -29,12 +29,12 @@ std::string reasons(const StreamReport& report) {
   return io::joined(parts);
 }
 
-/// Names that a fault lists, which may be thousands.
+/// Joins names for an error message; only the first 30, because there may be thousands.
 std::string listed(const std::vector<std::string>& names) {
-  constexpr std::size_t kMost = 30;
-  if (names.size() <= kMost) return names.empty() ? "nothing" : io::shortened(io::joined(names), 2000);
-  return io::shortened(io::joined({names.begin(), names.begin() + kMost}), 2000) + " and " +
-         std::to_string(names.size() - kMost) + " more";
+  constexpr std::size_t kMax = 30;
+  if (names.size() <= kMax) return names.empty() ? "nothing" : io::shortened(io::joined(names), 2000);
+  return io::shortened(io::joined({names.begin(), names.begin() + kMax}), 2000) + " and " +
+         std::to_string(names.size() - kMax) + " more";
 }
 
 const Channel& channel_of(const Channels& channels, const StreamMapping& s, const std::string& name,
@@ -49,7 +49,7 @@ const Channel& channel_of(const Channels& channels, const StreamMapping& s, cons
 
 bool is_optional(const StreamMapping& s) { return s.name == "power" || s.name == "wings" || s.name == "attitude"; }
 
-/// Whether a stream that a log need not have is not there.
+/// Whether an optional stream has no samples in the recording.
 bool left_out(const Channels& channels, const StreamMapping& s) {
   const Channel* found = channels.find(s.channel);
   return is_optional(s) && (!found || found->received_ns().empty());
@@ -62,7 +62,7 @@ const std::vector<double>& field_of(const Channel& channel, const io::Table& tab
   table.fail(key, "\"" + field + "\" is no field of the channel", listed(names) + io::did_you_mean(field, names));
 }
 
-/// The unit, of "s", "ms", "us" and "ns", in which a value lies in a range of seconds; empty where none does.
+/// The unit ("s", "ms", "us" or "ns") in which `value` lies between `least_s` and `most_s`; empty where no unit fits.
 std::string unit_for(double value, double least_s, double most_s) {
   for (const auto& [unit, seconds] :
        {std::pair("s", 1.0), std::pair("ms", 1e-3), std::pair("us", 1e-6), std::pair("ns", 1e-9)})
@@ -75,12 +75,12 @@ std::string unit_for(double value, double least_s, double most_s) {
   s.table.fail(key, what, unit.empty() ? "times of a flight" : "time_unit = \"" + unit + "\"");
 }
 
-/// Refuses times that are no flight's by their unit: later than any clock shows, or farther apart or nearer than the samples of any robot, as microseconds are that are taken
-/// for seconds.
+/// InputError where times are implausible in the declared unit: after the year 2100, or with a sampling interval that
+/// no robot has, as where microseconds are declared as seconds.
 void require_unit(const Channel& channel, const StreamMapping& s) {
   constexpr double kLatest_s = 4.1e9;                    // the year 2100
-  constexpr double kLongest_s = 10, kShortest_s = 1e-6;  // between two samples, on the whole
-  constexpr double kTail = 0.05;                         // share of the times at either end that may be wrong
+  constexpr double kLongest_s = 10, kShortest_s = 1e-6;  // mean interval of samples
+  constexpr double kTail = 0.05;                         // share of the times at either end that is ignored
   std::vector<double> times = field_of(channel, s.table, "time_field", s.time_field);
   std::erase_if(times, [](double t) { return !std::isfinite(t); });
   if (times.size() < 2) return;
@@ -105,7 +105,7 @@ std::vector<std::int64_t> field_times(const Channel& channel, const StreamMappin
   return times;
 }
 
-/// The times of a channel's rows as a stream takes them: stamps are still by their own clock.
+/// The times of a channel's rows that the mapping selects, stamps still on their own clock.
 std::vector<std::int64_t> raw_times(const Channel& channel, const StreamMapping& s) {
   if (s.time == TimeOf::received) return channel.received_ns();
   if (s.time == TimeOf::stamp) return channel.stamp_ns();
@@ -126,7 +126,8 @@ bool all_missing(const std::vector<std::int64_t>& times) {
   return std::ranges::all_of(times, [](std::int64_t t) { return t == kNoTime; });
 }
 
-/// Streams of one clock give one line: the quickest message of all is what bounds it.
+/// The clock lines of a recording. All streams of one clock give one line, because the quickest message of all bounds
+/// it.
 class Clocks {
  public:
   Clocks(const Channels& channels, const Mapping& mapping) : mapping_(mapping) {
@@ -142,9 +143,9 @@ class Clocks {
     for (const auto& [name, pairs] : pairs_) add(name, without_outliers(pairs));
   }
 
-  /// Where the stamps of a stream are on the receiver's clock.
+  /// Converts the stamps of a stream to the receiver's clock.
   const ClockLine& line(const StreamMapping& s) const { return lines_.at(s.clock); }
-  /// The line that the quickest messages lie on, which delays are counted from.
+  /// The line of the quickest messages of the stream's clock: the reference of delays.
   const ClockLine& quickest(const StreamMapping& s) const { return quickest_.at(s.clock); }
   const std::vector<ClockReport>& reports() const { return reports_; }
 
@@ -182,10 +183,10 @@ class Clocks {
   std::vector<ClockReport> reports_;
 };
 
-/// Of a channel that a stream takes columns from.
+/// A channel and the times of its rows.
 struct Timed {
   const Channel* channel;
-  std::vector<std::int64_t> t_ns;  ///< by the receiver's clock
+  std::vector<std::int64_t> t_ns;  ///< on the receiver's clock
 };
 
 Timed timed(const Channel& channel, const StreamMapping& s, const Clocks& clocks) {
@@ -197,7 +198,8 @@ Timed timed(const Channel& channel, const StreamMapping& s, const Clocks& clocks
   return timed;
 }
 
-/// Row by row of `times`, the row of `held` that came last at or before it; its size where there is none.
+/// For each of `times`, the index of the last of the times `held` that is not after it; held.size() where there is
+/// none.
 std::vector<std::size_t> last_rows(const std::vector<std::int64_t>& times, const std::vector<std::int64_t>& held) {
   std::vector<std::size_t> order(held.size()), rows;
   std::iota(order.begin(), order.end(), 0);
@@ -218,7 +220,7 @@ struct Quaternion {
   }
 };
 
-/// A stream's samples, and the times that they have.
+/// Samples of a stream and their times on the receiver's clock.
 struct Stream {
   const StreamMapping& mapping;
   std::vector<std::int64_t> t_ns;
@@ -249,7 +251,7 @@ struct Stream {
   }
 };
 
-/// The value that is farthest from 0, of those that are there.
+/// The finite value with the largest absolute value.
 double farthest(const Column& values) {
   double most = 0;
   for (const double v : values)
@@ -257,13 +259,13 @@ double farthest(const Column& values) {
   return most;
 }
 
-/// Angles become the quaternion that they stand for.
+/// Replaces the columns of angles by those of the quaternion.
 void turn_angles(Stream& s) {
   if (!s.columns.contains("roll_rad")) return;
   const Column roll = s.columns["roll_rad"], pitch = s.columns["pitch_rad"], yaw = s.columns["yaw_rad"];
-  constexpr double kMost_rad = 2 * std::numbers::pi + 0.1;
+  constexpr double kMax_rad = 2 * std::numbers::pi + 0.1;
   for (const auto& [name, angles] : {std::pair("roll_rad", &roll), std::pair("pitch_rad", &pitch)})
-    if (const double angle = farthest(*angles); std::abs(angle) > kMost_rad)
+    if (const double angle = farthest(*angles); std::abs(angle) > kMax_rad)
       s.mapping.table.table("columns").fail(
           name, "reaches " + io::shortest_digits(angle) + ": likely in degrees",
           "radians: " + s.mapping.name + ".scale." + name + " = 0.017453292519943295");
@@ -279,7 +281,7 @@ void turn_angles(Stream& s) {
   }
 }
 
-/// Length of the sample's quaternion; 1 where the stream has none.
+/// Length of the quaternion of sample `i`; 1 where the stream has none.
 double length_of_rotation(const Stream& s, std::size_t i) {
   if (!s.columns.contains("qw")) return 1;
   double square = 0;
@@ -287,7 +289,7 @@ double length_of_rotation(const Stream& s, std::size_t i) {
   return std::sqrt(square);
 }
 
-/// By the receiver's clock: where most samples of all streams lie, and what of that the log is to have.
+/// Times on the receiver's clock: the range in which most samples of all streams lie, and the part for the log.
 struct Span {
   TimeRange recorded, flown;
 };
@@ -304,7 +306,7 @@ bool has_none(const Stream& s, std::size_t i) {
 
 const std::string kBeyond = " is out of range";
 
-/// InputError where a column is out of range too often for a few bits that were flipped: it is in another unit.
+/// InputError where more than 1 % of a column is out of range: that is another unit, not a few flipped bits.
 void require_range(const Stream& s) {
   constexpr double kFew = 0.01;
   for (const auto& [name, column] : s.columns)
@@ -331,9 +333,11 @@ std::string fault_of(const Stream& s, std::size_t i, const Span& span) {
   return std::abs(length - 1) <= kQuaternionTolerance ? "" : "quaternion of another length than 1";
 }
 
-/// `shared`: whether other streams have the same channel. Drops what is unusable, counts what is out of order and puts it in order, drops what came twice.
+/// Drops unusable samples, sorts and counts those out of order, drops samples at the time of another, and counts lost
+/// ones. `sequence`: counts of the samples, or null. `shared`: whether other streams use the same channel.
 void tidy(Stream& s, const std::vector<double>* sequence, const Span& span, bool shared) {
-  // A row without any of the stream's numbers belongs to another stream of the channel if there are many such rows. If there are few, it is a sample that lacks them.
+  // Many rows without any number of this stream belong to another stream of the channel. A few such rows are faulty
+  // samples.
   constexpr double kOthersShare = 0.1;
   std::size_t none = 0;
   for (std::size_t i = 0; i < s.t_ns.size(); ++i) none += has_none(s, i);
@@ -375,11 +379,12 @@ void tidy(Stream& s, const std::vector<double>* sequence, const Span& span, bool
   s.report.lost = 0;
   const std::vector<double> counts = kept(*sequence);
   for (std::size_t i = 1; i < rows.size(); ++i)
-    if (const double steps = counts[i] - counts[i - 1]; steps > 1 && steps < 1e6)  // else it began anew
+    if (const double steps = counts[i] - counts[i - 1]; steps > 1 && steps < 1e6)  // else the count was reset
       s.report.lost += static_cast<std::size_t>(steps) - 1;
 }
 
-/// Delays are beyond the quickest message of the clock, lateness beyond the quickest of the stream: some sensors just take longer.
+/// Computes delays relative to the quickest message of the clock, and counts late samples relative to the quickest of
+/// the stream, because some sensors always take longer.
 void count_delays(Stream& s, const Channel& channel, const ClockLine& quickest) {
   const std::vector<StampedReceipt> pairs = without_outliers(stamped_receipts(channel, s.mapping));
   if (pairs.empty()) return;
@@ -393,7 +398,8 @@ void count_delays(Stream& s, const Channel& channel, const ClockLine& quickest) 
   s.report.delay_median_s = io::median(delays_s);
 }
 
-/// Where most samples of all streams lie, and when in that the robot flew. InputError where a stream has none there.
+/// The range in which most samples of all streams lie, and the part of it in which the robot flew. InputError where
+/// most samples of a stream lie outside the range.
 Span span_of(const Channels& channels, const Mapping& mapping, const Clocks& clocks) {
   std::vector<std::int64_t> all;
   std::vector<std::pair<const StreamMapping*, TimeRange>> own;
@@ -592,12 +598,12 @@ Imported import_recording(const std::vector<std::filesystem::path>& files, const
     for (const std::filesystem::path& file : files) read_source(file, channels, warnings);
     imported = assemble(channels, mapping);
   } catch (const io::InputError&) {
-    log_warnings();  // they say why something is not there
+    log_warnings();  // warnings may explain why something is missing
     throw;
   }
   for (const std::string& warning : imported.report.warnings)
     warnings.push_back(mapping.file.string() + ": " + warning);
-  for (std::string& warning : warnings) warning = io::printable(warning);  // JSON holds UTF-8 alone
+  for (std::string& warning : warnings) warning = io::printable(warning);  // JSON must be UTF-8
   log_warnings();
   imported.report.warnings = std::move(warnings);
   write_flight_log(out, imported.log);

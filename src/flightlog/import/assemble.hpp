@@ -1,4 +1,4 @@
-// From channels to a flight log, by a mapping, and what was found on the way.
+// Makes a flight log from channels by a mapping, and reports what happened to the samples.
 #pragma once
 
 #include <cstdint>
@@ -16,31 +16,31 @@ namespace flappy::flightlog {
 
 struct StreamReport {
   std::string stream, channel;
-  std::size_t samples = 0;                          ///< in the log
-  std::size_t twice = 0;                            ///< came again at the time of another: dropped
-  std::size_t unusable = 0;                         ///< dropped
+  std::size_t samples = 0;                          ///< samples in the log
+  std::size_t twice = 0;                            ///< samples at the time of another one, dropped
+  std::size_t unusable = 0;                         ///< faulty samples, dropped
   std::map<std::string, std::size_t> why_unusable;  ///< counts by reason, as "lacks x_m"
-  std::size_t late = 0, reordered = 0;              ///< in the log all the same
-  std::size_t lost = 0;                             ///< never came, by the sequence or the rate
+  std::size_t late = 0, reordered = 0;              ///< samples that came late or out of order; kept
+  std::size_t lost = 0;                             ///< samples that never came, by `sequence` or by the rate
   double rate_hz = 0;                               ///< measured
-  /// Beyond the quickest of its clock; 0 where it has no times of receipt.
+  /// Delay beyond that of the quickest message of the same clock; 0 without times of receipt.
   double delay_median_s = 0, delay_most_s = 0;
 };
 
 struct ClockReport {
   std::string name;
-  double offset_s = 0;  ///< the receiver's time less this clock's, at the first stamp
-  double drift = 0;     ///< how much faster the receiver's goes, in a second
-  bool measured = false;
+  double offset_s = 0;    ///< receiver's time less this clock's time, at the first stamp
+  double drift = 0;       ///< seconds that the receiver's clock gains per second
+  bool measured = false;  ///< whether from stamps and times of receipt; else the mapping gives the offset
   std::size_t stamps = 0;
   double span_s = 0;
 };
 
 struct ImportReport {
-  std::int64_t start_ns = 0;  ///< the log's 0 s by the receiver's clock
+  std::int64_t start_ns = 0;  ///< time of the log's 0 s on the receiver's clock
   std::vector<StreamReport> streams;
   std::vector<ClockReport> clocks;
-  std::vector<std::string> warnings;  ///< of what was left out, and of power, wings and attitude that are not recorded
+  std::vector<std::string> warnings;  ///< samples left out, and optional streams that were not recorded
 };
 
 struct Imported {
@@ -48,18 +48,19 @@ struct Imported {
   ImportReport report;
 };
 
-/// InputError, at the mapping's own line, for a channel or a field that is not there and for times that cannot be had. The log
-/// is one that write_flight_log() looks at once more.
+/// InputError, at the line of the mapping, for a channel or field that was not recorded and for times that cannot be
+/// determined. The log is not validated here: write_flight_log() does that.
 Imported assemble(const Channels& channels, const Mapping& mapping);
 
-/// Reads the files of one recording (sources.hpp), notes its warnings and writes its flight log; InputError before anything is written.
+/// Reads the files of one recording (sources.hpp), logs the warnings and writes the flight log to `out`. Where it
+/// throws InputError, nothing was written.
 Imported import_recording(const std::vector<std::filesystem::path>& files, const Mapping& mapping,
                           const std::filesystem::path& out);
 
-/// What --json holds.
+/// The report as --json prints it.
 nlohmann::ordered_json json_of(const ImportReport& report);
 
-/// A table, and a line for each clock.
+/// The report as text: a table of the streams and a line for each clock.
 std::string report_text(const ImportReport& report);
 
 }  // namespace flappy::flightlog

@@ -6,10 +6,10 @@
 namespace flappy::flightlog {
 namespace {
 
-/// What PX4 calls the first instance of a topic is often the only one.
+/// Suffix of the first instance of a PX4 topic, which is often the only one and may be left out in a mapping.
 const std::string kFirst = "[0]";
 
-/// Differences of two times fit, too.
+/// The time, or kNoTime where it exceeds kLatest_ns.
 std::int64_t checked(std::int64_t t_ns) { return std::abs(static_cast<double>(t_ns)) <= kLatest_ns ? t_ns : kNoTime; }
 
 }  // namespace

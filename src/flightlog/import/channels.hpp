@@ -1,5 +1,5 @@
-// What a recording holds, whatever wrote it: named channels of rows of named numbers, each with the time at which it was
-// received and, where it says so itself, the time that it tells of. Importers fill it, and so may a recorder, row by row.
+// The content of a recording in any format: named channels of rows, each row with named numbers, the time at which it was received
+// and, where the row has one, its stamp. Importers and recorders fill it row by row.
 #pragma once
 
 #include <cstdint>
@@ -12,10 +12,10 @@
 
 namespace flappy::flightlog {
 
-/// The latest time that a row may have, before 1970 or after: the differences of two fit 64 bits.
+/// Largest absolute value of a time, in ns from 1970, so that the difference of two times fits 64 bits.
 inline constexpr double kLatest_ns = 4e18;
 
-/// Where a row has no such time. Others are nanoseconds of some clock.
+/// Marks a row without a time. All other times are nanoseconds of some clock.
 inline constexpr std::int64_t kNoTime = std::numeric_limits<std::int64_t>::min();
 
 struct Item {
@@ -24,25 +24,25 @@ struct Item {
 };
 using Row = std::vector<Item>;
 
-/// In place of a channel's name: whichever there is, of a recording that has one.
+/// Stands for the name of the channel in a recording that has only one.
 inline const std::string kOnlyChannel = "*";
 
-/// Fields by channel.
+/// The wanted fields of each channel; an empty set: all its fields.
 using Wanted = std::map<std::string, std::set<std::string>>;
 
 class Channel {
  public:
-  /// Nothing wanted: all of it.
+  /// Keeps the `wanted` fields; none given: all fields.
   explicit Channel(std::set<std::string> wanted = {}) : wanted_(std::move(wanted)) {}
 
   void add(std::int64_t received_ns, std::int64_t stamp_ns, const Row& row);
-  /// Makes a field known, though no row may have it.
+  /// Registers a field even if no row ever has it.
   void add(const std::string& field) { slot(field); }
   const std::vector<std::int64_t>& received_ns() const { return received_ns_; }
   const std::vector<std::int64_t>& stamp_ns() const { return stamp_ns_; }
-  /// One value for each row, NaN where it had none; null where there is no such field, or nobody wanted it.
+  /// One value for each row, NaN where the row lacks it; null where the field is unknown or not wanted.
   const std::vector<double>* column(std::string_view field) const;
-  /// Names of all fields that rows had, wanted or not.
+  /// Names of all fields, wanted or not.
   std::vector<std::string> fields() const;
 
  private:
@@ -53,25 +53,26 @@ class Channel {
   std::vector<std::int64_t> received_ns_, stamp_ns_;
   std::map<std::string, std::size_t, std::less<>> slots_;
   std::vector<std::vector<double>> columns_;
-  std::vector<std::pair<std::string, std::size_t>> order_;  ///< of the row before, which the next is like
+  std::vector<std::pair<std::string, std::size_t>> order_;  ///< fields and slots of the last row; the next is alike
 };
 
 class Channels {
  public:
-  /// Only rows of what is wanted are kept; nothing wanted: all.
+  /// Keeps only wanted channels and fields; nothing given: all.
   explicit Channels(Wanted wanted = {}) : wanted_(std::move(wanted)) {}
 
   bool wants(const std::string& channel) const { return wanted_.empty() || wanted_fields(channel) != nullptr; }
   bool wants(const std::string& channel, const std::string& field) const;
-  /// Makes a channel and fields of it known, though no row of it may come. Fields without a name are none.
+  /// Registers a channel and its fields even if no row of it ever comes. Empty field names are ignored.
   void add(const std::string& channel, const std::vector<std::string>& fields = {});
   void add(const std::string& channel, std::int64_t received_ns, std::int64_t stamp_ns, const Row& row);
-  /// `name`, or else `name`[0], or kOnlyChannel; null where it is not there.
+  /// The channel `name`, or else `name`[0]. kOnlyChannel finds the channel of a recording that has only one. Null where
+  /// there is none.
   const Channel* find(const std::string& name) const;
   std::vector<std::string> names() const;
 
  private:
-  /// Null where the channel is not wanted; empty where all of it is.
+  /// Null where the channel is not wanted; empty where all its fields are.
   const std::set<std::string>* wanted_fields(const std::string& channel) const;
 
   Wanted wanted_;

@@ -13,7 +13,7 @@ struct Point {
   double x_s, y_ns;
 };
 
-/// The lower convex hull of points in order of x.
+/// The lower convex hull of points that are sorted by x.
 std::vector<Point> lower_hull(const std::vector<Point>& points) {
   std::vector<Point> hull;
   for (const Point& p : points) {
@@ -31,7 +31,7 @@ std::vector<Point> lower_hull(const std::vector<Point>& points) {
 
 TimeRange main_range(std::vector<std::int64_t> times_ns) {
   constexpr auto kApart_ns = static_cast<std::uint64_t>(1e9 * kLongestGap_s);
-  // unsigned, for the difference of two times may exceed 63 bits
+  // unsigned, because the difference of two times may exceed 63 bits
   const auto apart = [](std::int64_t a, std::int64_t b) {
     return static_cast<std::uint64_t>(b) - static_cast<std::uint64_t>(a);
   };
@@ -64,20 +64,20 @@ ClockLine ClockLine::below(std::vector<StampedReceipt> pairs) {
   std::vector<Point> points;
   double least_ns = 0, middle_s = 0;
   for (const auto& [stamp, received] : pairs) {
-    // small numbers, which a double holds to the nanosecond
+    // relative to the first pair, so that a double resolves nanoseconds
     const Point p{1e-9 * static_cast<double>(stamp - line.origin_ns_),
                   static_cast<double>(received - stamp - line.base_ns_)};
-    if (points.empty() || p.x_s > points.back().x_s) points.push_back(p);  // of one stamp, the first has the least
+    if (points.empty() || p.x_s > points.back().x_s) points.push_back(p);  // sorted: least delay first
     least_ns = std::min(least_ns, p.y_ns);
     middle_s += p.x_s / static_cast<double>(pairs.size());
   }
   line.above_ns_ = least_ns;
-  if (points.back().x_s < kLeastSpan_s) return line;
+  if (points.back().x_s < kMinSpan_s) return line;
   const std::vector<Point> hull = lower_hull(points);
   std::size_t i = 0;
   while (i + 2 < hull.size() && hull[i + 1].x_s < middle_s) ++i;
   const double slope_ns_s = (hull[i + 1].y_ns - hull[i].y_ns) / (hull[i + 1].x_s - hull[i].x_s);
-  if (std::abs(slope_ns_s) > 1e9 * kMostDrift) return line;
+  if (std::abs(slope_ns_s) > 1e9 * kMaxDrift) return line;
   line.slope_ = 1e-9 * slope_ns_s;
   line.above_ns_ = hull[i].y_ns - slope_ns_s * hull[i].x_s;
   return line;

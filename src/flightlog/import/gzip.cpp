@@ -34,7 +34,8 @@ std::string gunzipped(std::string_view bytes, const std::string& name, std::vect
     stream.avail_out = static_cast<uInt>(kChunk);
     result = inflate(&stream, Z_NO_FLUSH);
     text.resize(before + kChunk - stream.avail_out);
-    if (result == Z_STREAM_END && (stream.avail_in > 0 || !bytes.empty())) result = inflateReset(&stream);  // another
+    // A gzip file may consist of several members.
+    if (result == Z_STREAM_END && (stream.avail_in > 0 || !bytes.empty())) result = inflateReset(&stream);
     if (result != Z_OK || (stream.avail_in == 0 && bytes.empty() && stream.avail_out > 0)) break;
   }
   if (result == Z_STREAM_END) return text;

@@ -1,4 +1,4 @@
-// Files that gzip made smaller.
+// Reads files that gzip compressed.
 #pragma once
 
 #include <string>
@@ -7,11 +7,11 @@
 
 namespace flappy::flightlog {
 
-/// Whether a file begins as one.
+/// Whether `bytes` begin like a gzip file.
 bool is_gzip(std::string_view bytes);
 
-/// What was made smaller. A file that ends early or is damaged is read as far as it goes, with a warning that names it. InputError
-/// where nothing of it can be read.
+/// The uncompressed content. A file that ends early or is damaged is read up to there, with a warning that begins with
+/// `name`. InputError where nothing can be read.
 std::string gunzipped(std::string_view bytes, const std::string& name, std::vector<std::string>& warnings);
 
 }  // namespace flappy::flightlog

@@ -50,7 +50,8 @@ const std::vector<StreamKeys> kStreams = {
 };
 const Names kAngles = {"roll_rad", "pitch_rad", "yaw_rad"};
 
-/// What a stream has of a table, where the table says that it has less, or something else.
+/// The keys of a stream, reduced or replaced as its table says: declared inputs, no gyro, no currents, angles instead
+/// of a quaternion.
 StreamKeys narrowed(StreamKeys keys, const io::Table& table, bool declared_inputs) {
   const auto drop = [](Names& names, std::string_view part) {
     std::erase_if(names, [&](const std::string& name) { return name.find(part) != std::string::npos; });
@@ -124,7 +125,7 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
     s.time_unit_ns = unit == "s" ? 1e9 : unit == "ms" ? 1e6 : unit == "us" ? 1e3 : 1;
   } else {
     for (const char* key : {"time_field", "time_unit"})
-      if (table.has(key)) table.fail(key, "is given beside time = \"" + time + "\"", "time = \"field\"");
+      if (table.has(key)) table.fail(key, "is given with time = \"" + time + "\"", "time = \"field\"");
   }
   s.clock = table.string_or("clock", kReceiver);
   if (s.time == TimeOf::received && s.clock != kReceiver)
@@ -139,7 +140,7 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
   return s;
 }
 
-/// As flight.toml has them; what is left out is 0 until it is measured.
+/// Reads the declared values of flight.toml; a rate that is left out is 0 until it is measured.
 void read_declared(const io::Table& root, FlightHeader& h) {
   const io::Range rate = positive(1e6), latency = non_negative(10);
   const auto rate_of = [&](const io::Table& table) { return table.number_or("rate_hz", 0, rate); };

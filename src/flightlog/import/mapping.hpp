@@ -1,11 +1,11 @@
-// What becomes of a recording's channels in a flight log: MAPPING.toml. A complete one, with every key:
+// MAPPING.toml: how the channels of a recording become the streams of a flight log. A complete one, with every key:
 //
 //   schema = 1
-//   vehicle = "hummingbird_nominal.toml"     # these, [ambient] and what is declared of each stream are those of flight.toml
+//   vehicle = "hummingbird_nominal.toml"     # this, [ambient] and the declared values of each stream: as in flight.toml
 //   vehicle_sha256 = "..."                   # optional
 //   flapping_Hz = 34.0
 //   gravity_m_s2 = 9.81
-//   start = "first"                          # the log's 0 s: "first" sample (default), or that of the "clock"
+//   start = "first"                          # the log's 0 s: "first" sample (default), or 0 of the receiver's "clock"
 //
 //   [ambient]
 //   air_density_kg_m3 = 1.18
@@ -13,59 +13,59 @@
 //   ceiling_z_m = 3.0
 //   walls = []
 //
-//   [clocks.robot]                           # optional; a clock that a stream names is else measured
+//   [clocks.robot]                           # optional; without it, a clock that a stream names is measured
 //   offset_s = 0.0                           # optional: the receiver's time less this clock's
 //
 //   [command]
-//   channel = "/wing_input"                  # a topic; a CSV's is the stem of its name; "*": the only one of the recording
+//   channel = "/wing_input"                  # a topic; of a CSV, the stem of the file's name; "*": the only channel of the recording
 //   inputs = ["left_flap", "tail"]           # optional: columns in place of voltages; [imu] and flapping_Hz are then optional
 //   time = "stamp"                           # default; "received", or "field"
-//   time_field = "timestamp"                 # with time = "field": where it is, and
-//   time_unit = "us"                         # ... in what: "s" (default), "ms", "us", "ns"
-//   clock = "robot"                          # whose the stamps are; "receiver" (default): those that say when it was received
-//   late_s = 0.02                            # default; a sample that took longer than the stream's quickest by more is counted as late
-//   sequence = "tick"                        # optional: a field that counts samples; lost ones are else known by the rate
-//   [command.columns]                        # of command.csv: the field of each
+//   time_field = "timestamp"                 # with time = "field": the field of the time,
+//   time_unit = "us"                         # ... and its unit: "s" (default), "ms", "us", "ns"
+//   clock = "robot"                          # the clock of the stamps; "receiver" (default): the clock of the times of receipt
+//   late_s = 0.02                            # default; a sample counts as late if its delay exceeds the stream's least delay by more
+//   sequence = "tick"                        # optional: a field that counts samples; without it, lost samples are estimated from the rate
+//   [command.columns]                        # the field for each column of command.csv
 //   left_voltage_V = "left_voltage_v"
 //   right_voltage_V = "right_voltage_v"
-//   [command.scale]                          # optional, as the next: column = scale x field + offset
+//   [command.scale]                          # optional, like [command.offset]: column = scale x field + offset
 //   left_voltage_V = 7.4
 //   [command.offset]
 //   left_voltage_V = 0.0
-//   [command.from]                           # optional: columns whose field is of another channel, as it last was
+//   [command.from]                           # optional: columns from another channel, whose last value holds
 //   right_voltage_V = "/right_wing_input"
 //
-//   [command.flown]                          # optional: the log lasts from the first to the last sample at which
-//   field = "thrust"                         # ... this field of the channel
-//   above = 0.0                              # ... is above this
+//   [command.flown]                          # optional: the log lasts from the first to the last sample where
+//   field = "thrust"                         # ... this field of the channel is
+//   above = 0.0                              # ... above this value
 //
-//   [mocap]                                  # channel, time and columns as above, roll_rad, pitch_rad, yaw_rad in place of qw to qz where
-//                                            # the recording has angles, and
-//   world = "enu"                            # default; or "ned": the frame of position and attitude, turned to z up
-//   frame = "flu"                            # default; or "frd": the body's, turned to x forward, y left, z up
-//   rate_hz = 200                            # optional everywhere: measured
-//   latency_s = 0.0                          # from the instant measured to the time taken: 0 for stamps of that instant
+//   [mocap]                                  # channel, time and columns as above; roll_rad, pitch_rad, yaw_rad replace qw to qz where
+//                                            # the recording has angles
+//   world = "enu"                            # default; or "ned": frame of position and attitude; turned to z up
+//   frame = "flu"                            # default; or "frd": frame of the body; turned to x forward, y left, z up
+//   rate_hz = 200                            # optional in every stream; measured if missing
+//   latency_s = 0.0                          # from the measured instant to the time used here: 0 if the stamp is that instant
 //   position_noise_m = 1e-4
 //   attitude_noise_rad = 2e-3
 //
 //   [imu]                                    # frame as above; columns are specific force and rate
 //   latency_s, bandwidth_hz, position_m, gyro_noise_rad_s, gyro_bias_sd_rad_s, accel_noise_m_s2
-//   gyro = true                              # default; false beside inputs: no gyro, nor its noise and bias
+//   gyro = true                              # default; false, with declared inputs only: no gyro, no noise and bias of it
 //   [power]                                  # optional
 //   battery_nominal_V, latency_s, voltage_noise_V, current_noise_A
-//   currents = true                          # default; false beside inputs: battery_V alone
+//   currents = true                          # default; false, with declared inputs only: battery_V alone
 //   [wings]                                  # optional
 //   noise_rad
-//   [attitude]                               # optional; world and frame as above: a second estimator's
+//   [attitude]                               # optional: attitude of a second estimator; world and frame as above
 //   latency_s, noise_rad
 //
 //   [dds]                                    # for flappy-record: io/dds_config.hpp
 //
 // Angles turn W to B about z by yaw, then about the new y by pitch, then about the new x by roll (Diebel, Representing Attitude, 2006,
-// sequence 1-2-3). As y points left, pitch > 0 is nose down: the scale of an angle that is nose up, or in degrees, says so,
-// pitch_rad = -0.017453292519943295. With world = "ned" and frame = "frd" they are as in aviation, nose up.
+// sequence 1-2-3). As y points left, pitch > 0 is nose down. An angle in degrees, nose up, needs the scale
+// pitch_rad = -0.017453292519943295. With world = "ned" and frame = "frd" angles are as in aviation, nose up.
 //
-// A joint's value is "position[left_stroke]", a transform's "transforms[torso].transform.translation.x".
+// Fields of named elements: "position[left_stroke]" of a joint, "transforms[torso].transform.translation.x" of a transform.
 #pragma once
 
 #include <filesystem>
@@ -93,32 +93,32 @@ struct StreamMapping {
   TimeOf time = TimeOf::stamp;
   std::string time_field;
   double time_unit_ns = 1e9;
-  std::string clock;  ///< kReceiver, or a name
+  std::string clock;  ///< kReceiver, or a name in Mapping::offsets_s or of a clock to measure
   double late_s = 0.02;
   std::string sequence;  ///< empty: none
   std::vector<ColumnMapping> columns;
   bool frd = false, ned = false, measures_rate = false;
-  std::string flown_field;  ///< of the command's: what says that the robot flies; empty: all of it does
+  std::string flown_field;  ///< command stream only: field that is above flown_above in flight; empty: the whole log
   double flown_above = 0;
-  io::Table table;  ///< where faults are
+  io::Table table;  ///< the stream's table in the file, for error messages
 };
 
-/// The clock of the times of receipt.
+/// Name of the clock of the times of receipt.
 inline const std::string kReceiver = "receiver";
 
 struct Mapping {
   std::filesystem::path file;
-  FlightHeader header;  ///< rates that are measured are 0
-  bool from_first = true;
-  std::map<std::string, double> offsets_s;  ///< of clocks, where given
-  io::DdsConfig dds;                        ///< where a recorder finds the robot
+  FlightHeader header;     ///< rates still to be measured are 0
+  bool from_first = true;  ///< whether the log's 0 s is the first sample; else 0 of the receiver's clock
+  std::map<std::string, double> offsets_s;  ///< given offsets of clocks
+  io::DdsConfig dds;                        ///< how a recorder reaches the robot
   std::vector<StreamMapping> streams;       ///< command, mocap, and imu, power, wings and attitude where mapped
 
-  /// What a recording is read for.
+  /// The channels and fields to read from a recording.
   Wanted wanted() const;
 };
 
-/// InputError for what is no mapping.
+/// InputError "file:line:column: key: ..." for a file that is no valid mapping.
 Mapping read_mapping(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
 
 }  // namespace flappy::flightlog

@@ -10,7 +10,7 @@ namespace flappy::flightlog {
 namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
-constexpr double kMostSeconds = 4e9;  // of 32 bits
+constexpr double kMaxSeconds = 4e9;  // about the limit of 32 bits
 
 /// "transforms[0]" of "transforms[0].child_frame_id"; empty where `path` is not the `member` of an element.
 std::string_view element_of(std::string_view path, std::string_view member) {
@@ -37,8 +37,8 @@ const Row& MessageRows::read(std::string_view bytes) {
       return;
     }
     const double number = ros::to_number(value);
-    // whatever a definition takes for seconds
-    const bool fits = std::abs(number) < kMostSeconds;
+    // a definition may use any type for seconds: exclude values that would overflow
+    const bool fits = std::abs(number) < kMaxSeconds;
     if (stamp_ns_ == kNoTime && fits && path.ends_with("stamp.sec")) {
       sec = number;
       open_stamp = true;
@@ -46,7 +46,7 @@ const Row& MessageRows::read(std::string_view bytes) {
       stamp_ns_ = static_cast<std::int64_t>(sec) * kSecond_ns + static_cast<std::int64_t>(number);
       open_stamp = false;
     }
-    // the memory of the row before is used again
+    // reuse the memory of the previous row
     if (count == row_.size()) row_.emplace_back();
     row_[count].name = path;
     row_[count++].value = number;

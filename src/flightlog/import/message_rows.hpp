@@ -1,4 +1,4 @@
-// Messages of ROS 2 as rows.
+// Turns messages of ROS 2 into rows.
 #pragma once
 
 #include <memory>
@@ -11,16 +11,17 @@
 
 namespace flappy::flightlog {
 
-/// Reads messages of one type. A number's field is its path, "pose.position.x". What has a name is known by it: where a message has
-/// a sequence of names (JointState), element i of every other is "position[left_stroke]"; where elements of a sequence have a
-/// name or a child_frame_id themselves (TFMessage), "transforms[torso].transform.translation.x".
+/// Reads messages of one type. The field of a number is its path, "pose.position.x". Names replace indices: where a
+/// message has a sequence "name" (JointState), element i of every other sequence becomes "position[left_stroke]"; where
+/// elements of a sequence have a member name or child_frame_id (TFMessage), they become
+/// "transforms[torso].transform.translation.x".
 class MessageRows {
  public:
   explicit MessageRows(std::shared_ptr<const ros::Layout> layout) : layout_(std::move(layout)) {}
 
-  /// The row, until the next is read. ros::MessageError for bytes that are no such message.
+  /// The row of a message, valid until the next call. ros::MessageError where the bytes do not fit the type.
   const Row& read(std::string_view bytes);
-  /// Of the row: the first member that is a stamp; kNoTime where there is none.
+  /// The first stamp in the last message; kNoTime where it has none.
   std::int64_t stamp_ns() const { return stamp_ns_; }
 
  private:
@@ -28,8 +29,8 @@ class MessageRows {
 
   std::shared_ptr<const ros::Layout> layout_;
   Row row_;
-  std::vector<std::string> names_;                          ///< of the members of all sequences
-  std::vector<std::pair<std::string, std::string>> named_;  ///< "transforms[0]" and what it is called
+  std::vector<std::string> names_;                          ///< the message's sequence "name"
+  std::vector<std::pair<std::string, std::string>> named_;  ///< "transforms[0]" and its name
   std::int64_t stamp_ns_ = kNoTime;
 };
 

@@ -28,8 +28,8 @@ void read_bag(const fs::path& file, Channels& channels, std::vector<std::string>
     std::string first_fault;
   };
   const auto bag = ros::Bag::open(file);
-  std::set<std::string> faulty;                    // told once, though each part of a bag has topics of its own
-  std::map<const ros::BagTopic*, Reader> readers;  // a topic may have had one type, and then another
+  std::set<std::string> faulty;                    // warned of once, although each part of a bag has own topics
+  std::map<const ros::BagTopic*, Reader> readers;  // by address, because two topics may share a name but differ in type
   const auto warn = [&](const ros::BagTopic& topic, const std::string& what) {
     warnings.push_back(file.string() + ": " + io::shortened(topic.name) + ": " + what);
   };
@@ -60,10 +60,10 @@ void read_bag(const fs::path& file, Channels& channels, std::vector<std::string>
       warn(*topic, std::to_string(reader.bad) + " messages left out, the first because " + reader.first_fault);
 }
 
-/// Files that people name here and that are none of ours.
+/// Foreign formats that users try to import.
 struct OtherKind {
   std::string_view begins;
-  std::size_t at;  ///< where that stands
+  std::size_t at;  ///< offset of `begins` in the file
   std::initializer_list<std::string_view> endings;
   std::string_view what, remedy;
 };
@@ -74,7 +74,7 @@ const OtherKind kOtherKinds[] = {
      0,
      {".mcap"},
      "a bag compressed by gzip",
-     "gunzip FILE"},  // Bag::open has taken those that are not compressed
+     "gunzip FILE"},  // uncompressed ones were recognised by Bag::is_bag
     {"SQLite format 3\0"sv, 0, {".db3"}, "a bag compressed by gzip", "gunzip FILE"},
     {"#ROSBAG V"sv, 0, {".bag"}, "a bag of ROS 1", "rosbags-convert --src FILE --dst FOLDER"},
     {"\x28\xB5\x2F\xFD"sv, 0, {".zst", ".zstd"}, "compressed by zstd", "zstd -d FILE"},
@@ -103,7 +103,7 @@ const OtherKind kOtherKinds[] = {
     {"\xFE\xFF"sv, 0, {}, "text in UTF-16", "iconv -f UTF-16 -t UTF-8 FILE"},
 };
 
-/// Refuses what is no text: by its first bytes or, where these say nothing, by how its name ends.
+/// InputError for files that are no text, recognised by their first bytes or by the ending of their names.
 void require_text(const fs::path& file, const std::string& ending, std::string_view bytes) {
   constexpr std::string_view kAccepted = "a bag, a ULog or a CSV";
   for (const OtherKind& kind : kOtherKinds)
@@ -120,7 +120,7 @@ void require_text(const fs::path& file, const std::string& ending, std::string_v
     throw io::InputError(file.string() + ": holds bytes that are no text; accepted: " + std::string(kAccepted));
 }
 
-/// Reads the bytes of a file that is no bag, as a ULog or a table; `plain` is its name without ".gz".
+/// Reads a file that is no bag as a ULog or a table; `plain` is its name without ".gz".
 void read_bytes(const fs::path& file, const fs::path& plain, std::string_view bytes, Channels& channels,
                 std::vector<std::string>& warnings) {
   if (is_ulog(bytes)) return read_ulog(bytes, file.string(), channels, warnings);

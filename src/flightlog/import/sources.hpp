@@ -1,4 +1,4 @@
-// What may be imported: rosbag2's bags (MCAP, SQLite), PX4's ULog, CSV.
+// Reads the formats that can be imported: rosbag2's bags (MCAP, SQLite), PX4's ULog, CSV.
 #pragma once
 
 #include <filesystem>
@@ -9,9 +9,9 @@
 
 namespace flappy::flightlog {
 
-/// Reads a bag, which may be a folder, a ULog or, of any other text, a table (table.hpp), whose channel is the stem of its name. Tables and ULogs may be
-/// compressed by gzip. `warnings` get what was left out. InputError where the file cannot be read; of a kind that others
-/// know, it says which, and what makes it readable.
+/// Reads a bag (a file or a folder), a ULog, or any other text as a table (table.hpp) into the channel named by the
+/// stem of the file. Tables and ULogs may be compressed by gzip. Adds a warning for everything left out. InputError
+/// where the file cannot be read; for a known foreign format it names the format and the command that converts it.
 void read_source(const std::filesystem::path& file, Channels& channels, std::vector<std::string>& warnings);
 
 }  // namespace flappy::flightlog

@@ -21,7 +21,7 @@ constexpr double kMissing = std::numeric_limits<double>::quiet_NaN(),
 
 using Cells = std::vector<std::string>;
 
-/// Splits lines into cells by libcsv, which knows quotes, blanks around cells and line ends within quotes.
+/// Splits lines into cells by libcsv, which handles quotes, blanks around cells and line ends within quotes.
 class RowSplitter {
  public:
   explicit RowSplitter(char separator) : merges_(separator == ' ') {
@@ -32,7 +32,7 @@ class RowSplitter {
   RowSplitter(const RowSplitter&) = delete;
   RowSplitter& operator=(const RowSplitter&) = delete;
 
-  /// Takes a line without its end. True where the row ends with it, and not in quotes that are still open.
+  /// Parses a line without its line end. True if the row is complete, false if quotes are still open.
   bool take(std::string_view line) {
     if (whole_) count_ = 0;
     whole_ = false;
@@ -45,7 +45,7 @@ class RowSplitter {
     csv_fini(&parser_, on_cell, on_row, this);
     whole_ = true;
   }
-  /// The cells of the row, until the next line is taken.
+  /// The cells of the current row; valid until the next take().
   Cells cells() const { return {cells_.begin(), cells_.begin() + static_cast<std::ptrdiff_t>(count_)}; }
   std::size_t size() const { return count_; }
   const std::string& operator[](std::size_t i) const { return cells_[i]; }
@@ -56,7 +56,7 @@ class RowSplitter {
   }
   static void on_cell(void* text, std::size_t size, void* self) {
     auto& own = *static_cast<RowSplitter*>(self);
-    if (own.merges_ && text == nullptr) return;  // between two blanks
+    if (own.merges_ && text == nullptr) return;  // empty cell between two blanks
     if (own.count_ == own.cells_.size()) own.cells_.emplace_back();
     own.cells_[own.count_++].assign(text == nullptr ? "" : static_cast<const char*>(text), size);
   }
@@ -64,7 +64,7 @@ class RowSplitter {
 
   csv_parser parser_ = {};
   bool merges_, whole_ = true;
-  Cells cells_;  ///< memory of the longest row, used again
+  Cells cells_;  ///< reused by all rows; the first count_ cells are valid
   std::size_t count_ = 0;
 };
 
@@ -73,7 +73,7 @@ struct Line {
   std::size_t number = 0;  ///< from 1
 };
 
-/// The lines of a text, one after the other.
+/// Iterates over the lines of a text.
 class Lines {
  public:
   explicit Lines(std::string_view text) : rest_(text) {}
@@ -96,13 +96,13 @@ bool is_comment(std::string_view line) {
   return line.substr(std::min(line.find_first_not_of(" \t"), line.size())).starts_with('#');
 }
 
-/// The names in a comment: what follows its '#'.
+/// The text of a comment after its '#'.
 std::string_view uncommented(std::string_view line) {
   line.remove_prefix(std::min(line.find_first_not_of("# \t"), line.size()));
   return line;
 }
 
-/// The separator of a line's cells: whichever of comma, semicolon and tab is most frequent outside quotes, or else the blank.
+/// The separator of cells in a line: the most frequent of comma, semicolon and tab outside quotes, or else the blank.
 char separator_of(std::string_view line) {
   std::array<std::size_t, 3> counts = {};
   constexpr std::string_view kSeparators = ",;\t";
@@ -123,7 +123,7 @@ bool is_one_of(std::string_view text, std::initializer_list<std::string_view> wo
   return std::ranges::any_of(words, [&](std::string_view word) { return std::ranges::equal(text, word, {}, lower); });
 }
 
-/// A number, kMissing or kNoNumber.
+/// The value of a cell, or kMissing, or kNoNumber.
 double to_number(std::string_view text, bool decimal_comma) {
   std::string with_point;
   if (decimal_comma && std::ranges::count(text, ',') == 1) {
@@ -135,7 +135,7 @@ double to_number(std::string_view text, bool decimal_comma) {
   double value = 0;
   const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error == std::errc::result_out_of_range)
-    value = std::strtod(std::string(text).c_str(), nullptr);  // 0, or infinity
+    value = std::strtod(std::string(text).c_str(), nullptr);  // underflow gives 0, overflow infinity
   if (error != std::errc::invalid_argument && stop == text.data() + text.size()) return value;
   return is_one_of(text, {"", "na", "n/a", "none", "null"}) ? kMissing : kNoNumber;
 }
@@ -144,7 +144,7 @@ double to_number(std::string_view text, bool decimal_comma) {
 struct Header {
   Cells names;
   char separator;
-  std::size_t line;  ///< 0 where the names stand in a comment
+  std::size_t line;  ///< line of the names; 0 if they stand in a comment
 };
 
 Cells split(std::string_view line, char separator) {
@@ -179,7 +179,7 @@ Header header_of(std::string_view text, const std::string& name) {
                        "; accepted: a line of column names, then rows of numbers");
 }
 
-/// Counts of one kind of thing that was left out, and its first case.
+/// Number of omissions of one kind, and the first case.
 struct LeftOut {
   std::size_t count = 0, first_line = 0;
   std::string first;
@@ -215,7 +215,7 @@ class TableReader {
     constexpr std::size_t kMaxLinesOfARow = 50;
     RowSplitter splitter(header_.separator);
     Lines lines(text_);
-    std::vector<Line> row;  // lines of the row being read: several where a quoted cell has line ends
+    std::vector<Line> row;  // lines of the current row: several if a quoted cell contains line ends
     for (auto line = lines.next(); line; line = lines.next()) {
       if (line->number <= header_.line || is_blank(line->text)) continue;
       if (row.empty() && is_comment(line->text)) {
@@ -238,7 +238,8 @@ class TableReader {
   }
 
  private:
-  /// Lines of which one opens quotes that are never closed: each is a row, and that one is left out.
+  /// Treats each of these lines as a row of its own, because one opens quotes that are never closed; leaves that one
+  /// out.
   void split_apart(RowSplitter& splitter, std::vector<Line>& lines) {
     splitter.end_row();
     for (const Line& line : lines) {
@@ -255,7 +256,7 @@ class TableReader {
 
   void add(const RowSplitter& cells, std::size_t line) {
     std::size_t width = cells.size();
-    while (width > named_ && cells[width - 1].empty()) --width;  // a separator at the end
+    while (width > named_ && cells[width - 1].empty()) --width;  // ignore separators at the end
     if (width < named_ || width > std::max(named_, header_.names.size()))
       return other_width_.add(line, std::to_string(width) + (width == 1 ? " cell for " : " cells for ") +
                                         std::to_string(named_) + " names");
@@ -289,12 +290,12 @@ class TableReader {
   std::string name_, channel_;
   Channels& channels_;
   Header header_;
-  Row row_;                           ///< the wanted cells of one row
-  std::vector<std::size_t> columns_;  ///< where each of it stands
-  std::size_t named_ = 0;             ///< columns up to the last that has a name
+  Row row_;                           ///< wanted cells of the current row
+  std::vector<std::size_t> columns_;  ///< column of each wanted cell
+  std::size_t named_ = 0;             ///< number of columns up to the last that has a name
   std::size_t rows_ = 0;
-  bool points_ = false;             ///< whether a cell had a decimal point: then a comma is none
-  LeftOut other_width_, comments_;  ///< other_width_: and quotes that are never closed
+  bool points_ = false;             ///< whether a cell had a point: then a comma is no decimal comma
+  LeftOut other_width_, comments_;  ///< other_width_ includes rows with quotes that are never closed
   std::vector<LeftOut> not_numbers_;
 };
 

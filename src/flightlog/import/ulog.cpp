@@ -17,8 +17,8 @@ namespace {
 
 constexpr std::string_view kMagic("ULog\x01\x12\x35", 7);
 constexpr std::size_t kHeader = 16, kMessageHeader = 3;
-constexpr std::size_t kDeepest = 8, kMostValues = 4096, kMaxSize = 65535;
-constexpr std::size_t kFlags = 16, kOffsets = 3;  // of the message of flags: their bytes, and where data were appended
+constexpr std::size_t kDeepest = 8, kMaxValues = 4096, kMaxSize = 65535;
+constexpr std::size_t kFlags = 16, kOffsets = 3;  // message of flags: its bytes of flags, offsets of appended data
 constexpr std::string_view kTypes = "BFAIMPQDRLCOS";
 constexpr std::size_t kLongestName = 256;
 constexpr std::string_view kSync("\x2F\x73\x13\x20\x25\x0C\xBB\x12", 8);
@@ -53,10 +53,10 @@ constexpr std::array<Basic, 12> kBasics = {{{"int8_t", 1, read_as<std::int8_t>},
 /// A member of a format: "float[3] gyro_rad".
 struct Member {
   std::string type, name;
-  std::size_t count = 0;  ///< of an array
+  std::size_t count = 0;  ///< size of an array; 0: no array
 };
 
-/// A number of a message by its place; what pads has no name.
+/// A number in a message and its offset; padding has an empty name.
 struct Place {
   std::string name;
   std::size_t offset;
@@ -66,7 +66,7 @@ struct Place {
 struct Layout {
   std::vector<Place> places;
   std::size_t size = 0;
-  /// Padding at the end is not written.
+  /// Least size of a message: the logger does not write padding at the end.
   std::size_t least_size() const {
     const auto last =
         std::ranges::find_if(places.rbegin(), places.rend(), [](const Place& p) { return !p.name.empty(); });
@@ -74,12 +74,12 @@ struct Layout {
   }
 };
 
-/// Whether all of it are characters of ASCII.
+/// Whether all bytes are printable ASCII.
 bool is_text(std::string_view bytes) {
   return std::ranges::all_of(bytes, [](char c) { return c >= 0x20 && c < 0x7f; });
 }
 
-/// Whether it can be the name of a topic.
+/// Whether the bytes can be the name of a topic.
 bool is_name(std::string_view bytes) {
   return !bytes.empty() && std::ranges::all_of(bytes, [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '_' || c == '/' || c == '-';
@@ -115,13 +115,13 @@ class UlogReader {
   struct Message {
     char type;
     std::string_view content;
-    std::size_t at, next;  ///< where it stands, and what follows it
+    std::size_t at, next;  ///< offset of the message and of the next one
   };
 
-  // ---- where messages stand, in a file that may be damaged
+  // ---- finding messages in a file that may be damaged
 
-  /// Where the part of the file that holds `at` ends: a logger that died may end amid a message, and what was appended later stands where the
-  /// flags say.
+  /// End of the part of the file that contains `at`. A logger that died may end within a message; the flags give the
+  /// offsets of data that was appended later.
   std::size_t end_of_part(std::size_t at) const {
     std::size_t end = bytes_.size();
     for (const std::uint64_t offset : appended_)
@@ -129,7 +129,7 @@ class UlogReader {
     return end;
   }
 
-  /// Nothing where the part ends before it.
+  /// The message at an offset; nothing where the part ends before the message does.
   std::optional<Message> message_at(std::size_t at) const {
     const std::size_t end = end_of_part(at);
     if (at >= end || end - at < kMessageHeader) return std::nullopt;
@@ -138,10 +138,10 @@ class UlogReader {
     return Message{bytes_[at + 2], bytes_.substr(at + kMessageHeader, size), at, at + kMessageHeader + size};
   }
 
-  /// Whether this can be what its type says.
+  /// Whether the content of a message is plausible for its type.
   bool sound(const Message& m) const {
     const std::string_view c = m.content;
-    const auto key_at = [&](std::size_t i) {  // a length, and so many characters
+    const auto key_at = [&](std::size_t i) {  // a length and this number of characters
       return c.size() > i && c[i] > 0 && c.size() > i + static_cast<unsigned char>(c[i]) &&
              is_text(c.substr(i + 1, static_cast<unsigned char>(c[i])));
     };
@@ -166,7 +166,7 @@ class UlogReader {
       case 'Q':
         return key_at(1);
       case 'L':
-      case 'C':  // begins with a level
+      case 'C':  // 'L' and 'C' begin with a log level
         return c.size() >= 9 && c[0] >= '0' && c[0] <= '7';
       case 'R':
       case 'O':
@@ -178,7 +178,8 @@ class UlogReader {
     }
   }
 
-  /// Whether messages go on at a place: a sound one, or one of some other kind before a sound one, or the end.
+  /// Whether messages continue at an offset: with a sound one, with at most `others` unsound ones before a sound one,
+  /// or with the end of the part.
   bool goes_on(std::size_t at, int others) const {
     if (at == end_of_part(at - 1)) return true;
     const auto m = message_at(at);
@@ -186,7 +187,7 @@ class UlogReader {
     return sound(*m) || (others > 0 && goes_on(m->next, others - 1));
   }
 
-  /// Whether the part ends within a message that begins here.
+  /// Whether the part ends within a message that begins at this offset.
   bool cut_off(std::size_t at) const {
     const std::string_view rest = bytes_.substr(at, end_of_part(at) - at);
     if (rest.size() < kMessageHeader) return true;
@@ -197,8 +198,9 @@ class UlogReader {
     return known != sizes_.end() && size <= known->second.second;
   }
 
-  /// Whether to take a message for what it says. A definition is taken in any case, for without it a whole topic is lost. Data are taken where another message
-  /// follows: one that lost a byte puts what follows out of step. The size of any other message may be what is damaged: it is not taken where data stand within it.
+  /// Whether to trust a message. A sound definition is always trusted, because without it a whole topic is lost. Data
+  /// are trusted if another message follows: after a lost byte nothing would follow in step. Any other message is not
+  /// trusted if a data message lies within it, because then its size is damaged.
   bool believed(const Message& m) const {
     const bool is_sound = sound(m);
     if (is_sound && (m.type == 'F' || m.type == 'A')) return true;
@@ -206,7 +208,7 @@ class UlogReader {
     return (is_sound && m.type == 'D') || next_sound(m.at + 1, m.next, "DS") == m.next;
   }
 
-  /// The next place before `end` where a sound message of these types stands, before another one; or `end`.
+  /// The next offset before `end` with a sound message of one of these types that another message follows; else `end`.
   std::size_t next_sound(std::size_t from, std::size_t end, std::string_view types) const {
     for (std::size_t at = from; at < end; ++at)
       if (const auto m = message_at(at);
@@ -215,7 +217,7 @@ class UlogReader {
     return end;
   }
 
-  /// Notes that bytes are skipped up to the next message, and returns where that stands.
+  /// Returns the offset of the next message and counts the bytes skipped.
   std::size_t skip(std::size_t at) {
     const std::size_t end = end_of_part(at), to = next_sound(at + 1, end, "DSFA");
     if (to == end && end == bytes_.size() && cut_off(at)) {
@@ -239,7 +241,7 @@ class UlogReader {
     if (lost_ms_ > 0) say("the logger itself dropped " + std::to_string(lost_ms_) + " ms");
   }
 
-  // ---- what messages say
+  // ---- interpreting messages
 
   template <class T>
   static T number(std::string_view bytes) {
@@ -278,7 +280,7 @@ class UlogReader {
         appended_.push_back(offset);
   }
 
-  /// "name:type name;type name;".
+  /// Reads a format "name:type name;type name;".
   void format(std::string_view content) {
     const std::size_t colon = content.find(':');
     std::vector<Member>& members = formats_[std::string(content.substr(0, colon))];
@@ -300,7 +302,8 @@ class UlogReader {
     }
   }
 
-  /// False where a type is unknown, or there are too many of them.
+  /// Adds the numbers of a type to `layout`, nested types included. False where a type is unknown, nesting is too deep,
+  /// or there are too many numbers.
   bool lay(const std::string& type, const std::string& path, std::size_t depth, std::size_t& offset,
            Layout& layout) const {
     const auto format = formats_.find(type);
@@ -315,7 +318,7 @@ class UlogReader {
           if (!lay(member.type, element, depth + 1, offset, layout)) return false;
           continue;
         }
-        if (layout.places.size() >= kMostValues) return false;
+        if (layout.places.size() >= kMaxValues) return false;
         layout.places.push_back({pads ? "" : element, offset, basic});
         offset += basic->size;
       }
@@ -348,7 +351,8 @@ class UlogReader {
   void data(std::string_view content) {
     if (content.size() < 2) return void(++bad_);
     const auto id = number<std::uint16_t>(content);
-    // the message that announced it may be lost: what else has its number and size is of the same topic
+    // The message that announces the topic may be lost: other messages with this number and size belong to the same
+    // topic.
     if (sizes_.try_emplace(id, content.size(), content.size()).second) unannounced_.insert(id);
     if (unannounced_.contains(id)) return void(++orphans_);
     const auto topic = topics_.find(id);
@@ -363,7 +367,7 @@ class UlogReader {
       row_.push_back({place.name, place.basic->read(at)});
       if (place.basic->size != 8) continue;
       const auto t_us = number<std::uint64_t>({at, 8});
-      if (t_us > std::uint64_t{1} << 52) continue;  // no time
+      if (t_us > std::uint64_t{1} << 52) continue;  // implausible as a time
       if (place.name == "timestamp") timestamp_ns = static_cast<std::int64_t>(t_us) * kMicrosecond_ns;
       if (place.name == "timestamp_sample" && t_us > 0) sample_ns = static_cast<std::int64_t>(t_us) * kMicrosecond_ns;
     }
@@ -379,7 +383,7 @@ class UlogReader {
   std::map<std::uint16_t, Topic> topics_;
   std::vector<std::uint64_t> appended_;
   Row row_;
-  /// Least and largest size of the data messages of each topic, its number included.
+  /// Least and largest size of the data messages of each topic, including the topic's number.
   std::map<std::uint16_t, std::pair<std::size_t, std::size_t>> sizes_;
   std::set<std::uint16_t> unannounced_;
   std::size_t bad_ = 0, unknown_ = 0, orphans_ = 0, lost_ms_ = 0, skips_ = 0, skipped_ = 0, first_skip_ = 0;

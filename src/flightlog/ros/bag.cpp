@@ -51,17 +51,17 @@ class McapBag : public Bag {
 class SqliteBag : public Bag {
  public:
   explicit SqliteBag(const fs::path& path) : name_(path.string()) {
-    io::MappedFile readable(path);  // says why not, in our words
+    io::MappedFile readable(path);  // throws InputError where the file cannot be read
     sqlite3* database = nullptr;
     const std::string uri = uri_of(unfinished(path) ? copy_of(path) : path);
     const int code = sqlite3_open_v2(uri.c_str(), &database,
                                      (copy_ ? SQLITE_OPEN_READWRITE : SQLITE_OPEN_READONLY) | SQLITE_OPEN_URI, nullptr);
     database_.reset(database);
     if (code != SQLITE_OK) refuse();
-    // else SQLite refuses a file that is shorter than its header says; nothing is written
+    // Without this, SQLite refuses a file that is shorter than its header says. Nothing is written.
     sqlite3_db_config(database, SQLITE_DBCONFIG_WRITABLE_SCHEMA, 1, nullptr);
     read_topics();
-    // in the order of the file, so that one that was cut off is read up to there
+    // In the order of the file, so that a truncated file can be read up to its end.
     messages_ = prepare("SELECT topic_id, timestamp, data FROM messages");
     if (!messages_) refuse();
   }
@@ -97,7 +97,7 @@ class SqliteBag : public Bag {
   };
   using Statement = std::unique_ptr<sqlite3_stmt, Close>;
 
-  /// Whether a writer left changes beside the file.
+  /// Whether a writer left a journal of unfinished changes next to the file.
   static bool unfinished(const fs::path& path) {
     return std::ranges::any_of(kBeside, [&](const char* ending) {
       std::error_code missing;
@@ -105,7 +105,8 @@ class SqliteBag : public Bag {
     });
   }
 
-  /// SQLite brings such changes into the file before it reads it: not into the user's.
+  /// Copies the file and its journals to a temporary folder: SQLite merges the journal into the file before it reads,
+  /// and the user's file must not change.
   fs::path copy_of(const fs::path& path) {
     copy_.emplace();
     for (const char* ending : {"", kBeside[0], kBeside[1]}) {
@@ -119,7 +120,7 @@ class SqliteBag : public Bag {
     return copy_->path() / "bag";
   }
 
-  /// "immutable": neither locks nor files beside it are made.
+  /// With "immutable", SQLite creates neither locks nor files next to the file.
   std::string uri_of(const fs::path& path) const {
     std::string uri = "file:";
     for (const char c : path.string())
@@ -144,7 +145,7 @@ class SqliteBag : public Bag {
   }
 
   void read_topics() {
-    // a table of Iron and later
+    // This table exists since Iron.
     std::map<std::string, std::string> definitions;
     if (const Statement found =
             prepare("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"))
@@ -161,7 +162,7 @@ class SqliteBag : public Bag {
   static constexpr std::array kBeside = {"-wal", "-journal"};
 
   std::string name_;
-  std::optional<io::TemporaryFolder> copy_;  ///< outlives the database
+  std::optional<io::TemporaryFolder> copy_;  ///< declared before database_, because it must outlive it
   std::unique_ptr<sqlite3, Close> database_;
   Statement messages_;
   std::map<std::int64_t, BagTopic> topics_;
@@ -169,7 +170,7 @@ class SqliteBag : public Bag {
   bool ended_ = false;
 };
 
-/// Files one after the other.
+/// The files of a split bag in sequence.
 class SplitBag : public Bag {
  public:
   explicit SplitBag(std::vector<std::unique_ptr<Bag>> parts) : parts_(std::move(parts)) {}
@@ -200,7 +201,7 @@ std::string beginning(const fs::path& path) {
   return {bytes.data(), static_cast<std::size_t>(file.gcount())};
 }
 
-/// The number that ends a file's stem: of bag_2.mcap and bag_10.mcap, bag_2 comes first.
+/// The number at the end of a file's stem, so that bag_2.mcap comes before bag_10.mcap.
 std::uint64_t part_number(const fs::path& path) {
   const std::string stem = path.stem().string();
   const std::string digits = stem.substr(stem.find_last_not_of("0123456789") + 1);
@@ -250,7 +251,7 @@ std::shared_ptr<const Layout> layout_of(const BagTopic& topic) {
   if (!topic.definition.empty()) {
     Definitions definitions;
     definitions.add(topic.type, topic.definition);
-    // a definition that refers to nothing else may leave out what everybody knows
+    // A bag's definition may omit the standard messages that it refers to: then use our own definition of the type.
     try {
       return definitions.layout(topic.type);
     } catch (const MessageError&) {

@@ -1,4 +1,4 @@
-// Recorded messages of ROS 2: rosbag2's MCAP files and SQLite databases, alone or in a bag's folder.
+// Reads recorded messages of ROS 2: rosbag2's MCAP files and SQLite databases, single files or the folder of a bag.
 #pragma once
 
 #include <filesystem>
@@ -14,36 +14,36 @@ namespace flappy::flightlog::ros {
 
 struct BagTopic {
   std::string name, type;  ///< "/imu", "sensor_msgs/msg/Imu"
-  /// Concatenated, as the bag has it; where it has none, empty.
+  /// Concatenated definition from the bag; empty where the bag has none.
   std::string definition;
-  std::string encoding = "cdr";  ///< of its messages
+  std::string encoding = "cdr";  ///< serialisation of the messages
 };
 
 struct BagMessage {
   const BagTopic* topic;  ///< lives as long as the bag
   std::int64_t received_ns;
-  std::string_view bytes;  ///< until the next is read
+  std::string_view bytes;  ///< valid until the next message is read
 };
 
-/// Messages of one file or folder, in the order in which they were written.
+/// Messages of one file or folder, in the order of writing.
 class Bag {
  public:
   virtual ~Bag() = default;
-  /// Nothing at the end, or where what follows cannot be read.
+  /// The next message; nothing at the end or where the rest cannot be read.
   virtual std::optional<BagMessage> next() = 0;
-  /// Names of the topics that were announced so far, whether messages of them came or not.
+  /// Names of the topics announced so far, with or without messages.
   virtual std::vector<std::string> topics() const = 0;
-  /// What was left out so far.
+  /// Warnings about what was left out so far.
   virtual std::vector<std::string> warnings() const = 0;
 
-  /// A file, or a folder whose .mcap or .db3 files are taken in order. InputError where it is no bag.
+  /// Opens a file, or a folder whose .mcap or .db3 files follow each other by number. InputError where it is no bag.
   static std::unique_ptr<Bag> open(const std::filesystem::path& path);
-  /// Whether open() takes it for one.
+  /// Whether `path` looks like a bag to open().
   static bool is_bag(const std::filesystem::path& path);
 };
 
-/// The layout of a topic's messages, by the bag's own definition or by that of standard_messages(). MessageError where neither is
-/// there or can be read, and where messages are not in CDR.
+/// The layout of a topic's messages, from the bag's definition or from standard_messages(). MessageError where neither
+/// gives one and where messages are not in CDR.
 std::shared_ptr<const Layout> layout_of(const BagTopic& topic);
 
 }  // namespace flappy::flightlog::ros

@@ -30,7 +30,7 @@ std::size_t size_of(Kind kind) {
   }
 }
 
-/// Lengthens a path, and takes back what it added.
+/// Appends to a path; the destructor removes the addition.
 class Lengthened {
  public:
   Lengthened(std::string& path, std::string_view name) : path_(path), size_(path.size()) {
@@ -56,7 +56,7 @@ class Reader {
  public:
   Reader(std::string_view bytes, const Visitor& visit) : visit_(visit) {
     constexpr std::size_t kHead = 4;
-    // the second byte is the representation: 0 and 1 are plain CDR, big and little endian
+    // The second byte is the representation: 0 is plain CDR in big endian, 1 in little endian.
     if (bytes.size() < kHead || bytes[0] != 0 || (bytes[1] != 0 && bytes[1] != 1))
       throw MessageError("begins with no header of plain CDR, as where messages are compressed one by one");
     swap_ = bytes[1] == 0;
@@ -64,7 +64,7 @@ class Reader {
   }
 
   void message(const Layout& layout) {
-    if (layout.fields.empty()) take(1);  // no empty struct on the wire
+    if (layout.fields.empty()) take(1);  // an empty struct is one byte on the wire
     for (const LayoutField& field : layout.fields) {
       const Lengthened longer(path_, field.name);
       if (field.many == Many::one) one(field);
@@ -92,7 +92,7 @@ class Reader {
 
   std::string_view string(const LayoutField& field) {
     const auto size = number<std::uint32_t>();
-    if (size == 0) return {};  // some senders leave out the zero of an empty string
+    if (size == 0) return {};  // some senders omit the zero of an empty string
     const std::string_view text = take(size);
     if (text.back() != 0) throw MessageError(path_ + ": is a string without an end");
     if (field.string_capacity > 0 && size - 1 > field.string_capacity)
@@ -139,11 +139,11 @@ class Reader {
                          std::to_string(field.capacity) + " are declared");
     if (count > bytes_.size() - at_) throw MessageError(path_ + ": the message ends before it");
     for (std::size_t i = 0; i < count; ++i) {
-      if (i == kMostElements && !field.message && field.kind != Kind::string) {
+      if (i == kMaxElements && !field.message && field.kind != Kind::string) {
         take((count - i) * size_of(field.kind));
         return;
       }
-      if (i >= kMostElements && !field.message) {
+      if (i >= kMaxElements && !field.message) {
         string(field);
         continue;
       }
@@ -236,7 +236,7 @@ class Writer {
     }
   }
 
-  /// Whether element `i` of the sequence at the path, or a member of it, is given.
+  /// Whether `members_` has element `i` of the sequence at the path, or a member of that element.
   bool has_element(std::size_t i) {
     const Lengthened longer(path_, i);
     const auto found = members_.lower_bound(path_);

@@ -30,12 +30,12 @@ void put_header(Members& m, std::int64_t t_ns, const char* frame, const std::str
   m[path + ".frame_id"] = frame;
 }
 
-/// The same number on the diagonal of a matrix of 3 x 3.
+/// Sets the diagonal of a 3 x 3 covariance to sd^2.
 void put_variance(Members& m, const std::string& path, double sd) {
   for (const int i : {0, 4, 8}) m[path + "[" + std::to_string(i) + "]"] = sd * sd;
 }
 
-/// The samples of one stream: when each was logged, and what writes it.
+/// A stream of the log: its times and the function that writes a sample.
 struct Feed {
   const Column* t_s;
   std::function<void(std::size_t i)> write;
@@ -52,7 +52,7 @@ class FlightFile {
     if (log.wings && log.header.wings) feeds_.push_back({&log.wings->t_s, [this](std::size_t i) { write_wings(i); }});
   }
 
-  /// All samples in the order of their times, as a recorder would have seen them.
+  /// Writes all samples in the order of their arrival, as a recorder would have.
   void write() {
     while (true) {
       Feed* first = nullptr;
@@ -131,7 +131,7 @@ class FlightFile {
                  {"linear_acceleration.y", s.accel_y_m_s2[i]},
                  {"linear_acceleration.z", s.accel_z_m_s2[i]},
                  {"orientation.w", 1.0},
-                 {"orientation_covariance[0]", -1.0}};  // it knows none
+                 {"orientation_covariance[0]", -1.0}};  // -1: no orientation, as sensor_msgs/Imu specifies
     put_header(m, to_ns(s.t_s[i] - h.latency_s), kTorso);
     put_variance(m, "angular_velocity_covariance", h.gyro_noise_rad_s);
     put_variance(m, "linear_acceleration_covariance", h.accel_noise_m_s2);

@@ -47,10 +47,10 @@ std::size_t to_size(std::string_view text, std::string_view line) {
   return value;
 }
 
-/// A member as its line has it, its type not looked up yet.
+/// A member from its line; a message type is not resolved yet.
 struct Member {
   LayoutField field;
-  std::string type;  ///< of a message
+  std::string type;  ///< name of a message type; else empty
 };
 
 std::string resolved(std::string_view type, std::string_view package) {
@@ -65,7 +65,7 @@ bool is_name(std::string_view word) {
   });
 }
 
-/// Nothing of an empty line, a comment or a constant.
+/// Parses a line; nothing for an empty line, a comment or a constant.
 std::optional<Member> parse_member(std::string_view line, std::string_view package) {
   if (line.empty() || line.front() == '#') return {};
   std::string_view rest = line;

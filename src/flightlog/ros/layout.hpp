@@ -1,7 +1,7 @@
-// What a ROS 2 message consists of, read from its definition (the text of a .msg file).
+// Reads the members of a ROS 2 message from its definition (the text of a .msg file).
 //
-// A concatenated definition, as MCAP files and rosbag2's databases hold it, is the text of one message followed by those that it
-// refers to, each after a line of '=' and a line "MSG: package/Type".
+// A concatenated definition, as MCAP files and rosbag2's databases contain it, is the text of one message followed by the texts of the
+// messages that it refers to, each after a line of '=' and a line "MSG: package/Type".
 #pragma once
 
 #include <cstdint>
@@ -14,13 +14,13 @@
 
 namespace flappy::flightlog::ros {
 
-/// A definition or the bytes of a message are not what they should be; what() says why.
+/// Thrown for an invalid definition and for invalid bytes of a message.
 class MessageError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Numbered as in type_description_interfaces/msg/FieldType, which hashes of types (REP 2016) are made of.
+/// Numbered as in type_description_interfaces/msg/FieldType, because type hashes (REP 2016) contain these numbers.
 enum class Kind : std::uint8_t {
   message = 1,
   int8 = 2,
@@ -46,7 +46,7 @@ struct LayoutField {
   std::string name;
   Kind kind = Kind::message;
   Many many = Many::one;
-  std::size_t capacity = 0;         ///< of an array, or at most of a bounded sequence
+  std::size_t capacity = 0;         ///< size of an array, largest size of a bounded sequence
   std::size_t string_capacity = 0;  ///< 0: unbounded
   std::shared_ptr<const Layout> message;
 };
@@ -56,18 +56,18 @@ struct Layout {
   std::vector<LayoutField> fields;
 };
 
-/// "package/msg/Type" of that or of "package/Type".
+/// "package/msg/Type" from "package/Type"; other names stay as they are.
 std::string full_type_name(std::string_view name);
 
-/// Definitions by name.
+/// Texts of definitions by type name.
 class Definitions {
  public:
-  /// A concatenated definition; parts that are there already stay as they were.
+  /// Adds all parts of a concatenated definition; known parts are not replaced.
   void add(std::string_view type, std::string_view text);
   bool has(std::string_view type) const { return texts_.contains(full_type_name(type)); }
   /// MessageError where the type, or one that it refers to, is unknown, cannot be read or contains itself.
   std::shared_ptr<const Layout> layout(std::string_view type) const;
-  /// The concatenated definition.
+  /// The concatenated definition of a type.
   std::string concatenated(std::string_view type) const;
   std::vector<std::string> names() const;
 

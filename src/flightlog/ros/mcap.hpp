@@ -1,4 +1,5 @@
-// Messages of many topics in one file: MCAP (mcap.dev/spec), profile "ros2", as rosbag2 writes it and Foxglove and PlotJuggler read it.
+// Writes and reads MCAP files (mcap.dev/spec): messages of many topics in one file. Profile "ros2", which rosbag2 writes and Foxglove and
+// PlotJuggler read.
 #pragma once
 
 #include <cstdint>
@@ -15,30 +16,30 @@
 namespace flappy::flightlog::ros {
 
 struct McapOptions {
-  bool compress = true;  ///< chunks in zstd, or as they are
+  bool compress = true;  ///< whether chunks are compressed by zstd
   std::size_t chunk_bytes = 1u << 20;
-  /// So much of the messages, by their times of logging, may be lost when the process is killed.
+  /// Longest span of log times that a chunk may cover, so that no more is lost when the process is killed.
   double flush_s = 1;
 };
 
-/// Writes messages in chunks. A chunk is handed to the system whole and does not need what follows, so a killed process
+/// Writes messages in chunks. A chunk is written as a whole and does not depend on later bytes, so a killed process
 /// leaves a file that can be read up to its last chunk. InputError where the file cannot be written.
 class McapWriter {
  public:
   explicit McapWriter(const std::filesystem::path& path, const McapOptions& options = {});
-  /// Finishes the file if finish() was not called; then what cannot be written is not reported.
+  /// Finishes the file if finish() was not called; errors of writing are then not reported.
   ~McapWriter();
   McapWriter(const McapWriter&) = delete;
   McapWriter& operator=(const McapWriter&) = delete;
 
-  /// A number for the topic, to write messages with. The definition is concatenated; `hash` as type_hash() has it, or empty.
+  /// Returns the number of the topic for write(). `definition`: concatenated. `hash`: from type_hash(), or empty.
   std::uint16_t add_topic(const std::string& topic, const std::string& type, const std::string& definition,
                           const std::string& hash);
-  /// `stamp_ns`: when it was sent, or what it tells of happened.
+  /// `stamp_ns`: time of sending or of the event that the message reports.
   void write(std::uint16_t topic, std::int64_t logged_ns, std::int64_t stamp_ns, std::string_view bytes);
-  /// Hands over what is in memory.
+  /// Writes the open chunk to the file.
   void flush();
-  /// Adds the summary, by which readers find things fast.
+  /// Writes the summary, which gives readers random access.
   void finish();
   std::uint64_t messages() const { return messages_; }
 
@@ -51,7 +52,7 @@ class McapWriter {
     std::uint16_t schema;
     std::uint32_t sequence = 0;
     std::uint64_t count = 0;
-    bool in_chunks = false;  ///< whether a chunk has its record
+    bool in_chunks = false;  ///< whether its channel record was written in a chunk
   };
   struct ChunkIndex;
 
@@ -67,31 +68,31 @@ class McapWriter {
   std::vector<Topic> topics_;
   std::string chunk_;
   std::int64_t chunk_first_ns_ = 0, chunk_last_ns_ = 0, opened_ns_ = 0, first_ns_ = 0, last_ns_ = 0;
-  std::map<std::uint16_t, std::string> chunk_messages_;  ///< entries of the index by topic
+  std::map<std::uint16_t, std::string> chunk_messages_;  ///< index of the open chunk: log times and offsets, by topic
   std::vector<ChunkIndex> chunks_;
   bool finished_ = false;
 };
 
 struct McapTopic {
-  std::string name, type, encoding;             ///< of the messages: "cdr"
-  std::string definition, definition_encoding;  ///< "ros2msg", where the definition is one that layout.hpp reads
+  std::string name, type, encoding;             ///< encoding: serialisation of the messages, "cdr"
+  std::string definition, definition_encoding;  ///< "ros2msg" for the format of layout.hpp
 };
 
 struct McapMessage {
   const McapTopic* topic;
   std::uint32_t sequence;
   std::int64_t logged_ns, stamp_ns;
-  std::string_view bytes;  ///< until the next is read
+  std::string_view bytes;  ///< valid until the next message is read
 };
 
-/// Goes through all messages in the order of the file. What is damaged is left out, and a file that ends early is read as far
-/// as it goes; warnings say so.
+/// Reads all messages in the order of the file. Damaged records are left out, and a file that ends early is read up to
+/// there; both give a warning.
 class McapReader {
  public:
-  /// `bytes` outlive the reader; `name` stands for the file in messages. InputError where this is no MCAP file.
+  /// `bytes` must outlive the reader; `name` is the file in messages. InputError where this is no MCAP file.
   McapReader(std::string_view bytes, std::string name);
   std::optional<McapMessage> next();
-  /// Names of the channels that were announced so far.
+  /// Names of the channels announced so far.
   std::vector<std::string> topics() const;
   const std::vector<std::string>& warnings() const { return warnings_; }
 
@@ -102,7 +103,7 @@ class McapReader {
   void warn(const std::string& what);
 
   std::string name_;
-  std::string_view all_, rest_;  ///< of the file
+  std::string_view all_, rest_;  ///< the whole file, and its unread part
   std::string_view chunk_rest_;
   std::string chunk_;  ///< uncompressed
   std::map<std::uint16_t, McapTopic> schemas_;

@@ -13,11 +13,11 @@ namespace {
 
 using namespace mcap;
 
-/// Of an uncompressed chunk, which writers make of some MB; more is a damaged length.
+/// Largest size of an uncompressed chunk. Writers use some MB, so a larger value is a damaged length.
 constexpr std::uint64_t kLargestChunk = 256u << 20;
-/// A block of 128 KiB takes 4 bytes at least, in zstd as in lz4.
-constexpr std::uint64_t kMostCompressed = 1u << 15;
-constexpr std::size_t kMostWarnings = 20;
+/// Largest compression ratio: a block of 128 KiB takes at least 4 bytes in zstd and in lz4.
+constexpr std::uint64_t kMaxCompressed = 1u << 15;
+constexpr std::size_t kMaxWarnings = 20;
 
 void unpack_zstd(std::string_view packed, std::string& out) {
   const std::size_t size = ZSTD_decompress(out.data(), out.size(), packed.data(), packed.size());
@@ -49,11 +49,11 @@ McapReader::McapReader(std::string_view bytes, std::string name) : name_(std::mo
   rest_.remove_prefix(kMagic.size());
   try {
     read_summary();
-  } catch (const MessageError&) {  // none, or damaged: what it has stands before the messages, too
+  } catch (const MessageError&) {  // no or damaged summary: the channels also stand before their messages
   }
 }
 
-/// Channels stand in the summary once more: a damaged chunk need not take them with it.
+/// Reads the channels repeated in the summary, so that a damaged chunk does not lose them.
 void McapReader::read_summary() {
   constexpr std::size_t kFooterSize = kHead + 20;
   if (!all_.ends_with(kMagic) || all_.size() < 2 * kMagic.size() + kFooterSize) return;
@@ -75,8 +75,8 @@ std::vector<std::string> McapReader::topics() const {
 }
 
 void McapReader::warn(const std::string& what) {
-  if (warnings_.size() < kMostWarnings) warnings_.push_back(name_ + ": " + what);
-  else if (warnings_.size() == kMostWarnings) warnings_.push_back(name_ + ": is damaged in more places");
+  if (warnings_.size() < kMaxWarnings) warnings_.push_back(name_ + ": " + what);
+  else if (warnings_.size() == kMaxWarnings) warnings_.push_back(name_ + ": is damaged in more places");
 }
 
 std::optional<McapMessage> McapReader::next() {
@@ -84,7 +84,7 @@ std::optional<McapMessage> McapReader::next() {
     if (in_chunk_ && chunk_rest_.empty()) in_chunk_ = false;
     if (!in_chunk_ && ended_) return {};
     std::string_view& rest = in_chunk_ ? chunk_rest_ : rest_;
-    const std::size_t at = all_.size() - rest_.size();  // in the file; of a chunk, its end
+    const std::size_t at = all_.size() - rest_.size();  // offset in the file; within a chunk: the chunk's end
     try {
       Parts parts(rest);
       const auto code = parts.number<std::uint8_t>();
@@ -97,7 +97,7 @@ std::optional<McapMessage> McapReader::next() {
         warn((in_chunk ? "a record in the chunk before byte " : "the record at byte ") + std::to_string(at) + " " +
              error.what() + ": left out");
       }
-    } catch (const MessageError&) {  // what the length says is not there
+    } catch (const MessageError&) {  // the record is longer than the rest
       if (in_chunk_) warn("the chunk before byte " + std::to_string(at) + " ends within a record");
       else warn("ends within a record, at byte " + std::to_string(at) + ": read as far as it goes");
       (in_chunk_ ? chunk_rest_ : rest_) = {};
@@ -124,7 +124,7 @@ std::optional<McapMessage> McapReader::record(std::uint8_t code, std::string_vie
       McapTopic topic = schema == schemas_.end() ? McapTopic() : schema->second;
       topic.name = parts.string();
       topic.encoding = parts.string();
-      topics_.try_emplace(id, std::move(topic));  // written once more in the summary; messages point to the first
+      topics_.try_emplace(id, std::move(topic));  // keep the first of repeated records: messages point to it
       return {};
     }
     case kMessage: {
@@ -141,7 +141,7 @@ std::optional<McapMessage> McapReader::record(std::uint8_t code, std::string_vie
       open_chunk(content);
       return {};
     case kDataEnd:
-    case kFooter:  // what follows repeats what was before
+    case kFooter:  // the rest repeats earlier records
       if (!in_chunk_) ended_ = true;
       return {};
     default:
@@ -151,12 +151,12 @@ std::optional<McapMessage> McapReader::record(std::uint8_t code, std::string_vie
 
 void McapReader::open_chunk(std::string_view content) {
   Parts parts(content);
-  parts.raw(16);  // times
+  parts.raw(16);  // skip the first and the last time
   const auto size = parts.number<std::uint64_t>();
   const auto expected = parts.number<std::uint32_t>();
   const std::string_view compression = parts.string();
   const std::string_view records = parts.raw(parts.number<std::uint64_t>());
-  if (size > kLargestChunk || (!compression.empty() && size / kMostCompressed > records.size()))
+  if (size > kLargestChunk || (!compression.empty() && size / kMaxCompressed > records.size()))
     throw MessageError("is a chunk of " + std::to_string(size) + " bytes");
   if (compression.empty()) {
     chunk_rest_ = records;

@@ -1,4 +1,4 @@
-// Records of MCAP as bytes: a code, the length of what follows, and that.
+// Records of MCAP as bytes: a code, the length of the content, and the content.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +32,7 @@ enum Code : std::uint8_t {
   kDataEnd,
 };
 
-/// Numbers are little endian, as they are in memory here.
+/// Appends numbers and strings. Numbers are little endian, which is also the order in memory on supported machines.
 class Bytes {
  public:
   template <class T>
@@ -52,7 +52,7 @@ class Bytes {
     return *this;
   }
   const std::string& text() const { return text_; }
-  /// As a record.
+  /// The bytes as the content of a record.
   std::string record(Code code) const {
     Bytes head;
     head.number<std::uint8_t>(code).number<std::uint64_t>(text_.size());
@@ -63,7 +63,7 @@ class Bytes {
   std::string text_;
 };
 
-/// Takes numbers and strings off the front; MessageError where there are none left.
+/// Reads numbers and strings from the front; MessageError where too few bytes are left.
 class Parts {
  public:
   explicit Parts(std::string_view bytes) : rest_(bytes) {}

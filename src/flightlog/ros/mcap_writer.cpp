@@ -32,7 +32,7 @@ McapWriter::McapWriter(const std::filesystem::path& path, const McapOptions& opt
 McapWriter::~McapWriter() {
   try {
     finish();
-  } catch (const io::InputError&) {  // who wants to know calls finish()
+  } catch (const io::InputError&) {  // callers who need the error call finish() themselves
   }
 }
 
@@ -52,7 +52,7 @@ std::uint16_t McapWriter::add_topic(const std::string& topic, const std::string&
   return static_cast<std::uint16_t>(topics_.size() - 1);
 }
 
-// a schema of number 0 would be none
+// Numbers of schemas begin at 1, because 0 means no schema.
 std::string McapWriter::schema_record(std::size_t index) const {
   const Schema& schema = schemas_[index];
   return Bytes()
@@ -66,7 +66,7 @@ std::string McapWriter::schema_record(std::size_t index) const {
 std::string McapWriter::channel_record(std::size_t index) const {
   const Topic& topic = topics_[index];
   Bytes metadata;
-  metadata.string("offered_qos_profiles").string("");  // the profile requires it; empty: any
+  metadata.string("offered_qos_profiles").string("");  // required by the profile; empty: any QoS
   if (!topic.hash.empty()) metadata.string("topic_type_hash").string(topic.hash);
   return Bytes()
       .number(static_cast<std::uint16_t>(index))
@@ -178,7 +178,7 @@ void McapWriter::finish() {
   group(kChunkIndex, indexes);
   const std::uint64_t offset_start = start + summary.size();
   summary += offsets;
-  // the checksum goes up to itself
+  // The checksum covers the summary and the footer up to the checksum itself.
   Bytes footer;
   footer.number(start).number(offset_start);
   Bytes head;

@@ -1,20 +1,21 @@
-// The messages that this project reads and writes, known without a definition beside them.
+// Definitions of the messages that this project reads and writes, for bags and senders that do not include them.
 #pragma once
 
 #include "flightlog/ros/layout.hpp"
 
 namespace flappy::flightlog::ros {
 
-/// Those of ROS 2 (the same from Humble on), and flappy_msgs:
+/// Messages of ROS 2 (unchanged since Humble) and of flappy_msgs:
 ///
-///   WingInput        what the driver applied: inputs of the wing beat, voltages, phase of the beat
-///   Tick             what a simulated robot tells its autopilot in each control period
-///   TrainingMetrics  how far a training is
+///   WingInput        applied by the driver: inputs of the wing beat, voltages, phase of the beat
+///   Tick             sent by a simulated robot to its autopilot in each control period
+///   TrainingMetrics  progress of a training
 ///   JobStatus        a job in the queue of a server
-///   Watch            which flapper of a batch is shown
-///   Command, CommandResult, FileChunk   what is asked of a server, and what it says and hands over
+///   Watch            selects the flapper of a batch that is shown
+///   Command, CommandResult, FileChunk   a request to a server, its reply, and a part of a file that it sends
 ///
-/// Each as members alone: constants, defaults and comments are no part of a message on the wire, nor of its hash.
+/// The texts contain members only: constants, defaults and comments belong neither to the bytes of a message nor to its
+/// hash.
 const Definitions& standard_messages();
 
 namespace type_name {

@@ -6,7 +6,7 @@ namespace flappy::flightlog::ros {
 namespace {
 
 constexpr int kBoundedString = 21;
-/// What an array, a bounded and an unbounded sequence of a kind add to its number.
+/// Step between the type numbers of a kind, its array, its bounded and its unbounded sequence.
 constexpr int kStep = 48;
 
 int type_id(const LayoutField& field) {
@@ -28,7 +28,7 @@ std::string description(const Layout& layout) {
     members += member(field.name, type_id(field), field.capacity, field.string_capacity,
                       field.message ? field.message->name : "");
   }
-  // the wire has no empty struct
+  // A struct without members has this member in the description, as in IDL.
   if (members.empty()) members = member("structure_needs_at_least_one_member", static_cast<int>(Kind::uint8), 0, 0, "");
   return "{\"type_name\": \"" + layout.name + "\", \"fields\": [" + members + "]}";
 }

@@ -1,4 +1,4 @@
-// The hash by which ROS 2 (from Iron on) knows a type of message (REP 2016).
+// The hash that identifies a message type in ROS 2, from Iron on (REP 2016).
 #pragma once
 
 #include <string>
@@ -7,11 +7,11 @@
 
 namespace flappy::flightlog::ros {
 
-/// "RIHS01_" and the SHA-256 of the type's description: JSON of its members and of all types that it refers to, by name, with
-/// the spaces that ROS 2 writes.
+/// "RIHS01_" and the SHA-256 of type_description().
 std::string type_hash(const Layout& layout);
 
-/// What is hashed.
+/// JSON with the members of a type and of all types that it refers to, sorted by name, with the spaces that ROS 2
+/// writes.
 std::string type_description(const Layout& layout);
 
 }  // namespace flappy::flightlog::ros

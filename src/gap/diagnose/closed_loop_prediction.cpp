@@ -15,18 +15,19 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-/// Of the path that is judged, and of the one that is flown: closer, for who flies it smooths once more.
+/// Standard deviation of the smoothing weights: for the path that deviations are measured from, and for the path that a simulation follows, which
+/// is smoothed less because the flight itself smooths it again; and the time between the knots of the latter.
 constexpr double kPathSd_s = 0.25, kFlownSd_s = 0.12, kKnot_s = 0.1;
-/// A path that stays within these hovers.
+/// A path within these ranges of position and heading counts as a hover.
 constexpr double kHoverReach_m = 0.06, kHoverTurn_rad = 0.6;
-/// Before a recorded path: hover to learn the trim, this far from ground and ceiling, then the way to where the path starts,
-/// and rest.
+/// Before a recorded path, the simulation hovers kClear_m away from ground and ceiling while the controller learns the trim, approaches the start
+/// of the path, and rests there.
 constexpr double kLearn_s = 3, kApproach_s = 1, kRest_s = 0.5, kLead_s = kLearn_s + kApproach_s + kRest_s;
 constexpr double kClear_m = 0.5;
-/// Until who starts at rest has caught up with a path that does not: not judged.
+/// Left out at the start of each flight: a simulated vehicle starts at rest and has to catch up with a moving path.
 constexpr double kCatchUp_s = 0.5;
-/// Fewer beats say nothing.
-constexpr std::size_t kLeastBeats = 40;
+/// Least number of beats from which quantities are computed.
+constexpr std::size_t kMinBeats = 40;
 
 constexpr std::array<const char*, 9> kQuantities = {"mean_amplitude_V", "mean_difference_V", "mean_bias_V",
                                                     "mean_split_cycle", "amplitude_rise_V",  "rms_roll_rad",
@@ -35,12 +36,12 @@ using Quantities = std::array<double, kQuantities.size()>;
 
 /// Means over one beat.
 struct Beat {
-  double t_s = 0, roll_rad = 0, pitch_rad = 0, heading_rad = 0;  ///< heading: whole turns counted
+  double t_s = 0, roll_rad = 0, pitch_rad = 0, heading_rad = 0;  ///< heading: continuous over whole turns
   Vector3d position_m = Vector3d::Zero();
   BeatMotion regime;
 };
 
-/// Whole beats of a recording in which all streams were there and the ground was not, from `from_s` to `to_s`.
+/// Whole beats of a recording from `from_s` to `to_s` in which all streams have data and the vehicle is clear of the ground.
 std::vector<Beat> beats_of(const Recording& r, double from_s, double to_s) {
   struct Sum {
     double n = 0, t_s = 0, roll = 0, pitch = 0;
@@ -77,7 +78,7 @@ std::vector<Beat> beats_of(const Recording& r, double from_s, double to_s) {
   return beats;
 }
 
-/// Where a log went: position and heading.
+/// x, y, z in W, m, and heading, rad.
 using PlaceAndHeading = Eigen::Vector4d;
 PlaceAndHeading place_of(const Beat& b) {
   return {b.position_m.x(), b.position_m.y(), b.position_m.z(), b.heading_rad};
@@ -87,7 +88,7 @@ struct OnPath {
   PlaceAndHeading at, per_s;
 };
 
-/// A line through the beats around an instant.
+/// The path at an instant, by a weighted straight line through the beats around it.
 OnPath path_at(const std::vector<Beat>& beats, double t_s, double sd_s) {
   double n = 0, t = 0, tt = 0;
   PlaceAndHeading sum = PlaceAndHeading::Zero(), moment = PlaceAndHeading::Zero();
@@ -99,7 +100,7 @@ OnPath path_at(const std::vector<Beat>& beats, double t_s, double sd_s) {
     sum += w * place_of(b), moment += w * dt * place_of(b);
   }
   const double spread = n * tt - t * t;
-  if (!(spread > 1e-9 * n * n * sd_s * sd_s)) {  // next to nothing around it: the nearest
+  if (!(spread > 1e-9 * n * n * sd_s * sd_s)) {  // too few beats nearby for a line: take the nearest beat
     const auto nearest = std::ranges::min_element(beats, {}, [&](const Beat& b) { return std::abs(b.t_s - t_s); });
     return {place_of(*nearest), PlaceAndHeading::Zero()};
   }
@@ -111,7 +112,7 @@ Quantities quantities_of(std::vector<Beat> beats) {
   std::erase_if(beats, [&](const Beat& b) { return b.t_s < begin_s; });
   Quantities q;
   q.fill(kNan);
-  if (beats.size() < kLeastBeats) return q;
+  if (beats.size() < kMinBeats) return q;
   const auto n = static_cast<double>(beats.size());
   const auto mean = [&](const auto& of) {
     double sum = 0;
@@ -149,7 +150,7 @@ Quantities quantities_of(std::vector<Beat> beats) {
 
 using Path = std::vector<flight::Segment<double>>;
 
-/// Cubic from place to place with the given velocities.
+/// Cubic path segment with the given end points and velocities.
 flight::Segment<double> segment(std::uint32_t tick, double duration_s, const OnPath& from, const OnPath& to) {
   flight::Segment<double> s{tick, {}};
   const double h = duration_s;
@@ -162,7 +163,7 @@ flight::Segment<double> segment(std::uint32_t tick, double duration_s, const OnP
   return s;
 }
 
-/// Learns to trim in clear air, goes to where the robot was first, and then where it went.
+/// The path of a simulation: hover away from surfaces to learn the trim, approach the start of the recorded path, rest, follow the recorded path.
 Path path_of(const std::vector<Beat>& beats, const sim::World& world, double tick_s) {
   std::vector<OnPath> knots;
   const double first_s = beats.front().t_s, span_s = beats.back().t_s - first_s;
@@ -195,7 +196,7 @@ Path path_of(const std::vector<Beat>& beats, const sim::World& world, double tic
   return path;
 }
 
-/// What is flown where a flight was recorded, and which part of the simulated log counts.
+/// A simulated flight for a recorded one, and the part of its log that is evaluated.
 struct Sortie {
   rollout::FlyConfig config;
   double from_s = 0, to_s = 0;
@@ -204,7 +205,7 @@ struct Sortie {
 Sortie along(const std::vector<Beat>& beats, const Recording& r, const rollout::FlyConfig& pilot) {
   Sortie s{pilot, kLead_s, kLead_s + beats.back().t_s - beats.front().t_s};
   rollout::FlyConfig& c = s.config;
-  c.duration_s = s.to_s + 0.2;  // so that motion capture, which is late, still sees the end
+  c.duration_s = s.to_s + 0.2;  // motion capture has latency and has to log the end, too
   c.excitation = {};
   c.fleet.batch.world = r.world;
   flight::Task& task = c.fleet.task;
@@ -245,7 +246,7 @@ std::vector<ClosedLoop> predict_closed_loop(const Flights& flights, const model:
     if (v == 0) found[f][0] = quantities_of(beats);
     Quantities& to = found[f][1 + v];
     to.fill(kNan);
-    if (beats.size() < kLeastBeats) return;
+    if (beats.size() < kMinBeats) return;
     const Sortie sortie = options.own_path ? Sortie{pilot, pilot.settle_s, pilot.duration_s} : along(beats, r, pilot);
     to = predict(sortie, r, *vehicles[v], options.copies);
   });

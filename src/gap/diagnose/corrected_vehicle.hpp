@@ -1,4 +1,4 @@
-// The vehicle that a diagnosis hands back to train on.
+// The corrected vehicle, to train on.
 #pragma once
 
 #include "flappy/vehicle.hpp"
@@ -6,7 +6,8 @@
 
 namespace flappy::gap {
 
-/// The vehicle with what was concluded and nothing else; its posterior holds what remains uncertain. `uncertain`: with the minor draws of the inference.
+/// The vehicle with the parameters and effects of the conclusion and nothing else; its posterior has their remaining uncertainty. `uncertain`: the
+/// randomisation with the minor draws of the inference.
 model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Inference& inference,
                                  const sim::Randomisation& uncertain);
 

@@ -5,7 +5,7 @@
 #include "gap/diagnose/closed_loop_prediction.hpp"
 #include "gap/diagnose/corrected_vehicle.hpp"
 #include "gap/diagnose/result.hpp"
-#include "gap/replay/mean_prediction.hpp"
+#include "gap/replay/beat_averaged_prediction.hpp"
 #include "gap/replay/reset_prediction.hpp"
 #include "io/config.hpp"
 #include "model/effects/registry.hpp"
@@ -15,10 +15,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Probability of the second hypothesis from which on a flight is looked for that tells it from the first.
+/// A next flight is proposed if the second hypothesis has at least this probability.
 constexpr double kMinRival = 0.01;
-/// A beat-averaged vehicle file may lack many effects at once, and to fit another costs little.
-constexpr int kMaxMeanEffects = 8;
+/// Most effects in a hypothesis on a beat-averaged vehicle: its file may lack many effects at once, and another fit costs little.
+constexpr int kMaxBeatAveragedEffects = 8;
 
 std::vector<int> read_channels(const std::vector<std::string>& names, bool beat_averaged) {
   if (!names.empty() && !beat_averaged)
@@ -58,10 +58,10 @@ rollout::FlyConfig read_pilot(const std::string& manoeuvre) {
 
 void check_withheld(const std::vector<std::string>& withheld, const model::Vehicle& vehicle) {
   std::vector<std::string> known;
-  for (const model::EffectEntry& e : model::catalogue_of(vehicle)) known.emplace_back(e.info.id);
+  for (const model::CatalogueEffect& e : model::catalogue_of(vehicle)) known.emplace_back(e.info.id);
   for (const std::string& id : withheld)
     if (model::find_effect(vehicle, id) == nullptr)
-      throw io::InputError("--withhold " + id + ": no such effect; accepted: identifiers of docs/effects.md" +
+      throw io::InputError("--withhold " + id + ": no such effect; accepted: those that flappy-gap effects lists" +
                            io::did_you_mean(id, known));
 }
 
@@ -85,7 +85,7 @@ DiagnosisRequest read_request(const DiagnosisSettings& s) {
   options.threads = s.threads;
   if (beat_averaged) {
     options.max_finalists = static_cast<int>(model::catalogue_of(vehicle).size());
-    options.max_effects = kMaxMeanEffects;
+    options.max_effects = kMaxBeatAveragedEffects;
   }
   options.withheld = s.withheld;
   options.discrepancy = read_model_discrepancy(file(s.discrepancy, "model_discrepancy.toml"));
@@ -112,7 +112,7 @@ Diagnosed diagnose(const DiagnosisRequest& request,
   for (std::size_t f = 0; f < logs.size(); ++f) {
     if (request.vehicle.beat_averaged)
       d.flights.push_back(
-          std::make_shared<MeanPrediction>(folders[f], std::move(logs[f]), request.vehicle, request.channels));
+          std::make_shared<BeatAveragedPrediction>(folders[f], std::move(logs[f]), request.vehicle, request.channels));
     else
       d.flights.push_back(
           std::make_shared<ResetPrediction>(Recording(folders[f], std::move(logs[f]), request.vehicle)));

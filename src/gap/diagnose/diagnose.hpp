@@ -1,4 +1,5 @@
-// A diagnosis from a vehicle file, flight logs and settings: the one way in for flappy-gap, the server's jobs, Python and the blind benchmark.
+// A diagnosis from a vehicle file, flight logs and settings: the only entry point for flappy-gap, jobs of the server, Python and the blind
+// benchmark.
 #pragma once
 
 #include <functional>
@@ -13,15 +14,17 @@
 namespace flappy::gap {
 
 struct DiagnosisSettings {
-  std::string vehicle;               ///< file of the vehicle as it was believed
+  std::string vehicle;               ///< the vehicle file
   std::vector<std::string> flights;  ///< folders of logs
-  /// Empty: priors.toml, model_discrepancy.toml and verdict.toml of configs/gap, or of configs/gap/beat_averaged for such a vehicle.
+  /// Files. Empty: priors.toml, model_discrepancy.toml and verdict.toml of configs/gap, or of configs/gap/beat_averaged for a beat-averaged vehicle.
   std::string priors, discrepancy, verdict;
-  std::vector<std::string> withheld;  ///< effects that the catalogue is to lack
-  std::vector<std::string> channels;  ///< of a beat-averaged vehicle: the only ones that count; empty: all
-  /// Configuration of flappy-fly that the flights flew. Empty: closed loops follow the recorded paths with the controller of fly/hover.toml.
+  std::vector<std::string> withheld;  ///< effects to leave out of the catalogue
+  /// For a beat-averaged vehicle, the only channels that count; empty: all that it compares.
+  std::vector<std::string> channels;
+  /// Configuration of flappy-fly that the flights were flown with. Empty: closed-loop simulations follow the recorded paths with the controller of
+  /// fly/hover.toml.
   std::string manoeuvre;
-  std::string experiments;  ///< folder of manoeuvres to propose one of; empty: configs/gap/experiments
+  std::string experiments;  ///< folder of manoeuvres, one of which may be proposed; empty: configs/gap/experiments
   int threads = 0;          ///< 0: one for each processor
 };
 
@@ -35,25 +38,26 @@ struct DiagnosisRequest {
   rollout::FlyConfig pilot;
   std::vector<Manoeuvre> manoeuvres;
 };
-/// io::InputError; reads no log.
+/// Reads and checks all files but the logs. io::InputError for a setting or file that is not accepted.
 DiagnosisRequest read_request(const DiagnosisSettings& settings);
 
-/// A diagnosis, and what was inferred on the way to it.
+/// A diagnosis, with the inference that it summarises.
 struct Diagnosed {
   Diagnosis result;
-  std::optional<model::Vehicle> corrected;  ///< none: the data are at fault, or the diagnosis was stopped
-  // where the data are not at fault:
+  std::optional<model::Vehicle> corrected;  ///< none: the data are faulty, or the diagnosis was stopped
+  // empty if the data are faulty:
   Flights flights;
-  std::optional<sim::Randomisation> uncertain;  ///< with the minor draws that the flights show
+  std::optional<sim::Randomisation> uncertain;  ///< with the minor draws at their estimates
   Inference inference;
 };
-/// Reads the logs and diagnoses. `progress`: false stops it before the next effect is fitted. io::InputError for what cannot be read.
+/// Reads the logs and diagnoses. `progress`: returns false to stop before the next effect is fitted. io::InputError if a log cannot be read.
 Diagnosed diagnose(const DiagnosisRequest& request,
                    const std::function<bool(double share, const std::string& what)>& progress = {});
 
-/// Adds to a complete result the recorded flights in closed loop, under the vehicle file and the corrected vehicle.
+/// Adds the closed-loop check of the corrected vehicle (closed_loop_prediction.hpp). No effect on incomplete results and beat-averaged vehicles.
 void fly_closed_loop(const DiagnosisRequest& request, Diagnosed& diagnosed);
-/// Adds to a complete result the flight that tells the hypotheses apart best, where a second one is probable enough.
+/// Adds the most informative next flight (next_experiment.hpp) if the second hypothesis is probable enough. No effect on incomplete results and
+/// beat-averaged vehicles.
 void propose_experiment(const DiagnosisRequest& request, Diagnosed& diagnosed);
 
 }  // namespace flappy::gap

@@ -16,12 +16,13 @@
 namespace flappy::gap {
 namespace {
 
-/// Effects of one group cannot be told apart by short flights: a withheld effect takes its group along.
+/// All effects in the groups of the withheld effects: short flights cannot tell effects of one group apart, so another one of the group would stand
+/// in for a withheld effect.
 std::vector<std::string> whole_groups(const DiagnosisSettings& settings) {
   const model::Vehicle vehicle = model::read_any_vehicle(settings.vehicle);
   std::vector<std::string> all;
   for (const std::string& id : settings.withheld) {
-    if (model::find_effect(vehicle, id) == nullptr) return settings.withheld;  // which is refused later
+    if (model::find_effect(vehicle, id) == nullptr) return settings.withheld;  // read_request refuses it
     for (std::string& member : model::whole_group(model::catalogue_of(vehicle), id)) all.push_back(std::move(member));
   }
   return all;
@@ -47,7 +48,7 @@ void look_ahead(const DiagnosisRequest& request, Diagnosed& d) {
   propose_experiment(request, d);
 }
 
-/// Also removes those of an earlier diagnosis.
+/// Removes the files of an earlier diagnosis first.
 void write_files(const std::filesystem::path& out, const Diagnosed& d) {
   for (const char* name : {kDiagnosisFile, kVehicleFile, kResidualsFile, kHypothesesFile})
     if (std::error_code error; true) std::filesystem::remove(out / name, error);

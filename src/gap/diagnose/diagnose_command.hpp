@@ -8,12 +8,13 @@
 namespace flappy::gap {
 
 struct DiagnoseCommand {
-  DiagnosisSettings settings;  ///< of a withheld effect the whole group is withheld
-  std::string out;             ///< folder for all files; empty: none
+  DiagnosisSettings settings;  ///< a withheld effect withholds its whole group
+  std::string out;             ///< folder for all files; empty: no files are written
   bool quiet = false;          ///< prints nothing
 };
 
-/// Diagnoses, prints, writes; returns the content of diagnosis.json. After Ctrl-C the diagnosis is incomplete, or what is ahead is left out.
+/// Diagnoses, prints the summary, writes the files; returns the content of diagnosis.json. After Ctrl-C, the diagnosis is incomplete, or lacks the
+/// closed-loop check or the proposed flight. io::InputError as from read_request and diagnose.
 nlohmann::ordered_json run_diagnose(const DiagnoseCommand& command);
 
 }  // namespace flappy::gap

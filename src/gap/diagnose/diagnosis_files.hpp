@@ -1,4 +1,4 @@
-// The files of a diagnosis in its folder.
+// The files that a diagnosis writes into its folder.
 #pragma once
 
 #include <filesystem>
@@ -10,8 +10,8 @@ namespace flappy::gap {
 inline constexpr const char *kDiagnosisFile = "diagnosis.json", *kVehicleFile = "vehicle_corrected.toml",
                             *kResidualsFile = "residuals.csv", *kHypothesesFile = "hypotheses.csv";
 
-/// diagnosis.json with all of it; for a spreadsheet residuals.csv, a line for each test of a residual, and hypotheses.csv, a line for each
-/// parameter of each hypothesis.
+/// Writes diagnosis.json with the whole result, and two tables for spreadsheets: residuals.csv, a row for each test of a residual, and
+/// hypotheses.csv, a row for each parameter of each hypothesis.
 void write_diagnosis(const std::filesystem::path& folder, const Diagnosis& diagnosis);
 
 }  // namespace flappy::gap

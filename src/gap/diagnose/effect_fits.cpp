@@ -14,12 +14,12 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Hypotheses that are tried with a remainder, and effects beside which the parameters are fitted again.
+/// Number of hypotheses that are tried with a remainder, and of single effects with which the parameters are fitted again.
 constexpr std::size_t kMaxRemainders = 3, kMaxMoved = 3;
 constexpr int kFitIterations = 6;
-/// Log evidence of a hypothesis that no vehicle flies.
+/// Log evidence of a hypothesis whose vehicle cannot be simulated.
 constexpr double kRefuted = -1e9;
-/// A magnitude that changes no row by more than this, in its unit, does not show.
+/// An effect cannot show if its magnitudes change no basis coefficient by more than this, in the channel's unit per unit coordinate.
 constexpr double kNoChange = 1e-9;
 
 ScoredHypothesis baseline(HypothesisKind kind, double log_evidence, double prior) {
@@ -30,7 +30,7 @@ ScoredHypothesis baseline(HypothesisKind kind, double log_evidence, double prior
   return a;
 }
 
-/// Blocks that are free, each by the function that takes most of it; the largest gain first.
+/// The free blocks, each with the function of the regime that takes most of it; the largest gain first.
 std::vector<FreeBlock> free_blocks(const ScaledEvidence& w, const RegimeBasis& basis, double penalty_nats) {
   std::vector<FreeBlock> blocks;
   for (std::size_t block = 0; block < w.scales.free.size(); ++block) {
@@ -53,8 +53,8 @@ std::vector<FreeBlock> free_blocks(const ScaledEvidence& w, const RegimeBasis& b
   return blocks;
 }
 
-/// Evidence where blocks may be free. A cause that does not show while models are off by little may show where they are off by much: so the search
-/// starts from `start` and from the scales of an unknown cause alone, if they are known.
+/// Evidence with blocks that may be free. Expectation-maximisation finds the nearest maximum, so it starts twice: from `start`, and, if known, from
+/// the scales of an unknown cause alone, where models are off by more.
 ScaledEvidence weigh_freely(const RobotFit& robot, const Hypothesis& hypothesis, const Fit& fit, const Scales& start,
                             const Scales* unknown_scales, double penalty_nats) {
   ScaledEvidence w = robot.weigh(hypothesis, fit, start, penalty_nats);
@@ -63,7 +63,7 @@ ScaledEvidence weigh_freely(const RobotFit& robot, const Hypothesis& hypothesis,
   return other.posterior.log_evidence > w.posterior.log_evidence ? other : w;
 }
 
-/// The function of the place along which a law deviates most.
+/// The function of the place along which the law of an effect deviates most from the catalogue's.
 FreeBlock largest_deviation(const ScaledEvidence& w, const RegimeBasis& basis) {
   FreeBlock most;
   for (int g = 0; g < kGroups; ++g)
@@ -75,17 +75,17 @@ FreeBlock largest_deviation(const ScaledEvidence& w, const RegimeBasis& basis) {
   return most;
 }
 
-/// Effects without a stage for the mean of a beat, or that change nothing here, as a battery's where none was logged.
+/// Effects that cannot show in these logs: they have no beat-averaged form, or change no row, as effects of the battery where none is logged.
 std::vector<std::string> untestable(const RobotFit& robot, const std::vector<std::string>& withheld) {
   std::vector<std::string> list;
   const model::Vehicle& vehicle = robot.uncertain().nominal();
-  for (const model::EffectEntry& e : model::catalogue_of(vehicle)) {
+  for (const model::CatalogueEffect& e : model::catalogue_of(vehicle)) {
     double most = 0;
     for (const MagnitudeColumn& m : robot.magnitudes())
       if (m.effect == e.info.id) most = std::max(most, m.change.cwiseAbs().maxCoeff());
     if (!(most > kNoChange)) list.emplace_back(e.info.id);
   }
-  for (const model::EffectEntry& e : model::effects())
+  for (const model::CatalogueEffect& e : model::effects())
     if (model::find_effect(vehicle, e.info.id) == nullptr) list.emplace_back(e.info.id);
   std::erase_if(list, [&](const std::string& id) { return std::ranges::count(withheld, id) > 0; });
   return list;
@@ -105,7 +105,8 @@ Baselines weigh_baselines(const RobotFit& robot, const VerdictRule& rule) {
   const ScaledEvidence unknown = weigh_freely(robot, h, robot.parameters(), scales, nullptr, penalty);
   b.unknown = baseline(HypothesisKind::unknown, unknown.posterior.log_evidence, rule.prior.unknown);
   b.unknown.unexplained = free_blocks(unknown, robot.evidence().basis(), penalty);
-  if (!b.unknown.has_remainder()) b.unknown.log_evidence -= penalty;  // a cause has to show somewhere
+  // an unknown cause frees at least one block, so it pays the penalty at least once
+  if (!b.unknown.has_remainder()) b.unknown.log_evidence -= penalty;
   b.unknown.fit.law_factor = unknown.law_factor;
   b.unknown_scales = unknown.scales;
   return b;
@@ -134,10 +135,10 @@ double EffectFits::log_prior_of_one() const {
   return std::log(rule_.prior.effect / static_cast<double>(catalogue_size_));
 }
 
-/// What the last effect of a set gains by chance.
+/// Gain by chance of the last effect of a hypothesis, nats.
 double EffectFits::gain_by_chance(const ScoredHypothesis& a) const { return rule_.gain.chance_of(a.effects.back()); }
 
-/// Coordinates from which a set was screened, with the parameters where they are.
+/// Start of a fit: the screened coordinates of the effects, and the fitted parameters of the vehicle without effects.
 VectorXd EffectFits::start(const Hypothesis& h, const std::vector<ScreenedEffect>& set) const {
   VectorXd at = h.start();
   at.head(h.shared()) = robot_.parameters().at.head(h.shared());
@@ -157,7 +158,7 @@ ScoredHypothesis EffectFits::fitted(const std::vector<ScreenedEffect>& set, cons
   ScoredHypothesis a;
   a.kind = HypothesisKind::effect;
   for (const ScreenedEffect& s : set) a.effects.push_back(s.effect);
-  a.log_evidence = kRefuted;  // until a vehicle flies
+  a.log_evidence = kRefuted;  // until its vehicle has been simulated
   const Hypothesis h(robot_.uncertain(), a.effects);
   a.log_prior = log_prior_of_one();
   for (std::size_t i = 1; i < set.size(); ++i)
@@ -172,7 +173,8 @@ ScoredHypothesis EffectFits::fitted(const std::vector<ScreenedEffect>& set, cons
   return a;
 }
 
-/// Fits the parameters again, jointly with the effects, if that explains more. A beat-averaged vehicle was fitted jointly already.
+/// Fits the parameters again, jointly with the effects; keeps this fit if it explains more. Does nothing for a beat-averaged vehicle, which was
+/// fitted jointly at first.
 void EffectFits::move_parameters(const std::vector<ScreenedEffect>& set, const Fitter& fitter,
                                  ScoredHypothesis& a) const {
   if (!robot_.evidence().policy().move_parameters) return;
@@ -180,7 +182,7 @@ void EffectFits::move_parameters(const std::vector<ScreenedEffect>& set, const F
   take(h, fit_jointly(h, set, fitter), fitter.scales(), a);
 }
 
-/// Unless the vehicle comes apart, or another fit explains as much.
+/// Takes `fit` for the hypothesis, unless its vehicle could not be simulated or the present fit explains as much.
 void EffectFits::take(const Hypothesis& h, Fit fit, const Scales& scales, ScoredHypothesis& a) const {
   if (!fit.flown()) return;
   const ScaledEvidence w = robot_.weigh(h, fit, scales);
@@ -192,7 +194,8 @@ void EffectFits::take(const Hypothesis& h, Fit fit, const Scales& scales, Scored
   if (w.law_factor > 1) a.other_law = largest_deviation(w, robot_.evidence().basis());
 }
 
-/// An effect that would gain nothing: what the flights do not say of it stays as its prior has it.
+/// A hypothesis with an effect that is fitted only linearly, so it counts for no gain. Where the flights say little of the effect, its posterior is
+/// near its prior.
 ScoredHypothesis EffectFits::linear(const ScreenedEffect& s) const {
   ScoredHypothesis a;
   a.kind = HypothesisKind::effect;
@@ -207,7 +210,8 @@ ScoredHypothesis EffectFits::linear(const ScreenedEffect& s) const {
   Posterior& p = a.fit.posterior;
   const Index first = h.shared();
   if (h.unknowns()[static_cast<std::size_t>(first)].low < 0) return a;
-  // the mean of its first magnitude, given that it is positive, and of all else given that
+  // the first magnitude cannot be negative: its mean given that it is positive, and the means of the others given that
+  // mean
   const double mean = p.mean[first], sd = std::sqrt(p.covariance(first, first)), t = mean / sd;
   const double beyond =
       std::exp(-0.5 * t * t) / (std::sqrt(std::numbers::pi / 2) * std::erfc(-t / std::numbers::sqrt2));
@@ -215,7 +219,7 @@ ScoredHypothesis EffectFits::linear(const ScreenedEffect& s) const {
   return a;
 }
 
-/// Whether a fit left all magnitudes of one of its effects as the vehicle file has them.
+/// Whether all magnitudes of one of the effects were fitted close to their values in the vehicle file.
 bool EffectFits::vanished(const ScoredHypothesis& a) const {
   if (!a.fitted()) return true;
   const Hypothesis h(robot_.uncertain(), a.effects);
@@ -231,7 +235,7 @@ bool EffectFits::vanished(const ScoredHypothesis& a) const {
   return false;
 }
 
-/// Where a fit left its effects, to go on from.
+/// Fitted coordinates of the effects, as the start of a fit with a further effect.
 std::vector<ScreenedEffect> EffectFits::coordinates(const ScoredHypothesis& a) const {
   std::vector<ScreenedEffect> list;
   Index at = robot_.no_effects().size();
@@ -249,7 +253,8 @@ std::vector<ScoredHypothesis> EffectFits::single_effects(const ScreenedCatalogue
   std::vector<ScoredHypothesis> singles;
   std::vector<ScreenedEffect> open = catalogue.others;
   if (by_simulation) {
-    // also those that promise nothing: where the parameters make up for an effect, a linear model sees nothing of it
+    // finalists without a screened gain are fitted, too: where the parameters compensate for an effect, the linear
+    // model shows no gain
     std::vector<ScoredHypothesis> fits(finalists.size());
     io::parallel_for(fits.size(), threads_, [&](std::size_t i) { fits[i] = fitted({finalists[i]}, robot_.fitter()); });
     std::vector<std::size_t> order(fits.size());
@@ -259,7 +264,7 @@ std::vector<ScoredHypothesis> EffectFits::single_effects(const ScreenedCatalogue
     io::parallel_for(order.size(), threads_,
                      [&](std::size_t i) { move_parameters({finalists[order[i]]}, robot_.fitter(), fits[order[i]]); });
     for (std::size_t i = 0; i < fits.size(); ++i)
-      // a fit that explains less than the linear model found nothing
+      // a fit that explains less than the linear model did not find the effect
       if (vanished(fits[i]) || fits[i].log_evidence < linear(finalists[i]).log_evidence) open.push_back(finalists[i]);
       else singles.push_back(std::move(fits[i]));
   } else {
@@ -286,7 +291,8 @@ void EffectFits::join_further(const std::function<bool(double, const std::string
   for (int n = 2; n <= options_.max_effects; ++n) {
     if (!progress(0.7 + 0.3 * (n - 1) / options_.max_effects, "fitting another jointly with " + best.effects.back()))
       break;
-    // what else is missing hides behind the scales of models with the best set in force, not without it
+    // further effects have to exceed the model discrepancy that is left with the best set in force, so the scales are
+    // found again
     sets.scales = robot_.find_scales(Hypothesis(robot_.uncertain(), best.effects), best.fit, sets.scales);
     const Fitter fitter = robot_.fitter().with_scales(sets.scales);
     std::vector<MagnitudeColumn> others = robot_.magnitudes();
@@ -306,7 +312,7 @@ void EffectFits::join_further(const std::function<bool(double, const std::string
       return vanished(a) || a.explained() < best.explained() + gain_by_chance(a);
     });
     if (more.empty()) break;
-    for (const ScoredHypothesis& a : more) {  // an effect that shows jointly with another may be all there is
+    for (const ScoredHypothesis& a : more) {  // the further effect may explain the flights alone: fit it alone, too
       const ScreenedEffect last = coordinates(a).back();
       const auto single = std::ranges::find(all, std::vector{last.effect}, &ScoredHypothesis::effects);
       if (single == all.end() || single->fitted()) continue;

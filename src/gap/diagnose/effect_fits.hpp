@@ -1,4 +1,4 @@
-// The middle stages of a diagnosis: hypotheses with effects are screened, fitted, and combined.
+// The middle stages of a diagnosis: effects are screened, fitted, and combined into hypotheses with several effects.
 #pragma once
 
 #include "gap/diagnose/inference.hpp"
@@ -8,14 +8,14 @@ namespace flappy::gap {
 /// Hypotheses without effects.
 struct Baselines {
   ScoredHypothesis none, parameters, unknown;
-  Scales unknown_scales;  ///< of the unknown cause
+  Scales unknown_scales;  ///< scales of the fit with an unknown cause
 };
 Baselines weigh_baselines(const RobotFit& robot, const VerdictRule& rule);
 
-/// Effects in the order of what they would gain.
+/// Effects of the catalogue by falling screened gain: the first options.max_finalists, and the others.
 struct ScreenedCatalogue {
   std::vector<ScreenedEffect> finalists, others;
-  std::vector<std::string> untestable;  ///< they cannot show in these logs; only where the policy asks
+  std::vector<std::string> untestable;  ///< effects that cannot show in these logs; only if the policy validates
 };
 ScreenedCatalogue screen_catalogue(const RobotFit& robot, const InferenceOptions& options);
 
@@ -23,19 +23,18 @@ class EffectFits {
  public:
   EffectFits(const RobotFit& robot, const Baselines& baselines, const InferenceOptions& options, int threads);
 
-  /// A hypothesis for each effect: finalists are fitted by simulation if `by_simulation`, all others linearly. The best first.
+  /// A hypothesis for each effect, the best first. If `by_simulation`, finalists are fitted by simulation; all others are fitted linearly.
   std::vector<ScoredHypothesis> single_effects(const ScreenedCatalogue& catalogue, bool by_simulation) const;
 
-  /// Sets of several effects: one effect after another joins the set that explains most, as long as that gains. Also the scales of the parameters,
-  /// searched on from those of the last set.
   struct Sets {
-    std::vector<ScoredHypothesis> hypotheses;  ///< singles and sets
-    Scales scales;
+    std::vector<ScoredHypothesis> hypotheses;  ///< with one effect and with several, the best first
+    Scales scales;                             ///< scales given the parameters alone
   };
+  /// Adds hypotheses with several effects: one effect after another joins the set that explains most, as long as it gains more than by chance.
   Sets combine(std::vector<ScoredHypothesis> singles,
                const std::function<bool(double, const std::string&)>& progress) const;
 
-  /// The hypotheses that explain most, with a remainder beside their effects, where one is found.
+  /// The hypotheses that explain most, with a remainder in addition to their effects; only those for which a remainder is found.
   std::vector<ScoredHypothesis> with_remainders(const std::vector<ScoredHypothesis>& hypotheses,
                                                 const Scales& scales) const;
 

@@ -13,13 +13,13 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Seconds of a block, draws of blocks, copies that are shifted.
+/// Length of a block of rows that is resampled; number of resamples; number of shifted copies.
 constexpr double kBlock_s = 2;
 constexpr int kDraws = 1000, kCopies = 20;
-/// On functions of rms 1: functions that are nearly the same share what they explain.
+/// Ridge of the regression on functions of rms 1, so that it stays determined where functions are nearly the same.
 constexpr double kRidge = 0.01;
 
-/// Type of a flight: its name without a number at the end, as "level_flight" of level_flight_2.
+/// Type of a flight: its name without the number of the repetition, as "level_flight" for level_flight_2.
 std::string type_of(std::string name) {
   while (!name.empty() && std::isdigit(static_cast<unsigned char>(name.back()))) name.pop_back();
   while (!name.empty() && (name.back() == '_' || name.back() == '-')) name.pop_back();
@@ -28,7 +28,7 @@ std::string type_of(std::string name) {
   return name;
 }
 
-/// Calls use(flight, beat, row) for what a channel covers.
+/// Calls use(flight, beat, row) for the mean row of each covered beat of a channel.
 template <class Use>
 void for_rows(const Flights& flights, int channel, const Use& use) {
   for (std::size_t f = 0; f < flights.size(); ++f)
@@ -85,8 +85,8 @@ HeldOutError error_of(const Flights& flights, const Residuals& each, const Resid
   return e;
 }
 
-/// Rms of what least squares on other flights leave of `y`, fitted by one column: [flight][beat] of one channel.
-double left_beside(const std::vector<std::vector<double>>& y, const std::vector<std::vector<double>>& x) {
+/// Rms of the residual of `y` in held-out flights, where y is fitted by one column `x` to the other flights by least squares; both [flight][beat].
+double left_given(const std::vector<std::vector<double>>& y, const std::vector<std::vector<double>>& x) {
   double sum = 0, n = 0;
   for (std::size_t out = 0; out < y.size(); ++out) {
     double xy = 0, xx = 1e-12;
@@ -98,7 +98,7 @@ double left_beside(const std::vector<std::vector<double>>& y, const std::vector<
   return std::sqrt(sum / std::max(n, 1.0));
 }
 
-/// A constant is nothing that could be shifted.
+/// Subtracts the mean over all flights, for a constant cannot be shifted in time.
 void centre(std::vector<std::vector<double>>& v) {
   double sum = 0, n = 0;
   for (const std::vector<double>& flight : v)
@@ -107,7 +107,8 @@ void centre(std::vector<std::vector<double>>& v) {
     for (double& value : flight) value -= sum / n;
 }
 
-/// Each effect of a set beside the rest: all of what it changes, and copies of that at other times.
+/// Controls of each effect of a set: the share of the rms that its contribution removes, given the other effects, and the largest share that shifted
+/// copies of this contribution remove.
 void control(const Flights& flights, const FittedHypothesis& all, const VectorXd& at, int threads, Validation& to) {
   std::vector<VehicleHypothesis> vehicles = {all.hypothesis.vehicle(at)};
   for (const std::string& e : all.hypothesis.effects()) {
@@ -133,7 +134,7 @@ void control(const Flights& flights, const FittedHypothesis& all, const VectorXd
       centre(x);
       std::vector<std::vector<double>> none = x;
       for (std::vector<double>& v : none) std::ranges::fill(v, 0.0);
-      const double before = left_beside(y, none), gain = 1 - left_beside(y, x) / before;
+      const double before = left_given(y, none), gain = 1 - left_given(y, x) / before;
       if (!best.channel.empty() && gain <= best.gain) continue;
       double shifted = -1;
       for (int copy = 0; copy < kCopies; ++copy) {
@@ -143,7 +144,7 @@ void control(const Flights& flights, const FittedHypothesis& all, const VectorXd
             std::rotate(v.begin(),
                         v.begin() + static_cast<std::ptrdiff_t>(kMinShift + random() % (v.size() - 2 * kMinShift)),
                         v.end());
-        shifted = std::max(shifted, 1 - left_beside(y, moved) / before);
+        shifted = std::max(shifted, 1 - left_given(y, moved) / before);
       }
       best.channel = channel_name(channel), best.gain = gain, best.best_of_shifted = shifted;
     }
@@ -272,7 +273,7 @@ double mean_square(const Evidence& evidence, const Flights& flights, const Resid
 Validation validate(const Fitter& fitter, const sim::Randomisation& uncertain, const Flights& flights,
                     const Inference& d, int threads) {
   Validation v;
-  // the largest set that the conclusion holds, and those on the way to it
+  // the effects of the conclusion, added one by one
   std::vector<FittedHypothesis> fits = {{Hypothesis(uncertain, {}), &d.parameters}};
   std::vector<const Residuals*> left = {&d.refit};
   const std::vector<std::string>& effects = d.conclusion().effects;

@@ -1,4 +1,4 @@
-// What fits leave in flights that they have not seen.
+// Residuals in held-out flights: each flight is predicted by a fit to other flights.
 #pragma once
 
 #include "gap/diagnose/inference.hpp"
@@ -10,21 +10,23 @@ struct FittedHypothesis {
   const Fit* fit;
 };
 
-/// Residuals, [fit][flight], of each flight with the fit to those of other folds; of a single fold, with the fit to all. `fold`: [flight].
+/// Residuals, [fit][flight]. Each flight is predicted by the fit to the flights of the other folds; if there is a single fold, by the fit to all.
+/// `fold`: [flight].
 std::vector<Residuals> held_out(const Fitter& fitter, const Flights& flights, const std::vector<FittedHypothesis>& fits,
                                 const std::vector<int>& fold, int threads);
 
-/// Sets d.refit, and held_out of each fitted hypothesis, each flight being a fold.
+/// Sets d.refit, and `held_out` of each fitted hypothesis; each flight is a fold.
 void hold_out(const Fitter& fitter, const sim::Randomisation& uncertain, const Flights& flights, int threads,
               Inference& d);
 
-/// A residual less, in each flight, the smooth functions of the regime that fit the other flights by least squares: no effect can explain more.
+/// The residual in each flight less the functions of the regime that are fitted to the residuals of the other flights by least squares. An estimate
+/// of what is left once all that depends on the regime is explained.
 Residuals smoothed_away(const Evidence& evidence, const Flights& flights, const Residuals& residual);
-/// Mean square over all rows, in units of noise.
+/// Mean square of the beat means over all channels, in units of the noise variance.
 double mean_square(const Evidence& evidence, const Flights& flights, const Residuals& residual);
 
-/// Controls of the most probable effects. Shifted copies are rotated within each flight by kMinShift rows or more, and fitted like the effect: to
-/// other flights, by least squares.
+/// Ladder, controls and agreements of the concluded effects (Validation). For the controls, the contribution of an effect is rotated in time within
+/// each flight by kMinShift rows or more; such a copy is fitted like the effect itself, to the other flights by least squares.
 inline constexpr std::size_t kMinShift = 50;
 Validation validate(const Fitter& fitter, const sim::Randomisation& uncertain, const Flights& flights,
                     const Inference& d, int threads);

@@ -12,10 +12,10 @@ namespace {
 
 using Eigen::VectorXd;
 
-/// Halvings of the way to a vehicle that no vehicle file may hold.
+/// Most halvings of a step to a vehicle that is not physical.
 constexpr int kMaxHalvings = 10;
 
-/// Calls the user's progress; remembers that it stopped.
+/// Calls the progress function of the options, and remembers whether it asked to stop.
 class Progress {
  public:
   explicit Progress(const InferenceOptions& options) : told_(options.progress) {}
@@ -35,13 +35,13 @@ VectorXd without_background(const Fitter& fitter, const Hypothesis& hypothesis, 
   if (!fitter.evidence().policy().background_in_corrected)
     return fitter.joint_fit(hypothesis, fit, fitter.all_flights(), false).at;
   VectorXd at = fitter.refit_without_background(hypothesis, fit).at;
-  // parameters of a body that each move on their own may be those of no body
+  // parameters are fitted independently of each other, so together they may describe a body that cannot exist
   for (int n = 0; n < kMaxHalvings && model::physical_fault(hypothesis.vehicle(at).vehicle); ++n)
     at = (at + fit.at) / 2;
   return at;
 }
 
-/// Coordinates of what is concluded, and the sensors' errors given that.
+/// Sets the coordinates of the corrected vehicle, and the errors of the sensors given the conclusion.
 void correct(const RobotFit& robot, const Fitter& fitter, Inference& d) {
   const ScoredHypothesis& answer = d.predicting();
   const Hypothesis h(robot.uncertain(), answer.effects);

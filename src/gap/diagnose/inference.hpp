@@ -1,4 +1,4 @@
-// From flights to the probabilities of all hypotheses: the stages of a diagnosis.
+// The stages of a diagnosis, from flights to the probabilities of all hypotheses.
 #pragma once
 
 #include <functional>
@@ -11,28 +11,29 @@
 
 namespace flappy::gap {
 
-/// A block of the model discrepancy that is larger than its prior allows: what no effect explains.
+/// A block of the model discrepancy that exceeds its prior: the residual there is explained by no effect.
 struct FreeBlock {
   int channel = 0, harmonic = 0;
-  int function = 0;  ///< of the basis: the one that takes most of the block
-  double times = 0;  ///< its scale over the robot's
-  double gain_nats = 0;
+  int function = 0;      ///< index of the basis function that takes most of the block
+  double times = 0;      ///< scale of the block over that of the robot; for other_law, the law factor
+  double gain_nats = 0;  ///< gain of evidence; for a free block, less the penalty of an unknown cause
 };
 
-/// A hypothesis with its evidence. Hypotheses exclude each other.
+/// A hypothesis with its evidence. Hypotheses exclude each other; their probabilities add up to 1.
 struct ScoredHypothesis {
   HypothesisKind kind = HypothesisKind::parameters;
   std::vector<std::string> effects;
-  double log_evidence = 0;  ///< of all flights; includes log_prior
+  double log_evidence = 0;  ///< log evidence of all flights; includes log_prior
   double log_prior = 0;
   double probability = 0;
-  std::vector<FreeBlock> unexplained;     ///< of an unknown cause, or of a remainder beside effects
-  std::vector<std::string> jointly_with;  ///< effects that these blocks are fitted jointly with
-  Fit fit;  ///< of effects and parameters. An effect that would gain nothing is fitted linearly, without a residual
-  /// The largest deviation of an effect that acts by the place from the catalogue's law; none: it follows that law as far as any does.
+  std::vector<FreeBlock> unexplained;     ///< blocks of an unknown cause, or of a remainder in addition to the effects
+  std::vector<std::string> jointly_with;  ///< effects with which these blocks are fitted jointly
+  Fit fit;                                ///< effects and parameters; without a residual if fitted only linearly
+  /// The largest deviation of an effect that acts by the place from the law of the catalogue. None: the law factor does not exceed 1.
   std::optional<FreeBlock> other_law;
-  Residuals held_out;  ///< residual of each flight with the fit to the others, where it was fitted
-  /// Effects of the hypothesis whose fit predicts for this one; those beyond its own are not told from chance. Empty: its own.
+  Residuals held_out;  ///< [flight], with the fit to the other flights; empty if not fitted by simulation
+  /// Effects of another hypothesis whose fit predicts for this one: its own effects and further ones, whose gain may be due to chance. Empty:
+  /// its own fit predicts.
   std::vector<std::string> predicted_with;
   bool fitted() const { return fit.flown(); }
   bool has_remainder() const { return !unexplained.empty(); }
@@ -43,31 +44,31 @@ struct ScoredHypothesis {
 struct InferenceOptions {
   int threads = 0;
   int max_finalists = 8;                                                ///< effects that are fitted by simulation
-  int max_effects = 3;                                                  ///< that a hypothesis may combine
-  std::vector<std::string> withheld;                                    ///< effects that the catalogue is to lack
-  std::function<bool(double share, const std::string& what)> progress;  ///< false: no further effect is fitted
+  int max_effects = 3;                                                  ///< largest number of effects in a hypothesis
+  std::vector<std::string> withheld;                                    ///< effects to leave out of the catalogue
+  std::function<bool(double share, const std::string& what)> progress;  ///< returns false to fit no further effect
   ModelDiscrepancy discrepancy = read_model_discrepancy();
   VerdictRule rule = read_verdict_rule();
 };
 
-/// What the stages found; a Diagnosis is its summary.
+/// Results of all stages; a Diagnosis summarises them.
 struct Inference {
-  bool complete = true;                      ///< false: progress stopped it
+  bool complete = true;                      ///< false: stopped by `progress`
   std::vector<ScoredHypothesis> hypotheses;  ///< the most probable first
   Verdict verdict;
-  std::size_t concluded = 0;  ///< place of the most probable hypothesis of the verdict
+  std::size_t concluded = 0;  ///< index of the most probable hypothesis of the verdict
   std::vector<std::string> untestable;
-  Fit parameters;                      ///< without effects
-  Eigen::VectorXd corrected;           ///< coordinates of what is concluded, without background magnitudes
+  Fit parameters;                      ///< the parameters fitted without effects
+  Eigen::VectorXd corrected;           ///< coordinates of the corrected vehicle, fitted without background magnitudes
   std::vector<double> minors;          ///< variates for sim::Randomisation::set_minors
-  std::vector<SensorFinding> sensors;  ///< given what is concluded
+  std::vector<SensorFinding> sensors;  ///< errors of declared sensors, given the conclusion
   std::optional<Validation> validation;
-  Residuals nominal;             ///< of the vehicle file
-  Residuals refit;               ///< of the parameters alone: each flight with the fit to the others
-  std::vector<double> noise_sd;  ///< [group] of rows of noise alone
+  Residuals nominal;             ///< residuals of the vehicle file
+  Residuals refit;               ///< residuals with parameters fitted to the other flights, without effects
+  std::vector<double> noise_sd;  ///< [group] standard deviation of the noise of a row
 
   const ScoredHypothesis& conclusion() const { return hypotheses[concluded]; }
-  /// The hypothesis whose fit predicts for the conclusion: the conclusion itself, or one with further effects.
+  /// The hypothesis whose fit predicts for the conclusion (ScoredHypothesis::predicted_with).
   const ScoredHypothesis& predicting() const;
 };
 

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Flights below a folder; the folder itself where it is one.
+/// Folders of flights in a folder, or the folder itself if it is a flight.
 std::vector<fs::path> flights_of(const fs::path& robot) {
   if (fs::exists(robot / "flight.toml")) return {robot};
   std::vector<fs::path> flights;

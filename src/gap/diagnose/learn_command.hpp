@@ -11,7 +11,7 @@ struct LearnCommand {
   std::vector<std::string> robots;  ///< folders, each with the flights of one robot
   int threads = 0;
 };
-/// Learns what models get wrong (gap/evidence/learn_discrepancy.hpp) and writes it. InputError where a log is at fault.
+/// Learns the model discrepancy (gap/evidence/learn_discrepancy.hpp) and writes it to `out`. io::InputError if a log has a fault.
 void run_learn_discrepancy(const LearnCommand& command);
 
 }  // namespace flappy::gap

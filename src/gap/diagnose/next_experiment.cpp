@@ -16,7 +16,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// A hypothesis where the flights so far leave it.
+/// A hypothesis as fitted to the flights so far.
 struct Rival {
   std::string name;
   double probability;
@@ -24,7 +24,7 @@ struct Rival {
   VectorXd at;
   Directions directions;
   MatrixXd covariance;  ///< along the directions
-  bool open;            ///< its effect is left open by the flights so far: it is the parameters' vehicle but for a size
+  bool open;            ///< its effect was fitted only linearly: the vehicle of the parameters, with magnitudes added
   VehicleHypothesis vehicle() const { return hypothesis.vehicle(at); }
 };
 
@@ -36,10 +36,10 @@ std::string name_of(const ScoredHypothesis& a) {
   return name;
 }
 
-/// The most probable rivals, which have to survive a manoeuvre.
+/// Number of the most probable rivals that have to survive a manoeuvre.
 constexpr std::size_t kSurvive = 4;
 
-/// Of an effect that the flights leave open: beside the parameters where they are, sizes that it may well have.
+/// Coordinates of a rival whose effect the flights leave open: the fitted parameters, and the root mean square of each magnitude.
 VectorXd open_place(const Hypothesis& h, const Fit& fit, const VectorXd& parameters) {
   VectorXd at = fit.mean();
   at.head(h.shared()) = parameters;
@@ -69,14 +69,14 @@ std::vector<Rival> rivals_of(const Inference& d, const sim::Randomisation& uncer
   return rivals;
 }
 
-/// What a rival expects of a flight that was flown.
+/// Prediction of a simulated flight by a rival.
 struct Expected {
   SufficientStatistics residual;
-  std::vector<BasisCoefficients> uncertain;  ///< changes for one standard deviation each, independent of each other
-  BasisCoefficients law_sd;                  ///< what the laws of its effects get wrong
+  std::vector<BasisCoefficients> uncertain;  ///< [independent unknown] change for one standard deviation
+  BasisCoefficients law_sd;                  ///< standard deviation of the deviations of the laws of its effects
 };
 
-/// What the parameters that all hypotheses share change, by the columns of one along the directions of another.
+/// Columns along the directions of a rival for the parameters that all hypotheses share, from the columns of another rival: spares simulations.
 std::vector<BasisCoefficients> turned(const Fit& l, const Directions& directions, Index shared) {
   std::vector<BasisCoefficients> columns;
   const MatrixXd turn =
@@ -94,7 +94,7 @@ std::vector<BasisCoefficients> turned(const Fit& l, const Directions& directions
   return columns;
 }
 
-/// Nothing where its vehicle comes apart. `first`: the first rival with parameters, whose columns serve the others.
+/// None if the simulation of the vehicle diverges. `first`: the linearisation of the first rival with parameters, whose columns serve the others.
 std::optional<Expected> expect(const Rival& rival, const Fitter& fitter, std::optional<Fit>& first) {
   const bool with_parameters = rival.directions.reach.size() > 0;
   std::vector<BasisCoefficients> known;
@@ -104,7 +104,7 @@ std::optional<Expected> expect(const Rival& rival, const Fitter& fitter, std::op
   if (with_parameters && !first) first = l;
   Expected e{l.statistics, {}, fitter.law_sd(rival.hypothesis, l)};
   const Index k = rival.covariance.rows();
-  if (k == 0) return e;  // without a gap nothing is uncertain
+  if (k == 0) return e;  // the vehicle file as it is: nothing is uncertain
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(rival.covariance);
   for (Index i = 0; i < k; ++i) {
     BasisCoefficients sum = BasisCoefficients::Zero(e.law_sd.rows(), e.law_sd.cols());
@@ -117,7 +117,7 @@ std::optional<Expected> expect(const Rival& rival, const Fitter& fitter, std::op
   return e;
 }
 
-/// For a over b where a is true.
+/// Expected evidence for a over b, if a is true.
 double nats(const Evidence& evidence, const Expected& a, const Expected& b) {
   SufficientStatistics difference = b.residual;
   for (std::size_t f = 0; f < difference.sums.size(); ++f)
@@ -138,8 +138,8 @@ double nats(const Evidence& evidence, const Expected& a, const Expected& b) {
   return Evidence::posterior(reduced, chosen, prior_mean).log_evidence - with;
 }
 
-/// Of rivals that the flights so far leave open: what the most probable one leaves, but for what their sizes change. They differ from one and the
-/// same vehicle by these alone, so nothing of it is rough, and nothing else has to be flown.
+/// Predictions of rivals that the flights so far leave open: the residual of the most probable rival, plus the change that their magnitudes make.
+/// All of them differ from one vehicle by their magnitudes alone, so each change is smooth and costs a single simulation.
 void add_open(const std::vector<Rival>& rivals, const Flights& flight, const Evidence& evidence,
               std::vector<std::optional<Expected>>& expected) {
   std::vector<std::size_t> open;
@@ -171,12 +171,12 @@ void add_open(const std::vector<Rival>& rivals, const Flights& flight, const Evi
   }
 }
 
-/// Step of the courses of a proposed flight.
+/// Time step of the courses in a proposal.
 constexpr double kCourseStep_s = 0.1;
 
 constexpr const char* kCourses[] = {"x_m", "y_m", "z_m", "amplitude_V", "difference_V", "bias_V", "split_cycle"};
 
-/// Of each of kCourses, means over kCourseStep_s; where a step has no sample, that before.
+/// Courses of the quantities kCourses, [quantity][step]: means over kCourseStep_s; a step without samples repeats the one before.
 std::vector<std::vector<double>> course_of(const flightlog::FlightLog& log) {
   const flightlog::MocapStream& m = log.mocap;
   const flightlog::CommandStream& c = log.command;

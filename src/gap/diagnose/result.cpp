@@ -9,9 +9,9 @@
 namespace flappy::gap {
 namespace {
 
-/// Half of 90 % of a normal law, in standard deviations.
+/// Half width of the 90 % interval of a normal distribution, in standard deviations.
 constexpr double kHalf90 = 1.645;
-/// Smallest error of a sensor that is reported, in its prior standard deviations.
+/// Smallest error of a sensor that is reported, in prior standard deviations.
 constexpr double kMinSensorError = 0.25;
 
 std::vector<std::pair<std::string, double>> moved_parameters(const Fit& fit, const Hypothesis& hypothesis) {
@@ -23,7 +23,7 @@ std::vector<std::pair<std::string, double>> moved_parameters(const Fit& fit, con
   return moved;
 }
 
-/// The most probable hypothesis that was fitted; null: none.
+/// The most probable hypothesis that was fitted by simulation; null: none.
 const ScoredHypothesis* best_fitted(const Inference& d) {
   const auto best = std::ranges::find_if(d.hypotheses, &ScoredHypothesis::fitted);
   return best == d.hypotheses.end() ? nullptr : &*best;
@@ -34,7 +34,7 @@ UnexplainedTerm term_of(const FreeBlock& b, const RegimeBasis& basis) {
           basis.quantity(b.function), b.times,    b.gain_nats};
 }
 
-/// Hypotheses with their losses, and the losses of the stages.
+/// Adds the hypotheses with their losses, and the losses of the stages.
 void add_hypotheses(const RowContext& context, const sim::Randomisation& uncertain, const Inference& d, Diagnosis& r) {
   r.noise_floor = huber_floor();
   const Losses refit = losses_of(context, d.refit);

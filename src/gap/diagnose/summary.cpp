@@ -43,7 +43,7 @@ std::string verdict_line(const Verdict& c) {
     case VerdictKind::none:
       return io::format("No gap beyond noise: the vehicle's file explains the flights (probability %.2f)", p);
     case VerdictKind::unknown:
-      return io::format("Something is missing in the model that no entry of the catalogue explains (probability %.2f)",
+      return io::format("Something is missing in the model that no effect of the catalogue explains (probability %.2f)",
                         p);
     case VerdictKind::data:
       return "The data are at fault; nothing was diagnosed";
@@ -71,7 +71,7 @@ std::string next_line(const Diagnosis& r, const std::string& out) {
   return "";
 }
 
-/// What stands out most in the stroke, in what the vehicle did and in frequency.
+/// The largest discovery of each test that says where: phase, regime and frequency.
 std::vector<ResidualLocation> one_of_each_test(const Diagnosis& r) {
   std::vector<ResidualLocation> list;
   for (const ResidualTest test : {ResidualTest::phase, ResidualTest::regime, ResidualTest::frequency})
@@ -83,7 +83,7 @@ std::vector<ResidualLocation> one_of_each_test(const Diagnosis& r) {
   return list;
 }
 
-/// Where the correction tells most: by the change of the error over its size.
+/// The quantity of the closed-loop check whose error the correction reduces most, as a share of the recorded value.
 const ClosedLoop* most_corrected(const std::vector<ClosedLoop>& list) {
   const ClosedLoop* most = nullptr;
   double largest = 0;
@@ -95,7 +95,7 @@ const ClosedLoop* most_corrected(const std::vector<ClosedLoop>& list) {
   return most;
 }
 
-/// By how much, which way, and its interval.
+/// The error of a sensor: amount, sign and interval.
 std::string sensor_line(const Estimate& s) {
   const bool more = s.value > 0;
   const auto told = [&](const std::string& what, double factor, const char* unit, const std::string& how) {
@@ -134,7 +134,7 @@ std::vector<std::string> summary_of(const Diagnosis& r, const std::string& out) 
   for (const RankedHypothesis& c : r.hypotheses) ranked.push_back(&c);
   std::ranges::stable_sort(ranked, std::greater{}, &RankedHypothesis::probability);
   const bool named = r.verdict.kind == VerdictKind::effect || r.verdict.kind == VerdictKind::group;
-  // its sizes: of the most probable one
+  // the most probable hypothesis of the verdict, whose magnitudes are shown
   const RankedHypothesis* concluded = nullptr;
   for (const RankedHypothesis* c : ranked)
     if (concluded == nullptr && named && c->kind == HypothesisKind::effect &&
@@ -142,12 +142,12 @@ std::vector<std::string> summary_of(const Diagnosis& r, const std::string& out) 
                             [&](const std::string& e) { return std::ranges::count(r.verdict.effects, e) > 0; }))
       concluded = c;
   if (concluded != nullptr) {
-    lines.push_back("size, with its 90 % interval:");
+    lines.push_back("magnitude, with its 90 % interval:");
     for (std::size_t i = 0; i < concluded->parameters.size() && i < kParameters; ++i)
       lines.push_back(estimate_line(concluded->parameters[i]));
   }
   if (r.other_law)
-    lines.push_back(io::format("by another law than the entry's, most so in %s, on %s (%s)",
+    lines.push_back(io::format("by another law than the catalogue's, most so in %s, on %s (%s)",
                                place_of(*r.other_law).c_str(), r.other_law->regime.c_str(),
                                r.other_law->function.c_str()));
   if (!r.background.empty()) {
@@ -162,7 +162,7 @@ std::vector<std::string> summary_of(const Diagnosis& r, const std::string& out) 
     for (std::size_t i = 0; i < r.unexplained.size() && i < kTerms; ++i)
       lines.push_back(io::format("  %s on %s (%s), %.1f times what models of this robot get wrong",
                                  place_of(r.unexplained[i]).c_str(), r.unexplained[i].regime.c_str(),
-                                 r.unexplained[i].function.c_str(), r.unexplained[i].times_usual));
+                                 r.unexplained[i].function.c_str(), r.unexplained[i].times_prior_scale));
   }
   std::string others;
   std::size_t shown = 0;
@@ -193,7 +193,7 @@ std::vector<std::string> summary_of(const Diagnosis& r, const std::string& out) 
       lines.push_back(io::format("  %-36s %+10.2f", r.moved_parameters[i].first.c_str(), r.moved_parameters[i].second));
   }
   if (!r.sensors.empty()) {
-    lines.push_back("beside what the headers declare (90 %):");
+    lines.push_back("in addition to what the headers declare (90 %):");
     for (std::size_t i = 0; i < r.sensors.size() && i < kSensors; ++i) lines.push_back(sensor_line(r.sensors[i]));
   }
   if (!r.untestable.empty()) lines.push_back("cannot be tested on these logs: " + io::joined(r.untestable));

@@ -1,4 +1,4 @@
-// A diagnosis in fewer than kSummaryLines lines that a person can act on.
+// The summary of a diagnosis for a person: the verdict, its reasons, and what to do next.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@ namespace flappy::gap {
 
 inline constexpr std::size_t kSummaryLines = 30;
 
-/// `out`: folder of the files; empty: none were written.
+/// Lines of the summary, in general fewer than kSummaryLines. `out`: folder of the files; empty: none were written.
 std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::string& out);
 
 }  // namespace flappy::gap

@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-/// Less than this share of what the parameters leave may be chance.
+/// Hypotheses are refuted only if functions of the regime explain more than this share of the residual of the parameters; less may be chance.
 constexpr double kMinExplainable = 0.15;
 constexpr double kRefuted = -1e9;
 
@@ -22,7 +22,8 @@ const ScoredHypothesis& parameters_alone(const std::vector<ScoredHypothesis>& al
   return *std::ranges::find(all, HypothesisKind::parameters, &ScoredHypothesis::kind);
 }
 
-/// Refutes hypotheses that leave most of what depends on the regime in flights held out, however probable they are beside their rivals.
+/// Refutes hypotheses that explain too little of the part of the residual that depends on the regime, in held-out flights, however probable they are
+/// relative to their rivals.
 void refute(const Evidence& evidence, const Flights& flights, double min_share, Inference& d) {
   const double refit = mean_square(evidence, flights, d.refit);
   const double explainable = refit - mean_square(evidence, flights, smoothed_away(evidence, flights, d.refit));
@@ -34,15 +35,15 @@ void refute(const Evidence& evidence, const Flights& flights, double min_share, 
   }
 }
 
-/// A background magnitude is linear, and an effect was flown. Where the effect explains more than its linear background does, a hypothesis without
-/// the effect may have it as its background, too, at the log-prior cost of the magnitudes there.
+/// A background magnitude acts linearly, but an effect is simulated and may explain more. So that this difference does not count as evidence for
+/// the effect, a hypothesis without the effect may have it as background, too, at the log-prior cost of such magnitudes.
 void share_backgrounds(const RobotFit& robot, const Scales& scales, double penalty_nats,
                        std::vector<ScoredHypothesis>& all) {
   const double before = parameters_alone(all).log_evidence;
   for (const ScoredHypothesis& a : all) {
     if (!a.fitted()) continue;
     const Hypothesis h(robot.uncertain(), a.effects);
-    // a law that deviates much from the catalogue's counts as a larger magnitude
+    // an effect whose law deviates from the catalogue's by more counts as one of larger magnitude
     const VectorXd mean = std::max(1.0, a.fit.law_factor) * a.fit.mean();
     std::map<std::string, double> beyond;
     for (const std::string& e : a.effects) {
@@ -68,7 +69,7 @@ void share_backgrounds(const RobotFit& robot, const Scales& scales, double penal
       b.predicted_with = a.predicted_with.empty() ? a.effects : a.predicted_with;
     }
   }
-  // the flights say nothing of effects that were not fitted, and this changes nothing of it
+  // effects that were not fitted keep their evidence relative to the parameters
   for (ScoredHypothesis& b : all)
     if (b.kind == HypothesisKind::effect && !b.fitted()) b.log_evidence += parameters_alone(all).log_evidence - before;
 }
@@ -127,7 +128,7 @@ void conclude(const VerdictRule& rule, Inference& d) {
     std::size_t best = 0;
   };
   const std::vector<ScoredHypothesis>& all = d.hypotheses;
-  std::map<std::string, Pool> pools;  // no effect has the name of another kind
+  std::map<std::string, Pool> pools;  // by key: "/" tells other kinds from groups of effects
   const auto key = [](const ScoredHypothesis& a) {
     return a.kind == HypothesisKind::effect ? pool_name(a.effects) : "/" + std::string(name_of(a.kind));
   };

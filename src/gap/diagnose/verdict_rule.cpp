@@ -22,21 +22,22 @@ VerdictRule read_verdict_rule(const std::filesystem::path& path) {
   const io::Table gain = root.table("gain");
   r.gain = {gain.number("by_chance_nats", kNats),
             gain.number("further_screened_nats", kNats),
-            gain.number("vanished_size", kPositive),
+            gain.number("vanished_magnitude", kPositive),
             {},
             {}};
   if (const auto outside = gain.optional_table("outside")) {
     r.gain.outside = outside->strings("effects");
     r.gain.outside_by_chance_nats = outside->number("by_chance_nats", kNats);
     for (const std::string& id : r.gain.outside)
-      if (!model::is_effect(id)) outside->fail("effects", "no effect \"" + id + "\"", "identifiers of docs/effects.md");
+      if (!model::is_effect(id))
+        outside->fail("effects", "no effect \"" + id + "\"", "those that flappy-gap effects lists");
   }
-  r.unknown = {root.table("unknown").number("freeing_nats", kNats)};
+  r.unknown = {root.table("unknown").number("penalty_nats", kNats)};
   if (const auto refutation = root.optional_table("refutation"))
-    r.refutation.min_share = refutation->number("least_share", kShare);
+    r.refutation.min_share = refutation->number("min_share", kShare);
   const io::Table interval = root.table("interval");
-  r.interval = {interval.number("sd_factor", kPositive), interval.number("size_error", kNats)};
-  const io::Table tempering = root.table("doubt");
+  r.interval = {interval.number("sd_factor", kPositive), interval.number("magnitude_error", kNats)};
+  const io::Table tempering = root.table("tempering");
   r.tempering = {tempering.number("nats", kPositive), tempering.number("freedom", kPositive)};
   const io::Table naming = root.table("naming");
   r.naming = {naming.number("of_all", kShare), naming.number("of_pool", kShare),

@@ -1,5 +1,5 @@
-// The constants by which evidence becomes a verdict: tables and keys of configs/gap/verdict.toml, which says what each is for and how it was
-// learnt.
+// The constants by which evidence becomes a verdict. Members are tables and keys of configs/gap/verdict.toml, which explains each constant and how
+// it was learnt.
 #pragma once
 
 #include <algorithm>
@@ -17,9 +17,9 @@ struct VerdictRule {
   } prior;
   struct Gain {
     double by_chance_nats, further_screened_nats, vanished_magnitude;
-    double outside_by_chance_nats;  ///< by_chance_nats of the effects outside the robot
-    std::vector<std::string>
-        outside;  ///< effects of the surroundings and sensors, which a model of the robot does not get wrong
+    double outside_by_chance_nats;  ///< replaces by_chance_nats for effects in `outside`
+    /// Effects of surroundings and sensors: errors of a robot's model do not look like these.
+    std::vector<std::string> outside;
     double chance_of(const std::string& effect) const {
       return std::ranges::count(outside, effect) > 0 ? outside_by_chance_nats : by_chance_nats;
     }
@@ -41,7 +41,7 @@ struct VerdictRule {
   } naming;
 };
 
-/// io::InputError by file and line.
+/// io::InputError with file and line.
 VerdictRule read_verdict_rule(const std::filesystem::path& path = io::config_path("gap/verdict.toml"));
 
 }  // namespace flappy::gap

@@ -15,7 +15,7 @@ using Eigen::VectorXd;
 
 /// Degrees of freedom of the noise's Student t.
 constexpr double kNoiseFreedom = 4;
-/// Ridge of the whole basis where it only takes structure out of the noise.
+/// Ridge of least squares on the whole basis.
 constexpr double kLooseRidge = 1e-6;
 constexpr double kMaxPast = 0.95;
 
@@ -28,11 +28,11 @@ struct WithoutDiscrepancy {
     precision.diagonal().array() += 1;
     llt.compute(precision);
   }
-  /// `sums`: basis x a.
+  /// `sums`: sums of products of the basis and a.
   MatrixXd of(const MatrixXd& sums) const { return llt.matrixL().solve(sd.asDiagonal() * sums); }
 
   VectorXd sd;
-  Eigen::LLT<MatrixXd> llt;  ///< of delta's precision given the rest, in units of its prior's sd
+  Eigen::LLT<MatrixXd> llt;  ///< Cholesky factor of the posterior precision of delta over its prior standard deviation
 };
 
 }  // namespace
@@ -68,7 +68,7 @@ Evidence::Evidence(const Flights& flights, ModelDiscrepancy discrepancy, int thr
       groups_[static_cast<std::size_t>(g)].signal = n > 0 ? sum / n : 0;
       all += groups_[static_cast<std::size_t>(g)].signal / kCoefficients;
     }
-    // half its own, half that of its channel: an error of shape moves power between harmonics
+    // average of the group's own mean square and its channel's: an error of the waveform moves power between harmonics
     for (int c = 0; c < kCoefficients; ++c) {
       double& s = groups_[static_cast<std::size_t>(channel) * kCoefficients + static_cast<std::size_t>(c)].signal;
       s = std::sqrt((s + all) / 2);
@@ -131,7 +131,7 @@ Rows Evidence::without(std::size_t flight, Rows residual, const BasisCoefficient
   return residual;
 }
 
-/// Calls use(beat, whether the one before it counts) for the beats of a flight that a channel covers.
+/// Calls use(beat, whether the beat before counts) for the beats of a flight that a channel covers.
 template <class Use>
 void Evidence::for_rows(std::size_t flight, int channel, const Use& use) const {
   const PredictedFlight& f = this->flight(flight);
@@ -195,7 +195,7 @@ void Evidence::learn(const Residuals& residual, Learn what) {
   });
 }
 
-/// Calls use(beat, row of the basis, its share of the beat before, whitened) in a group.
+/// Calls use(beat, now, past) for the rows of a group: the whitened row is now x (this row) - past x (the row of the beat before).
 template <class Use>
 void Evidence::for_whitened(std::size_t flight, int group, const Use& use) const {
   const Group& g = groups_[static_cast<std::size_t>(group)];
@@ -303,7 +303,7 @@ double Evidence::smooth_square(MatrixXd normal, const VectorXd& right) {
   return normal.ldlt().solve(right).dot(right);
 }
 
-/// Over the chosen flights: basis x basis, and basis x residual.
+/// Sums over the chosen flights: basis x basis, and basis x residual.
 std::pair<MatrixXd, VectorXd> Evidence::sums_of(const SufficientStatistics& residual, const std::vector<char>& use,
                                                 int group) const {
   const auto g = static_cast<std::size_t>(group);
@@ -325,10 +325,10 @@ Reduced Evidence::reduce(const SufficientStatistics& residual, const std::vector
   MatrixXd change(q, k), weighed(q, k);
   for (int g = 0; g < kGroups; ++g) {
     const auto [normal, right] = sums_of(residual, use, g);
-    if (normal(0, 0) == 0) continue;  // nothing was seen
+    if (normal(0, 0) == 0) continue;  // no rows
     for (Index i = 0; i < k; ++i) change.col(i) = regressors[static_cast<std::size_t>(i)]->row(g).transpose();
     const WithoutDiscrepancy without(normal, discrepancy_sd.row(g).transpose());
-    if (k > 0 && known == nullptr) {  // Eigen's product of half a matrix reads the first number of none
+    if (k > 0 && known == nullptr) {  // Eigen's triangular product reads the first element even of an empty matrix
       const MatrixXd half = without.of(normal);
       weighed.noalias() = (normal - half.transpose() * half) * change;
       result.sums.topLeftCorner(k, k).triangularView<Eigen::Lower>() += change.transpose() * weighed;

@@ -23,7 +23,7 @@ namespace flappy::gap {
 
 inline constexpr int kGroups = kChannels * kCoefficients;
 
-/// Smooth functions of what a beat did; over all flights each has mean 0 and rms 1, except the constant.
+/// Smooth functions of the regime; over all flights each has mean 0 and rms 1, except the constant.
 class RegimeBasis {
  public:
   explicit RegimeBasis(const Flights& flights);
@@ -48,13 +48,13 @@ class RegimeBasis {
 /// The part of rows that is a smooth function of the regime, as coefficients of the basis: [group][basis].
 using BasisCoefficients = Eigen::MatrixXd;
 
-/// Regressors side by side, and the prior of their coefficients: normal, of standard deviation 1.
+/// Regressors; the priors of their coefficients are normal with standard deviation 1.
 struct Regressors {
   std::vector<const BasisCoefficients*> columns;
   std::vector<double> prior_means;
-  std::vector<int> effects;        ///< place in Scales::effects of the scale that multiplies the regressor; -1: none
-  std::vector<ScalePrior> priors;  ///< of that scale
-  std::vector<int> all;            ///< 0, 1, ...
+  std::vector<int> effects;        ///< index in Scales::effects of the scale that multiplies the regressor; -1: none
+  std::vector<ScalePrior> priors;  ///< prior of that scale
+  std::vector<int> all;            ///< indices of all regressors: 0, 1, ...
   Eigen::VectorXd prior_mean() const;
   void add(const BasisCoefficients& column, double prior_mean, int effect = -1, ScalePrior prior = {});
 };
@@ -66,17 +66,17 @@ struct SufficientStatistics {
 
 /// Regressors and residual with delta integrated out.
 struct Reduced {
-  Eigen::MatrixXd sums;  ///< of products of the regressors, then the residual; square
-  double log_scale = 0;  ///< log density of what was integrated out
+  Eigen::MatrixXd sums;  ///< sums of products of the regressors and, last, the residual; square
+  double log_scale = 0;  ///< contribution of delta to the log evidence: minus half the log determinant of its precision
 };
 
 /// How far models of this robot are off, in units of the prior of the model discrepancy.
 struct Scales {
-  double robot = 1;             ///< of all blocks together
-  std::vector<double> effects;  ///< of the background magnitude of each effect; empty: 1
-  std::vector<double> blocks;   ///< [kBlocks] of delta; empty: 1
-  std::vector<char> free;       ///< [kBlocks] whether a block exceeds its prior, as an unknown cause makes it
-  /// Scale of a background magnitude where nothing was found of it.
+  double robot = 1;             ///< scale of the robot, common to all blocks
+  std::vector<double> effects;  ///< scale of the background magnitude of each effect; empty: 1
+  std::vector<double> blocks;   ///< [kBlocks] scale of delta; empty: 1
+  std::vector<char> free;       ///< [kBlocks] whether an unknown cause lets the block exceed its prior
+  /// Prior scale of a background magnitude.
   double prior_scale(ScalePrior prior) const { return prior.follows_robot ? robot : 1; }
   double block(std::size_t b) const { return blocks.empty() ? 1 : blocks[b]; }
 };
@@ -92,22 +92,22 @@ struct Posterior {
 struct ScaledEvidence {
   Posterior posterior;  ///< its evidence includes the prior of the scales
   Scales scales;
-  double law_factor = 1;      ///< of Fit
+  double law_factor = 1;      ///< as Fit::law_factor
   BasisCoefficients delta;    ///< posterior mean of delta over its standard deviation
   BasisCoefficients squares;  ///< expected squares of delta over those of its prior; 0 in groups without rows
 };
 
-/// Rows of flights, whitened by a model of their noise. Immutable: with_... return another.
+/// Rows of flights, whitened by a model of their noise. Immutable: with_... return a changed copy.
 class Evidence {
  public:
-  /// Noise as the headers declare it. `flights` are referred to.
+  /// With the noise that the headers declare. Keeps a reference to `flights`.
   Evidence(const Flights& flights, ModelDiscrepancy discrepancy, int threads);
 
-  /// Noise learnt from what a good fit leaves: standard deviation, autocorrelation, and which rows count less.
+  /// Learns the noise from the residual of a good fit: standard deviation, autocorrelation, and the weights of outliers.
   Evidence with_noise(const Residuals& residual) const;
-  /// Which rows count less alone, for residuals that are no noise yet.
+  /// Learns only the weights of outliers: for residuals that are larger than the noise.
   Evidence with_weights(const Residuals& residual) const;
-  /// All of a residual is noise, smooth or not. Scales stay 1, but for blocks that are free.
+  /// Learns the noise from the whole residual, including its smooth part. From then on, scales stay 1, except those of free blocks.
   Evidence with_remainder(const Residuals& residual) const;
   Evidence with_discrepancy(ModelDiscrepancy discrepancy) const;
 
@@ -115,8 +115,8 @@ class Evidence {
   const ModelDiscrepancy& discrepancy() const { return discrepancy_; }
   const DiagnosisPolicy& policy() const { return flights_->front()->policy(); }
 
-  /// Least squares on the basis. Differences of simulations are rough: small changes of a parameter move the step in which a wing meets its
-  /// stop. What is not a smooth function of the regime is noise under every hypothesis.
+  /// Coefficients of rows on the basis, by least squares. Differences of simulations are rough, for a small change of a parameter moves the step in
+  /// which a wing meets its stop; what is not a smooth function of the regime is noise under every hypothesis.
   BasisCoefficients basis_coefficients(const Residuals& rows) const;
   SufficientStatistics statistics(const Residuals& residual) const;
   /// Adds `share` times a smooth change to the residual of `to`.
@@ -126,16 +126,17 @@ class Evidence {
 
   /// Prior standard deviation of the discrepancy coefficients, [group][basis].
   BasisCoefficients discrepancy_sd(const Scales& scales) const;
-  /// `use`: [flight], which count. `discrepancy_sd`: [group][basis]. `known`: sums of products of the regressors, where they are known.
+  /// Integrates delta out. `use`: [flight] whether it counts. `discrepancy_sd`: [group][basis]. `known`: sums of products of the regressors from an
+  /// earlier call; null: computed.
   Reduced reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& regressors,
                  const std::vector<char>& use, const BasisCoefficients& discrepancy_sd,
                  const Eigen::MatrixXd* known = nullptr) const;
-  /// Of the chosen regressors, whose coefficients have the given prior means and standard deviation 1.
+  /// Posterior of the coefficients of the chosen regressors, which have the given prior means and prior standard deviation 1.
   static Posterior posterior(const Reduced& reduced, const std::vector<int>& chosen, const Eigen::VectorXd& prior_mean,
                              bool covariance = true);
 
-  /// Expectation-maximisation over the scales, from `start` on (gap/evidence/weigh.cpp). `law_sd`: [group][basis] standard deviation of what
-  /// laws of effects get wrong, which no scale changes; empty: 0. `unknown_penalty_nats`: what it costs that a block is free; none: no block is.
+  /// Expectation-maximisation over the scales, from `start` on (gap/evidence/weigh.cpp). `law_sd`: [group][basis] standard deviation of the
+  /// deviations of the effects' laws, which no scale changes; empty: 0. `unknown_penalty_nats`: penalty of each free block; none: no block is free.
   ScaledEvidence weigh(const SufficientStatistics& residual, const Regressors& regressors, const std::vector<char>& use,
                        const BasisCoefficients& law_sd, const Scales& start,
                        std::optional<double> unknown_penalty_nats = {}, int max_iterations = kMaxIterations) const;
@@ -144,9 +145,9 @@ class Evidence {
   static double scale_cost_nats(double times, ScalePrior prior, const Scales& scales);
   static int block_of(int group, BasisFunction function);
 
-  /// Standard deviation of a row of noise alone.
+  /// Standard deviation of the noise of a row.
   double noise_sd(int group) const;
-  /// Rms of the signal of a group, half that of its channel.
+  /// Rms of the signal of a group; its mean square is averaged with that of its channel.
   double signal(int group) const { return groups_[static_cast<std::size_t>(group)].signal; }
 
  private:
@@ -175,8 +176,8 @@ class Evidence {
   std::vector<Group> groups_;
   bool scales_held_ = false;
   Residuals weights_;
-  std::vector<Eigen::MatrixXd> inverse_;              ///< [channel] of basis x basis, without whitening
-  std::vector<std::vector<Eigen::MatrixXd>> normal_;  ///< basis x basis of the whitened rows, [flight][group]
+  std::vector<Eigen::MatrixXd> inverse_;              ///< [channel] inverse of basis x basis, without whitening
+  std::vector<std::vector<Eigen::MatrixXd>> normal_;  ///< [flight][group] basis x basis of the whitened rows
 };
 
 }  // namespace flappy::gap

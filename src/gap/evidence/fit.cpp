@@ -14,21 +14,21 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Reach of the first differences; and bounds of later ones, which go so many standard deviations of the posterior: a step has to be long where
-/// little is known and short where much is.
+/// Reach of the first differences. Later ones reach kReachSd standard deviations of the posterior, within bounds: a step has to be long where the
+/// posterior is wide and short where it is narrow.
 constexpr double kFirstReach = 0.3, kMinReach = 0.1, kMaxReach = 1, kReachSd = 3;
-/// Points around another one, and their distance in reaches.
+/// Number of points around the point of a fit over which statistics are averaged, and their distance in reaches.
 constexpr int kAround = 8;
 constexpr double kAroundReach = 0.2;
-/// Largest step that is not worth another iteration.
+/// A smaller step ends the iteration.
 constexpr double kConverged = 0.02;
-/// Information of a regressor with standard normal coefficient below which it says nothing: some hundredths of a nat.
+/// Nuisance regressors with less information, in units of their prior precision, are left out: they matter some hundredths of a nat.
 constexpr double kMinInformation = 0.05;
 /// Largest distance, in reaches, at which the columns of another point are used.
 constexpr double kMaxDistance = 2;
-/// A change follows a function of the place if it has this share of the largest square of any.
+/// A change follows a function of the place if its square along that function is at least this share of the largest square along any of them.
 constexpr double kFollows = 0.1;
-/// Steps of the effects where the parameters stay.
+/// Iterations of a fit of the effects alone.
 constexpr int kMaxEffectSteps = 2;
 constexpr int kMaxWithoutBackground = 6;
 
@@ -81,7 +81,7 @@ const BasisCoefficients* Fitter::linear_column(const Hypothesis& hypothesis, Ind
   return linear == linear_.end() ? nullptr : &linear->second;
 }
 
-/// Steps along the directions to points around another.
+/// Steps along the directions from `at` to points around it; adds the vehicles of these points.
 std::vector<VectorXd> Fitter::around(const Hypothesis& hypothesis, const VectorXd& at, const Directions& directions,
                                      const std::vector<BasisCoefficients>& known,
                                      std::vector<VehicleHypothesis>& vehicles) const {
@@ -91,8 +91,8 @@ std::vector<VectorXd> Fitter::around(const Hypothesis& hypothesis, const VectorX
     VectorXd shift = VectorXd::Zero(k);
     for (Index d = 0; d < k; ++d) {
       if (static_cast<std::size_t>(d) < known.size() && known[static_cast<std::size_t>(d)].size() == 0) continue;
-      // columns of a Hadamard matrix but its first: every direction goes as often up as down, and of any seven that follow one
-      // another no two together
+      // columns of a Hadamard matrix without its first: each direction goes up as often as down, and any seven
+      // consecutive directions are orthogonal
       const int sign = __builtin_popcount(static_cast<unsigned>((d % (kAround - 1) + 1) & i)) % 2 ? -1 : 1;
       shift[d] = kAroundReach * sign * directions.reach[d];
     }
@@ -103,8 +103,8 @@ std::vector<VectorXd> Fitter::around(const Hypothesis& hypothesis, const VectorX
   return shifts;
 }
 
-/// Averages the statistics over points around, each brought back by the columns: the residual at one point is as rough as differences are. Where
-/// a column is missing, nothing can be brought back.
+/// Averages the statistics over points around the fit, for the residual at one point is rough. The columns take each point back to the fit, so
+/// nothing is averaged if a column is missing.
 void Fitter::average(const std::vector<Residuals>& rows, const std::vector<VectorXd>& shifts, Fit& l) const {
   for (Index d = 0; !shifts.empty() && d < shifts[0].size(); ++d)
     if (shifts[0][d] != 0 && l.columns[static_cast<std::size_t>(d)].size() == 0) return;
@@ -153,7 +153,7 @@ Fitter Fitter::with_nuisances(const Regressors& nuisances, const std::vector<Bac
   for (std::size_t k = 0; k < nuisances.columns.size(); ++k) all.add(*nuisances.columns[k], nuisances.prior_means[k]);
   for (const Background& b : background) {
     int effect = f.place_of(b.effect);
-    if (effect < 0) {  // scales that were found keep their places
+    if (effect < 0) {  // a new effect; scales that were found before keep their indices
       effect = static_cast<int>(f.effects_.size());
       f.effects_.push_back(b.effect);
     }
@@ -220,7 +220,7 @@ Regressors Fitter::unscaled_regressors(const Fit& fit) const {
   return r;
 }
 
-/// What all magnitudes of each effect change. Effects of sensors are left out: their laws are known.
+/// Change by all magnitudes of each effect, in linear approximation. Effects of sensors are left out, for their laws are known.
 std::map<std::string, BasisCoefficients> Fitter::changes(const Hypothesis& hypothesis, const Fit& fit) const {
   std::map<std::string, BasisCoefficients> whole;
   for (Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
@@ -245,10 +245,10 @@ bool Fitter::acts_by_place(const Hypothesis& hypothesis, const Fit& fit) const {
                              [&](const auto& change) { return law_sd_of(change.second, 1).any(); });
 }
 
-/// The law of an effect that acts by the place (near surfaces, at a tether, in time) may deviate from the catalogue's in more than its magnitude. Along
-/// each function of the place that the change follows, each load of the body may deviate by the rms of the loads times the law factor. Along a
-/// function that the change hardly follows, as gusts follow time, the factor does not count: it may be large, and a heating motor would else explain
-/// what turns with the heading.
+/// The law of an effect that acts by the place (near surfaces, at a tether, in time) may deviate from the catalogue's in more than its magnitude. An
+/// effect acts by the place if more than half of its change follows functions of the place. Along each function of the place that the change follows,
+/// each load of the body may deviate by the rms of the loads times the law factor. Along functions that the change hardly follows, the law factor
+/// does not count: it may be large, and then a heating motor would explain loads that depend on the heading.
 BasisCoefficients Fitter::law_sd_of(const BasisCoefficients& change, double law_factor) const {
   const RegimeBasis& basis = evidence_->basis();
   BasisCoefficients sd = BasisCoefficients::Zero(change.rows(), change.cols());
@@ -307,7 +307,7 @@ Reduced Fitter::reduce(const Fit& fit, const Regressors& r) const {
   return evidence_->reduce(fit.statistics, r.columns, all_flights(), evidence_->discrepancy_sd(scales_));
 }
 
-/// Along all directions. `damping` of a step adds so much precision around the point (Levenberg); the covariance is left out then.
+/// Posterior along all directions. `damping`: precision that is added around the present point (Levenberg); if not 0, without a covariance.
 Posterior Fitter::solve(const Fit& fit, const Regressors& r, Reduced reduced, double damping) const {
   std::vector<Index> seen;
   for (std::size_t d = 0; d < fit.columns.size(); ++d)
@@ -410,12 +410,12 @@ Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int max_itera
 
 Fit Fitter::refit_without_background(const Hypothesis& hypothesis, const Fit& before) const {
   Fitter without = *this;
-  without.nuisances_.resize(places_.size());  // those of no effect come first
+  without.nuisances_.resize(places_.size());  // background magnitudes come last
   return without.improve(hypothesis, before, kMaxWithoutBackground, &before, true);
 }
 
-/// Gauss-Newton. Columns of another point serve as long as steps do not lead far from it; the last point gets columns of its own.
-/// `columns_are_here`: whether the columns of `fit` are.
+/// Gauss-Newton. Columns are kept while the steps stay close to the point where they were computed; the last point gets columns of its own.
+/// `columns_are_here`: whether the columns of `fit` were computed at its point.
 Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, const Fit* parameters,
                     bool columns_are_here) const {
   if (!fit.flown()) return fit;
@@ -441,14 +441,15 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, c
     const VectorXd step = fit.directions.axes * fit.posterior.mean;
     bool improved = n < max_iterations && step.cwiseAbs().maxCoeff() >= kConverged;
     if (improved) {
-      // shares of the step, and damped steps, which go less far where little is known; all tried at once
+      // shares of the step, and damped steps, which are shorter in directions with little information; all are tried at
+      // once
       constexpr double kShares[] = {1.4, 1, 0.7, 0.5, 0.35, 0.25, 0.1, 0.03},
                        kDampings[] = {0.3, 1, 3, 10, 30, 100, 300, 1000};
       std::vector<VectorXd> tries;
       for (const double share : kShares) tries.push_back(hypothesis.bounded(fit.at + share * step));
       for (const double damping : kDampings)
         tries.push_back(hypothesis.bounded(fit.at + fit.directions.axes * solve(fit, r, reduced, damping).mean));
-      // effects of sensors stay as they are here, so that all tries share one log; their changes are taken as linear
+      // effects of sensors keep their present values, so that all tries share one log; their changes are added linearly
       std::vector<VehicleHypothesis> vehicles;
       for (VectorXd at : tries) {
         at(in_log) = fit.at(in_log);
@@ -494,7 +495,7 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, c
     }
     if (improved) continue;
     if (columns_are_here || !linearise_here(fit.at)) return fit;
-    max_iterations = n + 1;  // the posterior by the new columns
+    max_iterations = n + 1;  // one more iteration, which computes the posterior with the new columns and does not step
   }
 }
 

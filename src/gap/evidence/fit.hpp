@@ -1,5 +1,5 @@
-// Finds the most probable unknowns of a hypothesis: Gauss-Newton on the rows of whole flights. Derivatives are differences between vehicles that
-// fly side by side as lanes of a batch.
+// Finds the most probable unknowns of a hypothesis by Gauss-Newton on the rows of whole flights. Derivatives are differences between vehicles
+// that are simulated together, as lanes of a batch.
 #pragma once
 
 #include <map>
@@ -12,45 +12,45 @@ namespace flappy::gap {
 
 /// Orthonormal directions through the coordinates of a hypothesis.
 struct Directions {
-  Eigen::MatrixXd axes;   ///< a column each
-  Eigen::VectorXd reach;  ///< half the step of the difference along each
+  Eigen::MatrixXd axes;   ///< [coordinate][direction]
+  Eigen::VectorXd reach;  ///< [direction] half the step of the difference
 };
 
 /// A hypothesis linearised at given coordinates, and its posterior there.
 struct Fit {
   Eigen::VectorXd at;
   Directions directions;
-  Residuals residual;               ///< empty: it was not flown, or the vehicle comes apart
-  SufficientStatistics statistics;  ///< of the residual, averaged over points around
-  std::vector<BasisCoefficients>
-      columns;  ///< change of the prediction for a unit along each direction; empty: the vehicle comes apart there
-  double law_factor = 1;  ///< by how much the laws of its effects deviate from the catalogue's (Fitter::law_sd)
+  Residuals residual;               ///< empty: not simulated, or the simulation diverged
+  SufficientStatistics statistics;  ///< statistics of the residual, averaged over points around `at`
+  /// [direction] change of the prediction for a unit along the direction; empty if the simulation diverges there.
+  std::vector<BasisCoefficients> columns;
+  double law_factor = 1;  ///< by how much the laws of its effects may deviate from the catalogue's (Fitter::law_sd)
   Posterior posterior;    ///< along the directions, relative to `at`
   bool flown() const { return !residual.empty(); }
-  /// Of the coordinates.
+  /// Posterior mean and covariance of the coordinates.
   Eigen::VectorXd mean() const;
   Eigen::MatrixXd covariance() const;
 };
 
-/// Background magnitude of an effect: a regressor of standard normal coefficient.
+/// Background magnitude of an effect: a regressor with a standard normal coefficient.
 struct Background {
   std::string effect;
   BasisCoefficients column;
 };
 
-/// Fits hypotheses to flights, given their evidence, nuisance regressors, and scales. Immutable: with_... return another.
+/// Fits hypotheses to flights, given their evidence, nuisance regressors, and scales. Immutable: with_... return a changed copy.
 class Fitter {
  public:
-  /// Magnitudes by [effect, name].
+  /// Columns of magnitudes by [effect, name].
   using LinearMagnitudes = std::map<std::pair<std::string, std::string>, BasisCoefficients>;
 
-  /// Without nuisance regressors; scales are 1. `flights` are referred to.
+  /// Without nuisance regressors; scales are 1. Keeps a reference to `flights`.
   Fitter(const Flights& flights, std::shared_ptr<const Evidence> evidence, int threads);
   Fitter with_evidence(std::shared_ptr<const Evidence> evidence) const;
-  /// Regressors that are fitted jointly with every hypothesis: nuisances, the same for every robot, then background magnitudes, also of effects that
-  /// a hypothesis names. Those that the flights say nothing of, given `fit`, are left out.
+  /// Regressors that are fitted jointly with every hypothesis: `nuisances`, then background magnitudes, including those of effects that a hypothesis
+  /// names. Regressors on which the flights have no information, given `fit`, are left out.
   Fitter with_nuisances(const Regressors& nuisances, const std::vector<Background>& background, const Fit& fit) const;
-  /// Magnitudes whose change is the same at any value, and need not be flown.
+  /// Columns of magnitudes that act linearly, so that they need not be simulated.
   Fitter with_linear_magnitudes(LinearMagnitudes magnitudes) const;
   Fitter with_scales(Scales scales) const;
 
@@ -58,36 +58,36 @@ class Fitter {
   const Scales& scales() const { return scales_; }
   /// Names of Scales::effects.
   const std::vector<std::string>& effects() const { return effects_; }
-  /// Place of an effect in Scales::effects; -1: none.
+  /// Index of an effect in Scales::effects; -1: none.
   int place_of(const std::string& effect) const;
   std::vector<char> all_flights() const { return std::vector<char>(flights_->size(), 1); }
 
   /// Posterior of a nuisance regressor, given a fit.
   struct NuisanceEstimate {
-    std::size_t place;  ///< among the nuisances as they were given
+    std::size_t place;  ///< index in `nuisances` of with_nuisances
     double mean, sd;
   };
-  /// Without those that the flights say nothing of.
+  /// Posteriors of all nuisance regressors that were not left out.
   std::vector<NuisanceEstimate> nuisances(const Fit& fit) const;
 
-  /// The columns of a fit, without those along which the vehicle comes apart.
+  /// The columns of a fit, without empty ones.
   static Regressors own_regressors(const Fit& fit);
-  /// Those, then nuisances and background magnitudes, with the scales of this robot. An effect that a hypothesis names has its background
-  /// magnitude as well: its model may be off along the effect.
+  /// The columns of a fit, then nuisances and background magnitudes with the scales of this robot. An effect that a hypothesis names has its
+  /// background magnitude as well, for the model of the robot may have errors along the effect.
   Regressors regressors(const Fit& fit) const;
-  /// The same with scales of 1.
+  /// As regressors(), with scales of 1.
   Regressors unscaled_regressors(const Fit& fit) const;
 
-  /// Posterior along all directions of a fit by some flights alone. `use`: [flight].
+  /// Posterior along all directions of a fit, from some flights alone. `use`: [flight] whether it counts.
   Posterior posterior(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
-  /// The most probable coordinates by some flights alone, and what nuisance regressors then explain.
+  /// The most probable coordinates from some flights alone, and the part of the residual that nuisance regressors then explain.
   struct JointFit {
     Eigen::VectorXd at;
     BasisCoefficients nuisances;
   };
   JointFit joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use,
                      bool with_background = true) const;
-  /// Standard deviation, [group][basis], of what the laws of effects that act by the place may deviate from the catalogue's.
+  /// Standard deviation, [group][basis], of the deviations of the laws of effects that act by the place from the catalogue's laws.
   BasisCoefficients law_sd(const Hypothesis& hypothesis, const Fit& fit) const {
     return law_sd(hypothesis, fit, fit.law_factor);
   }
@@ -95,24 +95,24 @@ class Fitter {
   /// Whether one of its effects acts by the place.
   bool acts_by_place(const Hypothesis& hypothesis, const Fit& fit) const;
 
-  /// Without a posterior. `known`: columns of the first directions, which need not be flown.
+  /// A fit without a posterior. `known`: columns of the first directions, which are not simulated again.
   Fit linearise(const Hypothesis& hypothesis, const Eigen::VectorXd& at, Directions directions,
                 const std::vector<BasisCoefficients>& known = {}) const;
-  /// Every coordinate.
+  /// One direction for each coordinate.
   static Directions axes(const Hypothesis& hypothesis);
-  /// At most `max_iterations` linearisations from `start` on. Not flown where the vehicle comes apart at once.
+  /// At most `max_iterations` iterations from `start` on. Not flown() if the simulation diverges at the start.
   Fit fit(const Hypothesis& hypothesis, Eigen::VectorXd start, int max_iterations) const;
-  /// The same with the directions and columns of the parameters of another fit.
+  /// As fit(), with the directions and columns of another fit for the parameters.
   Fit fit_given(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters,
                 int max_iterations) const;
-  /// The effects alone, with the parameters where another fit has them: so all effects are compared by the same columns.
+  /// Fits the effects alone, with the parameters of another fit, so that all effects are compared with the same columns of the parameters.
   Fit fit_effects(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters) const;
-  /// On from another fit, along its directions.
+  /// Continues another fit, along its directions.
   Fit refit(const Hypothesis& hypothesis, const Fit& before, int max_iterations) const;
-  /// On from another fit, along its directions, without background magnitudes.
+  /// Continues another fit, along its directions, without background magnitudes.
   Fit refit_without_background(const Hypothesis& hypothesis, const Fit& before) const;
-  /// Without a residual: linear in the unknowns of the effects, from magnitudes as the vehicle file has them. `effects`: columns of these
-  /// unknowns; empty: not seen.
+  /// A linear fit without a residual, around the magnitudes of the vehicle file. `effects`: columns of the unknowns of the effects; an unknown with
+  /// an empty column is not fitted.
   Fit fit_linear(const Hypothesis& hypothesis, const Fit& parameters,
                  const std::vector<BasisCoefficients>& effects) const;
 
@@ -151,7 +151,8 @@ class Fitter {
   Scales scales_;
   LinearMagnitudes linear_;
   std::vector<Nuisance> nuisances_;
-  std::vector<std::size_t> places_;  ///< of the nuisances that come first and belong to no effect, as they were given
+  /// Indices in `nuisances` of with_nuisances of those that were not left out; they come first in nuisances_.
+  std::vector<std::size_t> places_;
   std::vector<std::string> effects_;
 };
 

@@ -7,11 +7,11 @@
 namespace flappy::gap {
 namespace {
 
-/// Prior standard deviation of the IMU's lag: a header does not say whether a sample is an instant, a mean, or held.
+/// Prior standard deviation of the IMU's lag: a header does not say whether a sample is instantaneous, averaged, or held.
 constexpr double kImuLagSd_s = 5e-4;
 /// Largest deviation of a parameter, in standard deviations.
 constexpr double kMaxDeviation = 4;
-/// Half of 90 % of a normal distribution, in standard deviations; all of 90 % of one that has one side only.
+/// Half width of the 90 % interval of a normal distribution, which is also the 90 % quantile of a half-normal one, in standard deviations.
 constexpr double kHalf90 = 1.645;
 
 }  // namespace
@@ -22,11 +22,11 @@ std::vector<Unknown> unknowns_of(const std::string& effect) {
   return unknowns_of(model::effects()[static_cast<std::size_t>(model::effect_index(effect.c_str()))]);
 }
 
-std::vector<Unknown> unknowns_of(const model::EffectEntry& effect) {
+std::vector<Unknown> unknowns_of(const model::CatalogueEffect& effect) {
   std::vector<Unknown> list;
   for (std::size_t k = 0; k < effect.parameters.size(); ++k) {
     const model::EffectParameter& p = effect.parameters[k];
-    Unknown u{effect.info.id, p.name, 0, 1, p.low, p.high, static_cast<int>(k) < effect.info.sizes};
+    Unknown u{effect.info.id, p.name, 0, 1, p.low, p.high, static_cast<int>(k) < effect.info.magnitudes};
     if (u.magnitude) u.scale = std::max(-p.prior_low, p.prior_high) / kHalf90;
     else u.centre = p.typical, u.scale = (p.prior_high - p.prior_low) / (2 * kHalf90);
     u.in_log = effect.info.stage == model::Stage::sensor;
@@ -44,7 +44,7 @@ Hypothesis::Hypothesis(const sim::Randomisation& uncertain, std::vector<std::str
       {"", "imu.latency_s", 0, kImuLagSd_s, -kMaxDeviation * kImuLagSd_s, kMaxDeviation * kImuLagSd_s, false});
   for (const std::string& e : effects_)
     for (Unknown& u : unknowns_of(*model::find_effect(uncertain.nominal(), e))) {
-      u.in_log = u.in_log && !uncertain.nominal().beat_averaged;  // whose sensors are part of its prediction
+      u.in_log = u.in_log && !uncertain.nominal().beat_averaged;  // beat-averaged vehicles predict effects of sensors
       unknowns_.push_back(std::move(u));
     }
 }

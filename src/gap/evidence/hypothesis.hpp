@@ -12,7 +12,7 @@
 #include "sim/randomise.hpp"
 
 namespace flappy::model {
-struct EffectEntry;
+struct CatalogueEffect;
 }
 
 namespace flappy::gap {
@@ -24,14 +24,14 @@ struct Unknown {
   double centre = 0, scale = 1;
   double low = -1e30, high = 1e30;  ///< bounds of the value
   bool magnitude = false;           ///< the effect vanishes where all of its magnitudes are 0
-  bool in_log = false;  ///< it changes what the log says, not what is flown (gap/replay/sensor_correction.hpp)
+  bool in_log = false;              ///< it changes the log, not the simulation (gap/replay/sensor_correction.hpp)
   double value(double coordinate) const;
   double coordinate(double of_value) const { return (of_value - centre) / scale; }
 };
 
 class Hypothesis {
  public:
-  /// `uncertain` is referred to. `effects`: identifiers, in order.
+  /// Keeps a reference to `uncertain`. `effects`: identifiers, in the order of their unknowns.
   Hypothesis(const sim::Randomisation& uncertain, std::vector<std::string> effects);
   Hypothesis(sim::Randomisation&&, std::vector<std::string>) = delete;
 
@@ -42,7 +42,7 @@ class Hypothesis {
   Eigen::Index parameters() const { return static_cast<Eigen::Index>(uncertain_->majors()); }
   Eigen::Index lag() const { return parameters(); }
   Eigen::Index shared() const { return parameters() + 1; }
-  /// Coordinates of a vehicle: its effects as it has them; else magnitudes of 0, and shape parameters in the middle of their prior.
+  /// Coordinates of a vehicle. An effect that the vehicle lacks has magnitudes of 0, and shape parameters in the middle of their prior.
   Eigen::VectorXd start(const model::Vehicle& vehicle) const;
   Eigen::VectorXd start() const { return start(uncertain_->nominal()); }
   /// The nearest coordinates within the accepted ranges.
@@ -59,8 +59,8 @@ class Hypothesis {
 };
 
 /// Unknowns of an effect of the catalogue: its magnitudes, then its shape parameters.
-std::vector<Unknown> unknowns_of(const model::EffectEntry& effect);
-/// Of an effect of vehicles with wings and motors.
+std::vector<Unknown> unknowns_of(const model::CatalogueEffect& effect);
+/// Unknowns of an effect of vehicles with wings and motors, by its identifier.
 std::vector<Unknown> unknowns_of(const std::string& effect);
 
 }  // namespace flappy::gap

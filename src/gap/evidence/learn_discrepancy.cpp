@@ -14,9 +14,9 @@ namespace {
 using Eigen::Index;
 
 constexpr int kIterations = 16;
-/// Coefficients that the mean of like channels counts for.
+/// The mean square of like channels counts as much as this many coefficients.
 constexpr double kShrink = 6;
-/// Smaller estimates say only that the robots are few.
+/// Least estimates: smaller ones are due to the small number of robots.
 constexpr double kMinShare = 2e-4, kMinBackground = 0.01;
 constexpr std::size_t kKinds = static_cast<std::size_t>(BasisFunction::count);
 
@@ -26,12 +26,12 @@ struct Moment {
 };
 using Shares = std::array<std::array<std::array<Moment, kKinds>, kHarmonics + 1>, kChannels>;
 
-/// Scales of the background magnitudes of a robot, over their prior: heavy-tailed.
+/// Scales of the background magnitudes of a robot, by effect; they make the prior of the background magnitudes heavy-tailed.
 using Factors = std::map<std::string, double>;
 
 using Robots = std::vector<std::unique_ptr<const RobotFit>>;
 
-/// Expected squares, over all robots, given the model discrepancy so far.
+/// Expected squares of the discrepancy coefficients and of the background magnitudes over all robots, given the model discrepancy `now`.
 void expect(const Robots& robots, const ModelDiscrepancy& now, Shares& shares,
             std::map<std::string, Moment>& backgrounds, std::vector<Factors>& factors) {
   factors.resize(robots.size());
@@ -76,7 +76,7 @@ void expect(const Robots& robots, const ModelDiscrepancy& now, Shares& shares,
   }
 }
 
-/// Channels with like parameters.
+/// First and last of the channels that are shrunk towards their mean.
 constexpr std::array<std::pair<int, int>, 7> kAlike = {{{kTorqueX, kTorqueZ},
                                                         {kForceX, kForceZ},
                                                         {kStrokeLeft, kStrokeRight},
@@ -103,7 +103,7 @@ void shrink(Shares& shares) {
       }
 }
 
-/// The class of regimes that each effect's background acts in most, in units of the model discrepancy.
+/// The class of regimes in which the background of each effect is largest, in units of the model discrepancy.
 std::map<std::string, std::size_t> classes_of(const Robots& robots, const ModelDiscrepancy& now) {
   std::map<std::string, std::array<double, kClasses>> sums;
   for (const auto& robot : robots) {
@@ -122,8 +122,8 @@ std::map<std::string, std::size_t> classes_of(const Robots& robots, const ModelD
   return classes;
 }
 
-/// The robots come from few simulators, each of which looks like a few effects. So half of an effect's variance is the median of its class, which
-/// those few do not move.
+/// Averages the variance of each effect with the median of its class. The robots come from few simulators, and the errors of each simulator look like
+/// a few effects; the median is insensitive to those.
 void shrink(const std::map<std::string, std::size_t>& classes, std::map<std::string, Moment>& backgrounds) {
   std::array<std::vector<double>, kClasses> of_class;
   for (const auto& [effect, m] : backgrounds) of_class[classes.at(effect)].push_back(m.sum / m.count);

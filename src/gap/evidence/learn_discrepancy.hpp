@@ -8,9 +8,10 @@
 
 namespace flappy::gap {
 
-/// The prior variances of the discrepancy coefficients by channel, harmonic and kind of function, and of the background magnitudes, that make the
-/// residuals of all robots most probable: expectation-maximisation from `start` on, whose other parameters stay. Each robot is fitted first. Estimates
-/// are shrunk towards those of like channels and effects, for single ones rest on few coefficients. `flights`: of each robot. io::InputError after Ctrl-C.
+/// Finds the prior standard deviations of the discrepancy coefficients, by channel, harmonic and kind of function, and of the background magnitudes
+/// that make the residuals of all robots most probable: expectation-maximisation from `start` on, whose other parameters stay. Each robot is fitted
+/// first. At the end, estimates are shrunk towards those of like channels and effects, for single estimates rest on few coefficients. `flights`:
+/// [robot]. io::InputError after Ctrl-C.
 ModelDiscrepancy learn_discrepancy(const std::vector<Flights>& flights, const sim::Randomisation& uncertain,
                                    const ModelDiscrepancy& start, int threads);
 

@@ -19,28 +19,30 @@ constexpr std::pair<BasisFunction, const char*> kKeys[] = {
     {drag_x, "drag_x"},         {drag_y, "drag_y"},         {drag_z, "drag_z"}};
 
 constexpr const char* kHead =
-    R"(# How much models of one flapping wing are off before anything is known of a vehicle: the model discrepancy of Kennedy and O'Hagan
-# (2001), which an effect must exceed to be one. Read by flappy-gap diagnose, written by flappy-gap learn-discrepancy: learn it anew
-# from robots of your own that you trust.
+    R"(# The model discrepancy (Kennedy and O'Hagan 2001): what every model of a flapping wing gets wrong, before anything is known of a vehicle. An effect
+# has to explain more than this. Read by flappy-gap diagnose, written by flappy-gap learn-discrepancy: learn it again from robots of your own that
+# you trust, whose flights contain nothing that the vehicle file lacks.
 #
 # Learnt from )";
 constexpr const char* kShares =
-    R"(# Standard deviation of a coefficient of the regime's basis, as a share of the channel's signal, by harmonic of the beat from 0 to 4:
-# the mean; what follows the inputs, the body's rates, products, the place (height, heading, time, nearness of surfaces); what
-# changes from flight to flight (a warm sensor, another day's battery); the velocity v in B, and |v| v.
+    R"(# Prior standard deviation of the coefficients of the regime basis, as a share of the channel's signal, for harmonics 0 (the mean) to 4 of the beat.
+# Rows are kinds of functions: constant; the inputs; the rates of the body; products with an input; the place (height, heading, time, nearness of
+# surfaces); an offset of each flight (a warm sensor, another day's battery); the velocity v in B; and |v| v.
 )";
 constexpr const char* kSpread =
-    R"(# How much more or less than usual models of a robot are off: standard deviation of the log of its own factor, wide, for a robot may be
-# nearly the model; and how far its blocks (a kind of regime in a channel and harmonic), and what it has of each entry, go their own ways
-# about it, as degrees of freedom of an inverse gamma law: many of blocks of the place, for a wing knows nothing of it; few of entries that say how a wing, its hinges and its drive work by
-# themselves (of_models), for each model, and each maker's robot, has such laws of its own. What it has of other entries has nothing to do with that factor. Choices.
+    R"(# Priors of the scales by which models of one robot are off by more or less than those of others. robot_sd: standard deviation of the logarithm of the
+# robot's scale; wide, for a robot may be nearly the model. The other scales have inverse gamma priors of their squares; the more degrees of freedom,
+# the closer a scale stays to the centre of its prior. Scales of blocks (a class of regimes in a channel and harmonic) are centred on the robot's
+# scale: block_freedom, and place_freedom for those of the place, which are closer, for a wing does not sense its place. Scales of background
+# magnitudes are centred on 1 (effect_freedom), except those of the effects of_models, which describe how a wing, its hinges and its drive work:
+# each model and each robot has its own laws of these, so they are centred on the robot's scale and vary more (model_freedom). Choices.
 )";
 constexpr const char* kSensors =
-    R"(# What laboratories declare of sensors is right to so much, whatever else is so: standard deviations. Choices.
+    R"(# Errors of declared sensors: prior standard deviations, the same under every hypothesis. Choices.
 )";
 constexpr const char* kBackground =
-    R"(# Every vehicle has a little of every effect, or of something that looks like it: standard deviation of the coordinates of its sizes
-# (1: the catalogue's prior). Only more than that is an effect. `other`: of every entry that is not named.
+    R"(# Prior standard deviation of the background magnitudes, in coordinates of the effect (1: the prior of the catalogue). Every vehicle has a little of
+# every effect, or of something that looks like it; only more than that is evidence of the effect. `other`: for effects that are not listed.
 )";
 
 /// The effect of a background magnitude, without the suffix of what both wings share.
@@ -102,8 +104,8 @@ std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learn
   text += std::string(kSpread) + "[spread]\nrobot_sd = " + number(d.spread.robot_sd) +
           "\nblock_freedom = " + number(d.spread.block_freedom) +
           (d.beat_averaged ? "" : "\nplace_freedom = " + number(d.spread.place_freedom)) +
-          "\nentry_freedom = " + number(d.spread.effect_freedom) + of_models +
-          (d.beat_averaged ? "\nbeside_all = true\n\n" : "\n\n") + kSensors +
+          "\neffect_freedom = " + number(d.spread.effect_freedom) + of_models +
+          (d.beat_averaged ? "\nbeat_averaged = true\n\n" : "\n\n") + kSensors +
           "[sensors]\nimu_rotation_rad = " + sensor("imu_mounting") + "  # as it is mounted, about each axis\n" +
           "imu_place_m = " + sensor("imu_place") + "  # along each axis\npower_latency_s = " + sensor("power_delay") +
           "  # of a sample that is an instant, a mean, or held\nclock_rate = " + sensor("imu_clock") +
@@ -119,15 +121,16 @@ ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
   ModelDiscrepancy d;
   const io::Table spread = root.table("spread");
   d.spread = {spread.number("robot_sd", io::positive()), spread.number("block_freedom", io::positive()),
-              spread.number("block_freedom", io::positive()), spread.number("entry_freedom", io::positive()), 0};
-  d.beat_averaged = spread.boolean_or("beside_all", false);
+              spread.number("block_freedom", io::positive()), spread.number("effect_freedom", io::positive()), 0};
+  d.beat_averaged = spread.boolean_or("beat_averaged", false);
   if (!d.beat_averaged) {
     d.spread.place_freedom = spread.number("place_freedom", io::positive());
     d.spread.model_freedom = spread.number("model_freedom", io::positive());
     d.of_models = spread.strings("of_models");
   }
   for (const std::string& id : d.of_models)
-    if (!model::is_effect(id)) spread.fail("of_models", "no effect \"" + id + "\"", "identifiers of docs/effects.md");
+    if (!model::is_effect(id))
+      spread.fail("of_models", "no effect \"" + id + "\"", "those that flappy-gap effects lists");
 
   for (int channel = 0; channel < kChannels; ++channel) {
     const io::Table share = root.table("share");

@@ -13,11 +13,11 @@
 
 namespace flappy::gap {
 
-/// Classes of functions of the regime that share a scale.
+/// Classes of kinds of functions of the regime; functions of a class share a scale in each channel and harmonic.
 enum class Regimes { always, inputs, velocity, place, count };
 Regimes regimes_of(BasisFunction function);
 
-/// Prior of a scale: an inverse gamma law of its square about 1 or, if it follows the robot, about the scale of the robot.
+/// Prior of a scale: inverse gamma for its square, centred on 1 or, if it follows the robot, on the scale of the robot.
 struct ScalePrior {
   double freedom = 0;  ///< degrees of freedom
   bool follows_robot = false;
@@ -25,29 +25,29 @@ struct ScalePrior {
 
 struct ModelDiscrepancy {
   /// Priors of the scales by which models of one robot are off by more or less than those of others: log robot ~ N(0, robot_sd^2), and
-  /// (block / robot)^2 ~ inverse gamma for each class of regimes in a channel and harmonic, so that what is left has heavy tails.
+  /// (block / robot)^2 ~ inverse gamma for each class of regimes in a channel and harmonic, so that the model discrepancy has heavy tails.
   struct Spread {
     double robot_sd;
     double block_freedom;
-    double place_freedom;   ///< of blocks of the place, which a wing does not sense
-    double effect_freedom;  ///< of background magnitudes
-    double model_freedom;   ///< of background magnitudes of effects that each model of a wing describes in its own way
+    double place_freedom;   ///< replaces block_freedom for blocks of the place, which a wing does not sense
+    double effect_freedom;  ///< for background magnitudes, except those of effects in `of_models`
+    double model_freedom;   ///< for background magnitudes of effects in `of_models`
   } spread{};
   /// An error of a declared sensor, under every hypothesis, with its prior standard deviation.
   struct Nuisance {
-    std::string id, value;  ///< of gap/replay/sensor_correction.hpp
+    std::string id, value;  ///< error and its parameter, as in gap/replay/sensor_correction.hpp
     double sd;
   };
   std::vector<Nuisance> nuisances;
-  /// Prior standard deviation of the coefficient of such a function, as a share of the channel's signal.
+  /// Prior standard deviation of the coefficients of functions of this kind, as a share of the channel's signal.
   double share(int channel, int harmonic, BasisFunction function) const {
     return shares[static_cast<std::size_t>(channel)][static_cast<std::size_t>(harmonic)]
                  [static_cast<std::size_t>(function)];
   }
-  /// Prior standard deviation of the background magnitude of an effect, in its coordinates (gap/evidence/hypothesis.hpp): what a vehicle without
-  /// the effect has of it, or of what looks like it.
+  /// Prior standard deviation of the background magnitude of an effect, in its coordinates (gap/evidence/hypothesis.hpp): the magnitude that a vehicle
+  /// without the effect has of it, or of something that looks like it.
   double background_sd(const std::string& effect) const;
-  /// Degrees of freedom of the scale of a block of such functions.
+  /// Degrees of freedom of the scale of a block of this class.
   double freedom_of(Regimes regimes) const {
     return regimes == Regimes::place ? spread.place_freedom : spread.block_freedom;
   }
@@ -55,18 +55,19 @@ struct ModelDiscrepancy {
 
   std::array<std::array<std::array<double, static_cast<std::size_t>(BasisFunction::count)>, kHarmonics + 1>, kChannels>
       shares{};
-  std::map<std::string, double> background;  ///< by effect; "other": of those that are not named
-  std::vector<std::string>
-      of_models;               ///< effects whose background magnitude follows the robot, with spread.model_freedom
+  std::map<std::string, double> background;  ///< background_sd by effect; "other": effects that are not listed
+  /// Effects of wings, hinges and drive, which each model describes in its own way: their background magnitude follows the robot, with
+  /// spread.model_freedom.
+  std::vector<std::string> of_models;
   bool beat_averaged = false;  ///< every background magnitude follows the robot, with spread.effect_freedom
 };
 
-/// Suffix of the background magnitude that both wings share of an effect with a magnitude for each wing.
+/// An effect with a magnitude for each wing has two background magnitudes; this suffix marks the one that both wings share.
 inline constexpr const char* kOfBoth = "_of_both";
 
-/// The text of such a file; `learnt`: from what, for its head.
+/// The text of a file like configs/gap/model_discrepancy.toml. `learnt`: source of the values, for the head of the file.
 std::string discrepancy_text(const ModelDiscrepancy& discrepancy, const std::string& learnt);
-/// io::InputError by file and line.
+/// io::InputError with file and line.
 ModelDiscrepancy read_model_discrepancy(
     const std::filesystem::path& path = io::config_path("gap/model_discrepancy.toml"));
 

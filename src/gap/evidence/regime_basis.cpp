@@ -13,7 +13,7 @@ RegimeBasis::RegimeBasis(const Flights& flights) {
     functions.push_back(f->functions());
     column.push_back(Eigen::VectorXd::Ones(static_cast<Eigen::Index>(f->beats())));
   }
-  // centred and of rms 1, but for the constant; what never changes is the constant
+  // appends a function with mean 0 and rms 1, except the constant; a function that never changes is left out
   const auto append = [&](const std::string& name, const std::string& quantity, BasisFunction kind) {
     double sum = 0, squares = 0, n = 0;
     for (const Eigen::VectorXd& v : column)
@@ -34,12 +34,12 @@ RegimeBasis::RegimeBasis(const Flights& flights) {
     for (std::size_t f = 0; f < flights.size(); ++f) column[f] = functions[f][i].values;
     append(functions.front()[i].name, functions.front()[i].quantity, functions.front()[i].kind);
   }
-  // an offset of each flight, which would else look like a height at which one of them flew
+  // an offset for each flight, which would otherwise look like an influence of the height at which that flight flew
   for (std::size_t offset = 1; offset < flights.size() && flights.front()->policy().flight_offsets; ++offset) {
     for (std::size_t f = 0; f < flights.size(); ++f) column[f].setConstant(f == offset ? 1 : 0);
     append("flight " + flights[offset]->name(), "flight", BasisFunction::flight);
   }
-  // products of centred functions, none of them where a factor never changes
+  // products of centred functions; none at all if one of the factors never changes
   const auto index = [&](const std::string& name) {
     return static_cast<int>(std::ranges::find(functions_, name, &Function::name) - functions_.begin());
   };

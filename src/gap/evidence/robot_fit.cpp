@@ -15,11 +15,11 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr int kFirstIterations = 4, kMaxRefits = 5, kRefitIterations = 6;
-/// Scale of background magnitudes for the first fit, over their prior scale.
+/// Scale of background magnitudes over their prior scale, in the first fit with them.
 constexpr double kWideScale = 5;
-/// Rounds in which the remainder is learnt and the catalogue explains some of it.
+/// Rounds in which the catalogue is fitted linearly and the noise is learnt from the residual that it leaves.
 constexpr int kRemainderRounds = 3;
-/// Evidence that another round has to bring, and that it may lose, as linear models are not exact.
+/// Gain of evidence for which another round is made, and loss at which it is undone; smaller changes may be errors of the linear models.
 constexpr double kMinGain_nats = 2;
 
 /// Prior of the law factor: standard deviation of its log, and its largest value.
@@ -28,8 +28,8 @@ constexpr double kLawFactorSd = 1, kMaxLawFactor = 32;
 constexpr const char* kDelay = "delay_s";
 
 /// Whether an effect has a magnitude for each wing, and no other.
-bool of_sides(const model::EffectEntry& effect) {
-  return effect.info.sizes == 2 && std::string_view(effect.parameters[0].name).starts_with("left_") &&
+bool of_sides(const model::CatalogueEffect& effect) {
+  return effect.info.magnitudes == 2 && std::string_view(effect.parameters[0].name).starts_with("left_") &&
          std::string_view(effect.parameters[1].name).starts_with("right_");
 }
 
@@ -70,8 +70,8 @@ void RobotFit::refit_with_nuisances() {
   for (int round = 0; round < kMaxRefits && refit_with_minors(); ++round) continue;
 }
 
-/// Parameters that are fitted while background magnitudes are small make up for a large one, and then nothing shows it. So the first fit is one in
-/// which each may be large.
+/// Parameters that are fitted while background magnitudes are small compensate for a large one, and then no later fit finds it. So each may be large
+/// in the first fit.
 void RobotFit::widen_effects() {
   Scales wide = weigh(no_effects_, parameters_, fitter_.scales()).scales;
   for (std::size_t e = 0; e < wide.effects.size(); ++e)
@@ -95,8 +95,7 @@ double RobotFit::beyond_background(const std::string& effect, const VectorXd& ma
          improbable(effect + kOfBoth, VectorXd::Constant(1, half * (magnitudes[0] + magnitudes[1])));
 }
 
-/// Moves the minor draws to what the flights show of them, and fits the parameters again. False where that brings next to nothing, or loses so much
-/// that it is undone.
+/// Moves the minor draws to their estimates, and fits the parameters again. Undone if it loses evidence. False if it gains little or is undone.
 bool RobotFit::refit_with_minors() {
   const auto log_evidence = [&] { return weigh(no_effects_, parameters_, fitter_.scales()).posterior.log_evidence; };
   const std::vector<double> minors = uncertain_.minors();
@@ -111,7 +110,7 @@ bool RobotFit::refit_with_minors() {
     parameters_ = std::move(fit);
   };
   take(there, parameters_);
-  // with new columns: by those of another point a fit may end a hundred nats below what is near
+  // with new columns, for with columns of another point a fit may stop a hundred nats below a better point nearby
   parameters_ = fitter_.fit(no_effects_, parameters_.mean(), kRefitIterations);
   take_scales();
   const double gain = log_evidence() - before;
@@ -155,7 +154,7 @@ void RobotFit::set_nuisances() {
   fitter_ = fitter_.with_nuisances(nuisance_regressors(), background(evidence().discrepancy(), true), parameters_);
 }
 
-/// What is left given all magnitudes of the catalogue is noise under every hypothesis.
+/// Takes the residual that all magnitudes of the catalogue together leave as noise, under every hypothesis.
 void RobotFit::learn_remainder() {
   for (int round = 0; round < kRemainderRounds; ++round) {
     Regressors r = Fitter::own_regressors(parameters_);
@@ -177,7 +176,8 @@ void RobotFit::learn_remainder() {
 
 Scales RobotFit::find_scales(const Hypothesis& hypothesis, const Fit& fit, const Scales& start) const {
   ScaledEvidence best = weigh(hypothesis, fit, start);
-  // expectation-maximisation leaves to the blocks what they took first: one effect after another may have it instead
+  // expectation-maximisation stays in a maximum in which blocks explain what an effect's background may explain better,
+  // so larger background magnitudes are tried, one effect after another
   while (evidence().policy().discrepancy_scales) {
     const std::optional<Scales> larger = larger_effect(hypothesis, fit, best.scales);
     if (!larger) break;
@@ -188,8 +188,9 @@ Scales RobotFit::find_scales(const Hypothesis& hypothesis, const Fit& fit, const
   return best.scales;
 }
 
-/// The scales, but for the background magnitude that gains most where it is larger; none where none gains. Given all else, the likelihood of its
-/// coefficients is normal with precision C^-1 - 1 and sum C^-1 m, where m and C are their posterior.
+/// The scales with the largest gain if the background magnitude of a single effect becomes larger; none if no effect gains. Given all else, the
+/// likelihood of the coefficients of a background magnitude is normal with precision C^-1 - 1 and sum C^-1 m, where m and C are their posterior mean
+/// and covariance.
 std::optional<Scales> RobotFit::larger_effect(const Hypothesis& hypothesis, const Fit& fit, const Scales& now) const {
   const Fitter fitter = fitter_.with_scales(now);
   const Regressors r = fitter.regressors(fit);
@@ -237,7 +238,8 @@ ScaledEvidence RobotFit::weigh(const Hypothesis& hypothesis, const Fit& fit, con
     return w;
   };
   ScaledEvidence best = with(1, start);
-  // the effect may explain now what was taken for a large background magnitude
+  // also from prior scales of the effects' own background, for the effect may now explain what a large background
+  // magnitude explained
   Scales without_background = start;
   bool differs = false;
   for (const std::string& effect : hypothesis.effects())
@@ -272,7 +274,7 @@ std::vector<SensorFinding> RobotFit::sensors(const Fitter& fitter, const Hypothe
   return list;
 }
 
-/// Change of the prediction for one step, of a residual that is `steps` steps away from that of the parameters.
+/// Change of the prediction for one step. `there`: residual of a vehicle that is `steps` steps away from that of the parameters.
 BasisCoefficients RobotFit::change(Residuals there, double steps) const {
   for (std::size_t f = 0; f < there.size(); ++f)
     for (std::size_t k = 0; k < there[f].size(); ++k) there[f][k] = (parameters_.residual[f][k] - there[f][k]) / steps;
@@ -289,7 +291,7 @@ void RobotFit::find_magnitudes() {
     for (VehicleHypothesis& v : s.near) vehicles.push_back(std::move(v));
   }
   std::vector<Residuals> rows = residuals(flights_, vehicles, threads_);
-  std::vector<BasisCoefficients> changes(rows.size());  // of the whole step
+  std::vector<BasisCoefficients> changes(rows.size());  // [vehicle] for the whole step
   io::parallel_for(rows.size(), threads_, [&](std::size_t i) {
     if (!rows[i].empty()) changes[i] = change(std::move(rows[i]), 1);
   });
@@ -321,7 +323,7 @@ void RobotFit::find_magnitudes() {
   find_linear_magnitudes();
 }
 
-/// An error that a sensor adds is linear; its delay is not.
+/// Magnitudes of effects of sensors act linearly, except delays.
 void RobotFit::find_linear_magnitudes() {
   Fitter::LinearMagnitudes linear;
   for (const MagnitudeColumn& m : magnitudes_) {
@@ -343,7 +345,7 @@ void RobotFit::find_nuisances() {
     vehicles.push_back(std::move(v));
   }
   for (std::size_t d = uncertain_.majors(); d < uncertain_.draws(); ++d) {
-    // in the direction in which its body is physical
+    // a step in the direction in which the vehicle is physical
     VehicleHypothesis v = no_effects_.vehicle(parameters_.at, std::pair{d, 1.0});
     const bool other = model::physical_fault(v.vehicle).has_value();
     steps.push_back(other ? -1 : 1);

@@ -1,5 +1,5 @@
-// The flights of a robot with its vehicle's parameters fitted to them, and what is learnt with these: the noise, the scales of the model
-// discrepancy, nuisance regressors, and the change that each magnitude of the catalogue makes. All other stages of a diagnosis start here.
+// Fits the parameters of a vehicle to the flights of a robot, and learns what all later stages of a diagnosis use: the noise, the scales of the
+// model discrepancy, nuisance regressors, and the change that each magnitude of the catalogue makes.
 #pragma once
 
 #include "gap/evidence/screening.hpp"
@@ -8,23 +8,23 @@ namespace flappy::gap {
 
 /// Error of a declared sensor.
 struct SensorFinding {
-  std::string name;  ///< as "imu_mounting.x_rad", or "imu.latency_s"
+  std::string name;  ///< for example "imu_mounting.x_rad", "imu.latency_s"
   double value, sd;
   double prior_sd;
 };
 
 class RobotFit {
  public:
-  /// Fits. `flights` are referred to; `withheld`: effects that the catalogue is to lack; `threads`: as for io::parallel_for.
+  /// Fits. Keeps a reference to `flights`. `withheld`: effects to leave out of the catalogue; `threads`: as for io::parallel_for.
   RobotFit(const Flights& flights, const sim::Randomisation& uncertain, const ModelDiscrepancy& discrepancy,
            std::vector<std::string> withheld, int threads);
   RobotFit(const RobotFit&) = delete;
   RobotFit& operator=(const RobotFit&) = delete;
 
   const Evidence& evidence() const { return fitter_.evidence(); }
-  /// With the scales of the parameters' fit.
+  /// With the scales of the fit of the parameters.
   const Fitter& fitter() const { return fitter_; }
-  /// With the minor draws that the flights show.
+  /// With the minor draws at their estimates.
   const sim::Randomisation& uncertain() const { return uncertain_; }
   /// The hypothesis without effects.
   const Hypothesis& no_effects() const { return no_effects_; }
@@ -33,20 +33,20 @@ class RobotFit {
   const Fit& nominal() const { return nominal_; }
   const std::vector<MagnitudeColumn>& magnitudes() const { return magnitudes_; }
 
-  /// Background magnitudes of all effects. Of an effect with a magnitude for each wing: the difference of the wings, and what both share, for
-  /// there a model of a wing is off in both alike. `shapes`: with changes by another shape parameter.
+  /// Background magnitudes of all effects. An effect with a magnitude for each wing has two: the difference of the wings, and the part that both
+  /// share, for an error of a wing model is the same in both wings. `shapes`: also with other shape parameters.
   std::vector<Background> background(const ModelDiscrepancy& discrepancy, bool shapes) const;
-  /// Errors of declared sensors, then minor draws of the vehicle, for one standard deviation each.
+  /// Errors of declared sensors, then minor draws of the vehicle: change of the prediction for one prior standard deviation of each.
   Regressors nuisance_regressors() const;
-  /// Nats by which magnitudes of an effect are more probable as an effect than as its background.
+  /// Nats by which magnitudes of an effect are more probable a priori as an effect than as its background.
   double beyond_background(const std::string& effect, const Eigen::VectorXd& magnitudes, const Scales& scales) const;
-  /// Errors of declared sensors, given a fit. `fitter`: with scales of the fit.
+  /// Errors of declared sensors, given a fit. `fitter`: with the scales of the fit.
   std::vector<SensorFinding> sensors(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit) const;
 
   /// Evidence of a hypothesis with its own scales, searched from `start` on. `unknown_penalty_nats`: as in Evidence::weigh.
   ScaledEvidence weigh(const Hypothesis& hypothesis, const Fit& fit, const Scales& start,
                        std::optional<double> unknown_penalty_nats = {}) const;
-  /// Scales given a fit, searched from `start` on; also where one effect's background magnitude is much larger.
+  /// Scales given a fit, searched from `start` on and from scales at which the background magnitude of one effect is much larger.
   Scales find_scales(const Hypothesis& hypothesis, const Fit& fit, const Scales& start) const;
 
  private:

@@ -12,12 +12,12 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Log of twice the probability that N(mean, sd^2) is positive: the prior of a magnitude that cannot be negative has half of its mass there.
+/// Log of twice the probability that N(mean, sd^2) is positive. Twice, for the prior of a magnitude that cannot be negative is half-normal.
 double log_twice_positive(double mean, double sd) {
   return std::log(std::max(std::erfc(-mean / (sd * std::numbers::sqrt2)), 1e-300));
 }
 
-/// One effect at a time, jointly with the regressors of a fit.
+/// Evidence of one effect at a time, jointly with the regressors of a fit.
 class Screening {
  public:
   Screening(const Fitter& fitter, const Fit& fit, const std::vector<MagnitudeColumn>& columns)
@@ -40,7 +40,7 @@ class Screening {
     without_ = Evidence::posterior(reduced_, base_, mean_(base_)).log_evidence;
   }
 
-  /// The best of all magnitudes around which the effect may be linear.
+  /// Linearises the effect around small and around large magnitudes; returns the best.
   ScreenedEffect screened(const std::string& effect) const {
     std::vector<Linear> magnitudes;
     for (std::size_t i = 0; i < columns_.size(); ++i)
@@ -63,11 +63,11 @@ class Screening {
  private:
   struct Linear {
     std::size_t column;
-    int at;       ///< place in the reduced sums
-    double from;  ///< coordinate around which it is linear
+    int at;       ///< index in the reduced sums
+    double from;  ///< coordinate around which it is linearised, less that of the vehicle file
   };
 
-  /// The residual less so much of a regressor.
+  /// Sums for the residual less `much` times a regressor.
   Reduced less(int regressor, double much) const {
     Reduced r = reduced_;
     const Index last = r.sums.rows() - 1;
@@ -81,7 +81,8 @@ class Screening {
     const auto one_sided = [&](const Linear& m) { return columns_[m.column].one_sided; };
     ScreenedEffect s{effect, 0, VectorXd::Zero(columns_[magnitudes.front().column].unknowns)};
     for (const Linear& m : magnitudes) s.coordinates[columns_[m.column].unknown] = columns_[m.column].from;
-    // jointly with the background magnitude of the effect; or instead of it, whose log-prior cost is then saved
+    // either jointly with the background magnitude of the effect, or instead of it, which saves the log-prior cost of
+    // its scale
     const int place = fitter_.place_of(effect);
     const std::vector<double>& scales = fitter_.scales().effects;
     std::vector<int> others;
@@ -107,8 +108,8 @@ class Screening {
         return log_twice_positive(coordinate(k), std::sqrt(p.covariance(at(k), at(k))));
       };
       if (whole) s.gain = p.log_evidence - without_;
-      // the most negative magnitude of those that cannot be negative is 0: two that make up for each other are both far off, and only one of
-      // them is there. Its half of the prior counts beside those that are left
+      // if magnitudes that cannot be negative are, the most negative one is set to 0 and left out: of two that
+      // compensate for each other, only one is present. The probability of its positive side stays in the gain
       std::size_t worst = magnitudes.size();
       for (std::size_t k = 0; k < magnitudes.size(); ++k)
         if (one_sided(magnitudes[k]) && coordinate(k) < (worst == magnitudes.size() ? 0 : coordinate(worst))) worst = k;
@@ -127,14 +128,14 @@ class Screening {
 
   const Fitter& fitter_;
   const std::vector<MagnitudeColumn>& columns_;
-  std::vector<int> effects_;    ///< of the base: place of the effect whose background magnitude it is
-  std::vector<int> base_, at_;  ///< in the reduced sums: the regressors of the fit; each magnitude
+  std::vector<int> effects_;    ///< [regressor of the fit] its Regressors::effects
+  std::vector<int> base_, at_;  ///< indices in the reduced sums: regressors of the fit; magnitudes
   Reduced reduced_;
   VectorXd mean_;
   double without_ = 0;
 };
 
-/// Distance of near steps, in prior standard deviations of the background magnitude, and the least, below which differences are rough.
+/// Distance of near steps in prior standard deviations of the background magnitude; and their least distance, below which differences are rough.
 constexpr double kNearSd = 2, kMinReach = 0.05;
 
 }  // namespace
@@ -144,7 +145,7 @@ std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, 
                                            const ModelDiscrepancy* background) {
   std::vector<MagnitudeStep> steps;
   const model::Vehicle now = Hypothesis(uncertain, {}).vehicle(at).vehicle;
-  for (const model::EffectEntry& e : model::catalogue_of(uncertain.nominal())) {
+  for (const model::CatalogueEffect& e : model::catalogue_of(uncertain.nominal())) {
     const std::string id = e.info.id;
     if (std::ranges::count(withheld, id)) continue;
     const Hypothesis h(uncertain, {id});
@@ -162,7 +163,7 @@ std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, 
       steps.push_back({{id, i - first, h.size() - first, one_sided, here[i]}, h.vehicle(there), {}, {}, reach, {}});
       for (const double sign : {1.0, -1.0}) {
         there[i] = here[i] + sign * reach;
-        // effects of sensors are linear, near and far
+        // effects of sensors are linear, so they need no near steps
         if (background && !u.in_log && (sign > 0 || !one_sided))
           steps.back().near.push_back(h.vehicle(h.bounded(there)));
       }

@@ -1,4 +1,4 @@
-// What each effect of the catalogue would explain beside a fit, as far as a linear model shows.
+// Screening: the evidence that each effect of the catalogue would gain jointly with a fit, estimated by linear models.
 #pragma once
 
 #include "gap/evidence/fit.hpp"
@@ -8,48 +8,48 @@ namespace flappy::gap {
 /// A magnitude of an effect.
 struct Magnitude {
   std::string effect;
-  Eigen::Index unknown, unknowns;  ///< which of the effect's unknowns, and how many it has
-  bool one_sided;
-  double from;  ///< coordinate in the vehicle file
+  Eigen::Index unknown, unknowns;  ///< index among the effect's unknowns, and their number
+  bool one_sided;                  ///< cannot be negative
+  double from;                     ///< coordinate in the vehicle file
 };
 
 /// Vehicles that differ from the fitted one in a magnitude.
 struct MagnitudeStep : Magnitude {
-  VehicleHypothesis vehicle;               ///< kMagnitudeReach away
-  std::vector<VehicleHypothesis> shaped;   ///< the same with each shape parameter a standard deviation away
-  std::vector<VehicleHypothesis> further;  ///< of one sign: two steps away, three, .. kMaxSteps
-  double near_reach;                       ///< about as far as vehicles without the effect go
-  std::vector<VehicleHypothesis> near;     ///< there: above and, where it may be negative, below
+  VehicleHypothesis vehicle;               ///< one step, kMagnitudeReach, away
+  std::vector<VehicleHypothesis> shaped;   ///< one step away, with one shape parameter a standard deviation away
+  std::vector<VehicleHypothesis> further;  ///< two to kMaxSteps steps away; only if one_sided
+  double near_reach;                       ///< about as large as background magnitudes become
+  std::vector<VehicleHypothesis> near;     ///< near_reach away: above and, unless one_sided, below
 };
 inline constexpr std::size_t kMaxSteps = 5;
 inline constexpr double kMagnitudeReach = 0.4;
 
-/// For each effect of the catalogue but `withheld`, at the given coordinates of the parameters, with shape parameters in the middle of their
-/// prior. `background`: for steps as near as a vehicle without the effect; null: none.
+/// Steps for each effect of the catalogue but `withheld`, at the given coordinates of the parameters, with shape parameters in the middle of their
+/// prior. `background`: gives the reach of the near steps; null: no near steps.
 std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, const Eigen::VectorXd& at,
                                            const std::vector<std::string>& withheld,
                                            const ModelDiscrepancy* background = nullptr);
 
-/// Change of the prediction for a unit of a magnitude's coordinate, near the vehicle file's.
+/// Change of the prediction for a unit of a magnitude's coordinate, near its value in the vehicle file.
 struct MagnitudeColumn : Magnitude {
   BasisCoefficients change;
-  /// At background magnitudes, above and below: there a wing lands on its stop in another way.
+  /// Change per unit at background magnitudes, above and below: small magnitudes may act differently, for instance on how a wing meets its stop.
   std::vector<BasisCoefficients> near;
-  /// Where the magnitude is large, as a delay of a third of a beat turns the change of a small one.
+  /// Change at large magnitudes, where the effect is no longer linear; a delay of a third of a beat, for instance, acts unlike a small one.
   struct Large {
-    double at;                        ///< coordinate beyond the file's
-    BasisCoefficients chord, change;  ///< on the way there, and there
+    double at;                        ///< coordinate less that of the vehicle file
+    BasisCoefficients chord, change;  ///< per unit: mean on the way to `at`; local at `at`
   };
   std::vector<Large> large;
 };
 
 struct ScreenedEffect {
   std::string effect;
-  double gain = 0;              ///< evidence, nats
-  Eigen::VectorXd coordinates;  ///< of its unknowns
+  double gain = 0;              ///< gain of evidence, nats
+  Eigen::VectorXd coordinates;  ///< most probable coordinates of its unknowns
 };
 
-/// Each effect that has columns, the largest gain first. Columns of one effect follow each other.
+/// Screens each effect that has columns; the largest gain first. In `columns`, those of one effect have to be consecutive.
 std::vector<ScreenedEffect> screen(const Fitter& fitter, const Fit& fit, const std::vector<MagnitudeColumn>& columns);
 
 }  // namespace flappy::gap

@@ -1,14 +1,14 @@
-// How far models of this robot are off, learnt from its flights: a scale for each block of the model discrepancy, and one for the background
+// Learns from the flights of a robot how far models of it are off: a scale for each block of the model discrepancy, and one for the background
 // magnitude of each effect.
 //
-// Given the scales, theta and delta are normal (evidence.hpp). With delta's prior standard deviation s D in a group, delta / (s D) is z:
+// Given the scales, theta and delta are normal (evidence.hpp). Let s D be the prior standard deviation of delta in a group, and z = delta / (s D):
 //   z | theta ~ N(H^-1 d (right - normal change theta), H^-1)      d = s D, H = 1 + d normal d
 // which gives the expected squares of delta in a block. With n coefficients in the block, the most probable scale is
 //   s^2 = (sum E[delta^2] / D^2 + nu f^2) / (n + nu),
-// where f is the scale of the robot as a whole. The scales of background magnitudes follow the same law, about f or about 1 (ScalePrior): a robot,
-// or all robots of a maker, may have much of what looks like one effect, and a hypothesis pays the log-prior cost of that. The log evidence with the
-// prior of the scales never falls (Dempster, Laird, Rubin 1977). It is taken at its maximum: to first order the width of the maximum is the same for
-// every hypothesis.
+// where f is the scale of the robot as a whole. The scales of background magnitudes have the same law, centred on f or on 1 (ScalePrior): a robot may
+// have a large background magnitude of an effect, and each hypothesis pays the log-prior cost of it. Each iteration of expectation-maximisation
+// increases the log evidence with the prior of the scales (Dempster, Laird, Rubin 1977). The scales are not integrated out but taken at the maximum,
+// for to first order the width of the maximum is the same for every hypothesis.
 #include <cmath>
 #include <limits>
 
@@ -22,18 +22,18 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Evidence that another iteration has to bring.
+/// Iterations end when they gain less evidence than this.
 constexpr double kSettled_nats = 0.1;
-/// Growth of the stride after a success, and its limit.
+/// Growth of the stride after an iteration that gains, and its limit.
 constexpr double kStrideGrowth = 1.5, kMaxStride = 8;
-/// Smallest scale of a free block, in scales of the robot.
+/// Smallest scale of a free block over the scale of the robot.
 constexpr double kMinFree = 2;
 
 /// Sums over the rows of one group.
 struct Sums {
   MatrixXd normal, change, all;  ///< basis x basis; basis x regressors; normal (change), then basis x residual
-  VectorXd prior_sd;             ///< of delta where its scale is 1
-  double squares = 0;            ///< of the residual
+  VectorXd prior_sd;             ///< prior standard deviation of delta at scale 1
+  double squares = 0;            ///< sum of squares of the residual
 };
 
 /// A group under given scales.
@@ -48,8 +48,8 @@ double log_prior(double scale, double robot, double freedom) {
   return freedom / 2 * (2 * std::log(ratio) + 1 - ratio * ratio);
 }
 
-/// The most probable scale f of a robot, given the scales s of nu degrees of freedom that follow it. `freedom`: sum of nu; `inverses`: sum of
-/// nu / s^2; `sd`: of the prior of log f.
+/// The most probable scale f of a robot, given the scales s that follow it with nu degrees of freedom. `freedom`: sum of nu; `inverses`: sum of
+/// nu / s^2; `sd`: prior standard deviation of log f.
 double robot_scale(double freedom, double inverses, double sd) {
   constexpr double kGrid = 0.02;
   double best = 1, most = -std::numeric_limits<double>::infinity();
@@ -60,7 +60,7 @@ double robot_scale(double freedom, double inverses, double sd) {
   return best;
 }
 
-/// Over-relaxed expectation-maximisation: `stride` times the step from one to the other (Salakhutdinov, Roweis 2003).
+/// Over-relaxed expectation-maximisation: `stride` times the step between the logarithms of two sets of scales (Salakhutdinov, Roweis 2003).
 Scales strided(const Scales& from, const Scales& to, double stride) {
   const auto go = [&](double a, double b) { return a * std::pow(b / a, stride); };
   Scales s = to;
@@ -125,7 +125,7 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
   if (best.scales.blocks.empty()) best.scales.blocks.assign(kBlocks, 1);
   if (best.scales.free.empty()) best.scales.free.assign(kBlocks, 0);
   best.posterior.log_evidence = -std::numeric_limits<double>::infinity();
-  std::vector<int> of_effect;  // regressors of each scale
+  std::vector<int> of_effect;  // number of regressors of each scale
   std::vector<ScalePrior> priors;
   for (std::size_t i = 0; i < regressors.effects.size(); ++i)
     if (regressors.effects[i] >= 0) {
@@ -183,7 +183,7 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
         log_scales += log_prior(now.effects[e], now.prior_scale(priors[e]), priors[e].freedom);
     w.posterior.log_evidence += log_scales;
     const double gain = w.posterior.log_evidence - best.posterior.log_evidence;
-    if (!(gain > 0)) {  // too far: back to the best, and on by a step that cannot fail
+    if (!(gain > 0)) {  // the stride was too long: back to the best scales, and on with stride 1, which cannot lose
       if (stride == 1) break;
       stride = 1;
       now = strided(best.scales, next, stride);
@@ -197,10 +197,10 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
       const VectorXd z = h.llt.matrixU().solve(h.half.col(k) - h.half.leftCols(k) * w.posterior.mean);
       const MatrixXd inverse = h.llt.matrixU().solve(MatrixXd::Identity(q, q));
       MatrixXd moved;
-      if (k > 0)  // neither Eigen's triangular products nor its rows are for matrices without columns
+      if (k > 0)  // Eigen's triangular products and row expressions fail for matrices without columns
         moved = h.llt.matrixU().solve(h.half.leftCols(k) * spread.triangularView<Eigen::Lower>());
       for (Index i = 0; i < q; ++i) {
-        const double d = h.sd[i], share = d > 0 ? 1 - std::pow(h.law_sd[i] / d, 2) : 0;  // of the discrepancy
+        const double d = h.sd[i], share = d > 0 ? 1 - std::pow(h.law_sd[i] / d, 2) : 0;  // delta's share of variance
         const double square =
             d * d * (z[i] * z[i] + inverse.row(i).squaredNorm() + (k > 0 ? moved.row(i).squaredNorm() : 0.0));
         const double own = share * share * square + share * h.law_sd[i] * h.law_sd[i];
@@ -237,7 +237,8 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
       const double bound2 = scales_held_ ? 1 : (total[b] + nu[b] * f2) / (n + nu[b]);
       next.blocks[b] = std::sqrt(bound2);
       next.free[b] = 0;
-      // a block with heavy tails holds any error of a model: to be spared their cost is no sign of a cause
+      // blocks with few degrees of freedom have heavy tails that hold any error of a model, so an excess there is no
+      // sign of an unknown cause
       if (unknown_penalty_nats && nu[b] >= discrepancy_.spread.place_freedom) {
         const double free2 = std::max(total[b] / n, kMinFree * kMinFree * f2);
         const auto objective = [&](double s2) { return -0.5 * (n * std::log(s2) + total[b] / s2); };

@@ -11,10 +11,10 @@
 namespace flappy::gap {
 namespace {
 
-/// A quarter of a second at 34 Hz.
+/// Beats in a block: a quarter of a second at 34 Hz.
 constexpr std::size_t kBlock = 8;
 constexpr int kDraws = 400;
-constexpr double kLeastGapSd = 2;
+constexpr double kMinGapSd = 2;
 
 }  // namespace
 
@@ -92,7 +92,7 @@ std::optional<Closure> closure_of(const Losses& refit, const Losses& effect, dou
   double mean = 0, square = 0;
   for (const double g : gaps) mean += g / static_cast<double>(gaps.size());
   for (const double g : gaps) square += (g - mean) * (g - mean) / static_cast<double>(gaps.size());
-  if (!(*before - floor >= kLeastGapSd * std::sqrt(square)) || !(*before > floor)) return std::nullopt;
+  if (!(*before - floor >= kMinGapSd * std::sqrt(square)) || !(*before > floor)) return std::nullopt;
   return Closure{(*before - *after) / (*before - floor), io::quantile(closures, 0.05), io::quantile(closures, 0.95)};
 }
 

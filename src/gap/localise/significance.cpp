@@ -13,8 +13,8 @@
 namespace flappy::gap {
 namespace {
 
-constexpr std::size_t kLeastWhiteness = 20;
-constexpr double kLeastBlocks = 5;
+constexpr std::size_t kMinWhiteness = 20;
+constexpr double kMinBlocks = 5;
 
 }  // namespace
 
@@ -40,7 +40,7 @@ std::optional<FittedSlope> slope_test(const std::vector<double>& x, const std::v
   double uneven = 0, alone = 0, neighbours = 0;
   for (const auto& [b, w] : weights) uneven += w * w;
   const double n = 1 / uneven;
-  if (n < kLeastBlocks) return std::nullopt;
+  if (n < kMinBlocks) return std::nullopt;
   for (auto b = sums.begin(); b != sums.end(); ++b) {
     alone += b->second * b->second;
     const auto next = std::next(b);
@@ -55,7 +55,7 @@ std::optional<FittedSlope> slope_test(const std::vector<double>& x, const std::v
 std::optional<Whiteness> whiteness_test(const std::vector<double>& y, const std::vector<int>& block) {
   std::map<int, std::pair<double, double>> sums;
   for (std::size_t i = 0; i < y.size(); ++i) sums[block[i]].first += y[i], sums[block[i]].second += 1;
-  if (sums.size() < kLeastWhiteness) return std::nullopt;
+  if (sums.size() < kMinWhiteness) return std::nullopt;
   const double n = static_cast<double>(sums.size());
   double mean = 0, squares = 0;
   for (auto& [b, s] : sums) s.first /= s.second, mean += s.first / n;

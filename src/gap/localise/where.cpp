@@ -10,19 +10,19 @@
 namespace flappy::gap {
 namespace {
 
-/// Half a second of a flapper at 34 Hz: longer than the memory of what noise usually is.
+/// Beats in a block, half a second at 34 Hz: longer than noise is usually correlated.
 constexpr int kLongBlock = 16;
-/// For whiteness: short, yet longer than the hats of beats.
+/// Beats in a block of the test of whiteness: short, yet longer than the hat of a beat (gap/replay/beat_rows.hpp).
 constexpr int kShortBlock = 8;
-constexpr double kMostMemory = 0.95;
-/// Ends of all bands but the highest.
+constexpr double kMaxMemory = 0.95;
+/// Upper ends of the frequency bands, except the highest band.
 constexpr double kBandEnds_Hz[] = {0.5, 1, 2, 4, 8};
 
-/// A coefficient's part in the mean square of its waveform.
+/// Weight of the square of a coefficient in the mean square of the waveform.
 double share_of(int coefficient) { return coefficient == 0 ? 1 : 0.5; }
 
-/// How much of the variance of noise that remembers the beat before lies below a frequency, as a share of half the beats': the
-/// integral of (1 - past^2) / |1 - past exp(i pi f)|^2.
+/// Share of the variance of first-order autoregressive noise below a frequency: the integral of (1 - past^2) / |1 - past exp(i pi f)|^2.
+/// `frequency`: over half the rate of beats; `past`: autocorrelation from beat to beat.
 double share_below(double frequency, double past) {
   if (frequency >= 1) return 1;
   return 2 / std::numbers::pi * std::atan((1 + past) / (1 - past) * std::tan(std::numbers::pi / 2 * frequency));
@@ -32,7 +32,7 @@ struct TestedBeat {
   std::size_t flight, beat;
 };
 
-/// The rows of one channel.
+/// The rows of one channel, and their tests.
 class ChannelRows {
  public:
   ChannelRows(const RowContext& around, const Residuals& residual, int channel, Stage stage)
@@ -75,7 +75,7 @@ class ChannelRows {
         {stage_, test, channel_name(channel_), channel_unit(channel_), std::move(regime), gap, floor, p, false});
   }
 
-  /// Coefficients from `first` to before `last`, in the beats where `in` is 1.
+  /// Tests the coefficients from `first` to before `last`, in the beats where `in` is 1.
   void add_cell(ResidualTest test, Regime regime, const std::vector<double>& in, int first, int last,
                 std::vector<ResidualLocation>& places) const {
     double squares = 0, noise = 0, n = 0, least_p = 1;
@@ -116,8 +116,8 @@ class ChannelRows {
     }
   }
 
-  /// Of noise that remembers the beat before, from neighbours within blocks, whose means are taken off: what is slow is no noise. A mean
-  /// of so few takes some of the memory along (Kendall 1954).
+  /// Autocorrelation of the noise from beat to beat, from neighbouring beats within blocks. The mean of each block is
+  /// subtracted, for slow changes are not noise; the bias that this causes in short blocks is corrected (Kendall 1954).
   double memory() const {
     std::vector<double> sums(1, 0), counts(1, 0);
     const std::vector<double>& y = rows_[0];
@@ -135,7 +135,7 @@ class ChannelRows {
       squares += (off(i) * off(i) + off(i - 1) * off(i - 1)) / 2;
     }
     if (!(squares > 0)) return 0;
-    return std::clamp((products / squares + 1.0 / kLongBlock) / (1 - 3.0 / kLongBlock), -kMostMemory, kMostMemory);
+    return std::clamp((products / squares + 1.0 / kLongBlock) / (1 - 3.0 / kLongBlock), -kMaxMemory, kMaxMemory);
   }
 
   void test_bands(std::vector<ResidualLocation>& places) const {
@@ -143,7 +143,7 @@ class ChannelRows {
     ends.push_back(*std::ranges::max_element(around_.beats_Hz) / 2);
     const double past = memory();
     Bands left;
-    std::vector<double> noise(ends.size(), 0);  // mean square of noise of variance 1, by band
+    std::vector<double> noise(ends.size(), 0);  // [band] mean square of autoregressive noise of variance 1
     for (std::size_t f = 0; f < around_.beats.size(); ++f) {
       std::vector<double> y(around_.beats[f], 0);
       double covered = 0;
@@ -225,7 +225,7 @@ RowContext row_context_of(const Flights& flights, std::vector<double> noise_sd) 
   }
   for (int g = 0; g < kGroups; ++g)
     s.rows.push_back(!flights.empty() && flights.front()->has_rows(g / kCoefficients, g % kCoefficients) ? 1 : 0);
-  // those that all flights have
+  // only quantities that all flights have
   const auto gather = [&](std::vector<RegimeQuantity> (PredictedFlight::*of)() const, std::vector<Quantity>& to) {
     for (const auto& f : flights)
       for (RegimeQuantity& own : ((*f).*of)()) {

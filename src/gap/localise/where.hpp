@@ -1,14 +1,15 @@
-// Where the residuals are more than noise: by channel, by what the vehicle did, by frequency.
+// Locates residuals that exceed the noise: by channel, by regime, by phase of the beat, by frequency.
 //
-// A table has one line for each test of one channel; rms of its rows over the noise's, and how probable noise alone is:
+// The table has one row for each test of one channel, with the rms of the residual, that of the noise, and the p value of noise alone:
 //   channel     all beats
-//   regime      a third of the beats: low, middle and high ones of height, speed, ...
-//   phase       mean or one harmonic of the beats: where in the stroke
-//   frequency   a band of the beats' means, against the highest band and the spectrum of noise that remembers one beat
-//   input       what is proportional to an input
-//   whiteness   whether blocks of beats remember the blocks before; not of motion capture, whose rows are differences
-// The first three and inputs test mean rows in blocks of beats (gap/significance.hpp), the most telling coefficient of a channel standing for
-// all (Bonferroni). Among all tests of a stage false discoveries are held to kFalseDiscoveries.
+//   regime      a third of the beats: those with low, middle or high height, speed, ...
+//   phase       the mean or one harmonic of the beats: where in the stroke
+//   frequency   a band of the beat means, against the highest band and the spectrum of first-order autoregressive noise
+//   input       the part that is proportional to an input
+//   whiteness   correlation between blocks of beats; not for path and turn, whose rows are differences over beats
+// The tests of channel, regime, phase and input use sums over blocks of beats (gap/localise/significance.hpp); the smallest p value of the
+// coefficients of a channel counts, multiplied by their number (Bonferroni). Among all tests of a stage, the share of false discoveries is held
+// to kFalseDiscoveries.
 #pragma once
 
 #include <string>
@@ -25,19 +26,19 @@ constexpr std::size_t group_of(int channel, int coefficient) {
   return static_cast<std::size_t>(channel) * kCoefficients + static_cast<std::size_t>(coefficient);
 }
 
-/// What beats are sorted by, [flight][beat].
+/// A quantity by which beats are sorted.
 struct Quantity {
   std::string name, unit;
-  std::vector<std::vector<double>> values;
+  std::vector<std::vector<double>> values;  ///< [flight][beat]
 };
 
-/// What rows of flights lie in.
+/// Properties of the rows of all flights that the tests need.
 struct RowContext {
-  std::vector<std::size_t> beats;          ///< of each flight
-  std::vector<double> beats_Hz;            ///< of each flight
+  std::vector<std::size_t> beats;          ///< [flight]
+  std::vector<double> beats_Hz;            ///< [flight]
   std::vector<std::vector<char>> covered;  ///< [flight][beat][channel]
   std::vector<Quantity> regimes, inputs;
-  std::vector<char> rows;        ///< [group]: whether there are any
+  std::vector<char> rows;        ///< [group] whether the group has rows
   std::vector<double> noise_sd;  ///< [group]
   bool has_rows(int channel, int coefficient) const { return rows[group_of(channel, coefficient)] != 0; }
   bool covers(std::size_t flight, std::size_t beat, int channel) const {
@@ -46,8 +47,8 @@ struct RowContext {
 };
 RowContext row_context_of(const Flights& flights, std::vector<double> noise_sd);
 
-/// All rows of the table of a stage. `residual`: [flight], empty where the vehicle came apart. Of an input, `gap` and `noise_floor` are of what
-/// is proportional to it.
+/// All rows of the table for one stage. `residual`: [flight], empty where the simulation of the vehicle diverged. In the test of an input, `gap`
+/// and `noise_floor` are the rms of the part proportional to it.
 std::vector<ResidualLocation> locate(const RowContext& around, const Residuals& residual, Stage stage);
 
 }  // namespace flappy::gap

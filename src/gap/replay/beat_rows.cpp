@@ -33,7 +33,7 @@ BeatProjection::BeatProjection(const std::vector<double>& beat, const std::vecto
       weights_.push_back(w);
     }
   }
-  // a beat at an end has half a hat only
+  // compared with the median weight, for at the ends of a flight only half of a hat has samples
   const double usual = io::upper_median(all);
   for (std::size_t k = 0; k < beats; ++k) covered_[k] = k >= first && there[k] > (1 - kMissing) * usual ? 1 : 0;
   for (Weight& w : weights_)

@@ -1,25 +1,25 @@
-// How a diagnosis treats a kind of vehicle. A vehicle of wings and motors predicts each harmonic of a beat, and models of its wings are never
-// exact. A beat-averaged vehicle predicts means alone; what no effect explains of them is noise.
+// How a diagnosis treats a kind of vehicle. A vehicle with wings and motors predicts each harmonic of a beat, and no model of its wings is exact.
+// A beat-averaged vehicle predicts only means over a beat; the part of these that no effect explains counts as noise.
 #pragma once
 
 namespace flappy::gap {
 
 struct DiagnosisPolicy {
   bool flight_offsets;  ///< the regime basis has an offset for each flight but the first
-  bool
-      discrepancy_scales;  ///< scales of the model discrepancy and of background magnitudes are fitted for each hypothesis
-  bool nuisances_are_noise;  ///< what nuisance regressors explain is taken off residuals in flights held out
+  /// Scales of the model discrepancy and of background magnitudes are fitted for each hypothesis.
+  bool discrepancy_scales;
+  bool nuisances_are_noise;  ///< residuals of held-out flights exclude what the nuisance regressors explain
   bool move_parameters;      ///< parameters are fitted again jointly with the effects that explain most
-  bool
-      background_in_corrected;  ///< the corrected vehicle is fitted without background magnitudes by simulation, not by its columns
-  bool validate;                ///< ladder, controls and agreements are computed; effects that cannot show are listed
-  double min_step_nats;  ///< evidence that a step of a fit has to bring
-  int max_further;       ///< effects that are tried jointly with the most probable set at a time
+  /// The corrected vehicle is fitted again by simulation, without background magnitudes; false: only linearly, by the columns of its fit.
+  bool background_in_corrected;
+  bool validate;         ///< ladder, controls and agreements are computed; effects that cannot show are listed
+  double min_step_nats;  ///< least gain of evidence for which a fit takes another step
+  int max_further;       ///< number of effects that are tried at a time, each jointly with the best set
 };
 
-/// Of vehicles with wings and motors: steps have to be flown.
+/// Vehicles with wings and motors: each step of a fit costs a simulation, so a step has to bring more.
 inline constexpr DiagnosisPolicy kWingPolicy{true, true, true, true, true, false, 0.5, 2};
-/// Of beat-averaged vehicles: steps cost nothing.
+/// Beat-averaged vehicles: a step of a fit costs almost nothing.
 inline constexpr DiagnosisPolicy kBeatAveragedPolicy{false, false, false, false, false, true, 0.05, 1};
 
 }  // namespace flappy::gap

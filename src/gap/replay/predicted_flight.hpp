@@ -1,5 +1,5 @@
-// A recorded flight that vehicles predict, as rows: one for each beat, sorted by channel and by coefficient of the beat. There are two
-// implementations: for vehicles with wings and motors (reset_prediction.hpp), and for beat-averaged ones (mean_prediction.hpp).
+// A recorded flight and its prediction by vehicle hypotheses, as rows: for each beat, the coefficients of each channel. There are two
+// implementations: for vehicles with wings and motors (reset_prediction.hpp), and for beat-averaged vehicles (beat_averaged_prediction.hpp).
 #pragma once
 
 #include <memory>
@@ -14,26 +14,25 @@
 
 namespace flappy::gap {
 
-/// The channels that residuals are sorted by.
 enum Channel : int {
   kTorqueX,
   kTorqueY,
   kTorqueZ,  ///< angular acceleration, rad/s^2, B
   kForceX,
   kForceY,
-  kForceZ,  ///< specific force at the IMU, or at the origin, m/s^2, B
+  kForceZ,  ///< specific force at the IMU, or for beat-averaged vehicles at the torso origin, m/s^2, B
   kStrokeLeft,
-  kStrokeRight,  ///< rad, where logged
-  kBattery,      ///< V, where logged, as the next
+  kStrokeRight,  ///< stroke angle, rad; only where logged
+  kBattery,      ///< battery voltage, V; only where logged
   kCurrentLeft,
-  kCurrentRight,  ///< of the motors, A
-  // what motion capture says against the IMU alone, no vehicle: the mean only
+  kCurrentRight,  ///< motor current, A; only where logged
+  // motion capture compared with the IMU, without a vehicle (gap/replay/stream_rows.hpp): only the mean of a beat
   kPathX,
   kPathY,
-  kPathZ,  ///< acceleration of the origin, m/s^2, W
+  kPathZ,  ///< acceleration of the torso origin by motion capture less that by the IMU, m/s^2, W
   kTurnX,
   kTurnY,
-  kTurnZ,  ///< rate beyond the gyro's and a constant bias, rad/s, B
+  kTurnZ,  ///< angular rate by motion capture less that by the gyro and a constant bias, rad/s, B
   kChannels
 };
 const char* channel_name(int channel);
@@ -43,11 +42,11 @@ const char* channel_unit(int channel);
 using Rows = std::vector<double>;
 inline constexpr std::size_t kRowsPerBeat = static_cast<std::size_t>(kChannels) * kCoefficients;
 
-/// A vehicle that may have flown a recording, and how its sensors may differ from the headers of the log.
+/// A vehicle that may have flown a recording, and the errors of its sensors.
 struct VehicleHypothesis {
   model::Vehicle vehicle;
-  double lag_s = 0;      ///< the sensors are later, against the voltages, than the header says
-  EffectValues sensors;  ///< errors of sensors beyond the headers (gap/replay/sensor_correction.hpp)
+  double lag_s = 0;      ///< delay of the sensors relative to the voltages, beyond the latency in the header
+  EffectValues sensors;  ///< errors of sensors that the headers do not declare (gap/replay/sensor_correction.hpp)
 };
 
 /// Kinds of functions of the regime (gap/evidence/evidence.hpp).
@@ -57,7 +56,7 @@ enum class BasisFunction {
   rate,
   product,
   place,
-  flight,  ///< an offset of one flight
+  flight,  ///< 1 in one flight, 0 in the others
   velocity_x,
   velocity_y,
   velocity_z,
@@ -67,16 +66,16 @@ enum class BasisFunction {
   count
 };
 
-/// A function of what a flight did, beat by beat.
+/// A function of the regime.
 struct RegimeFunction {
   std::string name;
-  std::string
-      quantity;  ///< what it depends on: a name, amplitude, velocity, rate, height, ceiling, wall, heading, time, ...
+  /// The quantity that it depends on: the name of an input, amplitude, velocity, rate, height, ceiling, wall, heading, time, ...
+  std::string quantity;
   BasisFunction kind;
   Eigen::VectorXd values;  ///< [beat]
 };
 
-/// A quantity by which the beats of a flight are sorted.
+/// A quantity of the regime by which the beats of a flight are sorted.
 struct RegimeQuantity {
   std::string name, unit;
   std::vector<double> values;  ///< [beat]
@@ -85,7 +84,7 @@ struct RegimeQuantity {
 class PredictedFlight {
  public:
   virtual ~PredictedFlight() = default;
-  /// Of the log's folder.
+  /// Name of the folder of the log.
   virtual const std::string& name() const = 0;
   virtual std::size_t beats() const = 0;
   virtual double beats_Hz() const = 0;
@@ -93,14 +92,15 @@ class PredictedFlight {
   /// Whether a channel has rows of this coefficient.
   virtual bool has_rows(int channel, int coefficient) const = 0;
   virtual const Rows& measured() const = 0;
-  /// What moved: as measured, and for torques the angular acceleration of the recorded motion. Of these `measured` holds nothing, for the
-  /// prediction is the difference already.
+  /// The signal of each channel, which the model discrepancy is a share of: the measured rows. For vehicles with wings and motors, some channels
+  /// differ. Torque: the predicted rows are already the difference from the recorded motion, so `measured` is 0; the signal is the recorded
+  /// angular acceleration. Battery: the voltage less the full voltage. Path and turn: constants.
   virtual const Rows& signal() const = 0;
-  /// Rows as the sensors of each vehicle would have shown them; empty for one that came apart.
+  /// Rows that the sensors of each vehicle would have measured, [vehicle]; empty for a vehicle whose simulation diverges.
   virtual std::vector<Rows> predict(const std::vector<const VehicleHypothesis*>& vehicles) const = 0;
-  /// Weighs rows of samples that were predicted elsewhere as `measured` and `predict` do.
+  /// Smooths rows that were predicted elsewhere over beats, as `measured` and `predict` do.
   virtual void weigh(Rows& /*rows*/) const {}
-  /// Rows of the sensors' declared noise alone: one of its many realisations, the same for a seed.
+  /// Rows that the declared noise of the sensors alone would give: one realisation for each seed.
   virtual Rows declared_noise(std::uint64_t seed) const = 0;
   virtual std::vector<RegimeFunction> functions() const = 0;
   /// Pairs of functions, by name, whose products complete the regime basis.
@@ -110,10 +110,10 @@ class PredictedFlight {
   virtual const DiagnosisPolicy& policy() const = 0;
   /// Null for beat-averaged vehicles.
   virtual const Recording* recording() const { return nullptr; }
-  /// The same beats of another log of the flight. Null for beat-averaged vehicles.
+  /// The same beats with another log of the flight. Null for beat-averaged vehicles.
   virtual std::shared_ptr<const PredictedFlight> with_log(flightlog::FlightLog /*log*/) const { return nullptr; }
-  /// The same beats after these effects of sensors are undone in the log. Null for beat-averaged vehicles, whose sensors are part of their
-  /// prediction.
+  /// The same beats after the given errors of sensors are undone in the log. Null for beat-averaged vehicles, whose prediction includes the
+  /// effects of their sensors.
   virtual std::shared_ptr<const PredictedFlight> corrected(const EffectValues& /*sensors*/) const { return nullptr; }
 };
 

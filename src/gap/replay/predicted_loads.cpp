@@ -9,10 +9,10 @@
 namespace flappy::gap {
 namespace {
 
-/// To a microsecond.
+/// Rounded to a microsecond.
 std::string seconds(double t_s) { return io::shortest_digits(std::round(1e6 * t_s) / 1e6); }
 
-/// What a name in the header means; none: nothing.
+/// The column that a name in the header of the file stands for; none: the name is unknown.
 std::optional<PredictedColumn> column_of(const std::string& name, const model::BeatAveraged& vehicle) {
   for (std::size_t k = 0; k < model::kLoadNames.size(); ++k) {
     if (name == model::kLoadNames[k]) return PredictedColumn{k, {}, {}};
@@ -22,10 +22,10 @@ std::optional<PredictedColumn> column_of(const std::string& name, const model::B
   return std::nullopt;
 }
 
-/// Of what is linear between its samples: the mean over each step of a grid where samples are closer than half a step, so that what is faster
-/// than the grid does not fold into the band, otherwise the value.
+/// Samples on the grid of the motion, linearly interpolated. Where samples are closer than half a step of the grid, each value is the mean over a
+/// step, so that frequencies above the grid's are not aliased into the band.
 std::vector<double> on_grid(const std::vector<double>& t_s, const std::vector<double>& x,
-                            const flightlog::MeanMotion& m) {
+                            const flightlog::BeatAveragedMotion& m) {
   std::vector<double> integral(x.size(), 0);
   for (std::size_t k = 1; k < x.size(); ++k)
     integral[k] = integral[k - 1] + (t_s[k] - t_s[k - 1]) * (x[k] + x[k - 1]) / 2;
@@ -52,7 +52,8 @@ std::vector<double> on_grid(const std::vector<double>& t_s, const std::vector<do
 }  // namespace
 
 std::vector<PredictedColumn> read_predicted_loads(const std::filesystem::path& file, const model::BeatAveraged& vehicle,
-                                                  const flightlog::MeanMotion& motion, double from_s, double to_s) {
+                                                  const flightlog::BeatAveragedMotion& motion, double from_s,
+                                                  double to_s) {
   const auto fail = [&](std::size_t line, const std::string& what, const std::string& accepted) {
     throw io::InputError(file.string() + (line > 0 ? ":" + std::to_string(line) : "") + ": " + what +
                          "; accepted: " + accepted);
@@ -98,7 +99,7 @@ std::vector<PredictedColumn> read_predicted_loads(const std::filesystem::path& f
            "rows at most " + seconds(apart_s) + " s apart, for motion is compared up to " +
                io::shortest_digits(vehicle.bandwidth_Hz) + " Hz");
   }
-  // clocks of streams differ by less than a sample
+  // the clocks of the streams may differ by up to a step of the motion's grid
   if (t_s.front() > from_s + motion.step_s || t_s.back() < to_s - motion.step_s)
     fail(t_s.front() > from_s + motion.step_s ? 2 : t_s.size() + 1,
          "t_s: is from " + seconds(t_s.front()) + " to " + seconds(t_s.back()) + " s, less than the flight",

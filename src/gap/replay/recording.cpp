@@ -14,14 +14,14 @@ namespace {
 
 using Eigen::Vector3d;
 constexpr double kTurn = 2 * std::numbers::pi;
-/// A frequency is looked for this far around the declared one, as a share of it.
+/// The flapping frequency is searched within this share of the declared one.
 constexpr double kFrequencyReach = 0.02;
-/// At both ends, so that a flight whose clocks are corrected still holds it.
+/// Cut off at both ends, so that the log still covers the grid after its clocks are corrected.
 constexpr double kMargin_s = 0.05;
-/// The battery's first samples, and what in them is more than their noise.
+/// The first samples of the battery give its full voltage; a ratio to the nominal voltage below kFuller may be noise and counts as 1.
 constexpr std::size_t kFirstSamples = 20;
 constexpr double kFuller = 1.02;
-/// Of the usual interval between commands: a longer one is a gap.
+/// An interval between commands that is longer than so many times the median is a gap.
 constexpr double kLongestHold = 5;
 
 TorsoAt torso_at(const flightlog::TorsoMotion& m) {
@@ -41,7 +41,7 @@ TorsoAt torso_at(const flightlog::TorsoMotion& m) {
 Recording::Recording(const std::filesystem::path& folder, flightlog::FlightLog flight_log,
                      const model::Vehicle& nominal)
     : name(folder.filename().empty() ? folder.parent_path().filename().string() : folder.filename().string()),
-      least_z_m(flight_log.header.ambient.ground_z_m + nominal.extent.below_m + kLeastClearance_m),
+      least_z_m(flight_log.header.ambient.ground_z_m + nominal.extent.below_m + kMinClearance_m),
       density_ratio(flight_log.header.ambient.air_density_kg_m3 / nominal.air_density_kg_m3),
       log(flightlog::on_its_clocks(std::move(flight_log))),
       smoother(log, folder),
@@ -83,7 +83,7 @@ void Recording::lay_grid() {
   torso.push_back(torso_at(smoother.at(std::max(begin_s, smoother.begin_s()))));
   const std::vector<std::pair<double, double>> undriven = undriven_s();
   for (std::size_t k = first + 1; k < bounds.size() && bounds[k] <= last_s + kPredictionStep_s / 2; ++k) {
-    // a gap is flown in pieces, so that the torso stays on its record
+    // a gap of the IMU is divided into intervals of the usual length, so that the torso is reset often enough
     const int pieces = std::max(1, static_cast<int>(std::lround((bounds[k] - now_s) / usual_s)));
     for (int i = pieces; i > 0; --i) {
       const int n = static_cast<int>(std::lround((bounds[k] - now_s) / i / kPredictionStep_s));
@@ -98,7 +98,8 @@ void Recording::lay_grid() {
       const bool flies = torso.back().position_m[2] > least_z_m;
       const bool driven =
           std::ranges::none_of(undriven, [&](const auto& span) { return span.first < now_s && from_s < span.second; });
-      // of another delay of motion capture the record may begin later than the grid, which all candidates share, or end before it does
+      // all vehicle hypotheses share the grid; with another delay of motion capture, the record may cover less than the
+      // grid
       const bool recorded = now_s > smoother.begin_s() && from_s < smoother.end_s() &&
                             smoother.covers(std::max(from_s, smoother.begin_s()), at_s);
       valid.push_back(recorded && flies && driven ? 1 : 0);
@@ -106,7 +107,7 @@ void Recording::lay_grid() {
   }
 }
 
-/// Where commands are missing, and until wings have forgotten what they were driven by instead.
+/// Spans without commands. Each lasts until the transient of the unknown voltages has decayed.
 std::vector<std::pair<double, double>> Recording::undriven_s() const {
   const flightlog::Column& t_s = log.command.t_s;
   flightlog::Column intervals_s;
@@ -135,7 +136,7 @@ void Recording::read_voltages() {
     for (double& v : *side) v *= full;
 }
 
-/// The beat's phase as the log has it, or that of the sine that fits the voltages best.
+/// The phase of the beat as logged, or that of the sine that fits the voltages best.
 void Recording::find_phase() {
   const flightlog::CommandStream& c = log.command;
   if (c.phase_rad) {
@@ -167,7 +168,7 @@ void Recording::find_phase() {
       }
     }
   }
-  const bool as_before = beats > 0;  // a clock that is corrected moves the grid by a step
+  const bool as_before = beats > 0;  // corrected clocks may move the grid by a step; the beats have to stay the same
   if (!as_before) first_beat_ = std::floor(beat_at(begin_s));
   phase_offset_ -= first_beat_;
   for (double& b : phase_beats_) b -= first_beat_;
@@ -188,7 +189,7 @@ double Recording::beat_at(double t_s) const {
   return phase_beats_[i - 1] + share * (phase_beats_[i] - phase_beats_[i - 1]);
 }
 
-/// Inputs are read off the voltages, so that every log has them: mean, first harmonic and how the halves differ.
+/// Inputs are computed from the voltages, which every log has: the mean, the first harmonic, and the second harmonic of a split cycle.
 void Recording::read_regimes() {
   struct Sum {
     double n = 0, left = 0, right = 0, left_cos = 0, right_cos = 0, left_sin2 = 0, right_sin2 = 0;
@@ -236,7 +237,7 @@ void Recording::read_regimes() {
     r.amplitude_V = (left + right) / 2;
     r.difference_V = (left - right) / 2;
     r.bias_V = (s.left + s.right) / (2 * s.n);
-    // a split cycle shows as a second harmonic, of opposite sign on the two sides
+    // a split cycle is a second harmonic with opposite signs on the two sides
     r.split_cycle = r.amplitude_V != 0 ? (s.left_sin2 - s.right_sin2) / (s.n * r.amplitude_V) : 0;
   }
 }

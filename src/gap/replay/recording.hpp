@@ -1,5 +1,5 @@
-// A recorded flight, ready to be flown once more by any vehicle: what drove it, where its torso was at every interval of
-// the IMU, and what its sensors said there.
+// A recorded flight, prepared for replay by any vehicle: the motor voltages, the motion of the torso at the bounds of the intervals of the IMU,
+// and the measurements in each interval.
 #pragma once
 
 #include <filesystem>
@@ -13,17 +13,17 @@
 
 namespace flappy::gap {
 
-/// At half of it, and twice the time, flights held out are predicted no better. Of a robot with nothing wrong that flew by finer steps the
-/// parameters make up for the difference, so that it is not called "none".
+/// Time step of replays. Half of it costs twice the time and predicts held-out flights no better. If a robot without any fault was simulated with
+/// finer steps, the fitted parameters absorb the difference, so its verdict is "parameters" rather than "none".
 inline constexpr double kPredictionStep_s = 2e-4;
-/// Of which the hold of a driver is a multiple. Replays have the recorded voltages, whatever held them.
+/// The hold time of a motor driver has to be a multiple of this. Replays use the recorded voltages and hold them for kPredictionStep_s.
 inline constexpr double kHoldStep_s = 1e-4;
-/// Beats until wings that were at rest have forgotten it: after three, thirty times the noise remains.
+/// Beats until the transient of wings that start at rest has decayed: after three beats it is still thirty times the noise.
 inline constexpr double kSpinUpBeats = 6;
-/// Lower than this over its stand a vehicle may still be touching the ground, which no hypothesis knows.
-inline constexpr double kLeastClearance_m = 0.01;
+/// Within this height above its stand, a vehicle may still touch the ground. No hypothesis models that contact.
+inline constexpr double kMinClearance_m = 0.01;
 
-/// Means over a beat of what a flight did.
+/// Inputs and motion of a flight, as means over one beat.
 struct BeatMotion {
   double t_s = 0, amplitude_V = 0, difference_V = 0, bias_V = 0, split_cycle = 0;
   Eigen::Vector3d velocity_B_m_s, rate_rad_s, position_m;
@@ -32,37 +32,37 @@ struct BeatMotion {
 
 struct Recording {
   std::string name;
-  double least_z_m = 0;      ///< lower, the ground may be touched
-  double density_ratio = 1;  ///< of the air that day, over that of the vehicle's file
-  /// Voltage of a full battery over its nominal one: commands are volts of the latter. Below it a battery gives way, which is the
-  /// robot's affair.
+  double least_z_m = 0;      ///< below this height of the torso origin in W, the vehicle may touch the ground
+  double density_ratio = 1;  ///< air density of the flight over that of the vehicle file
+  /// Battery voltage at the start of the flight over its nominal voltage, which commands refer to. Any fall of the voltage during the flight is
+  /// left to the vehicle's model.
   double full = 1;
   flightlog::FlightLog log;
   flightlog::Smoother smoother;
   sim::World world;
 
-  // the grid: intervals of the IMU on whole physics steps
+  // the grid: intervals of the IMU, rounded to whole physics steps
   double begin_s = 0, last_s = 0;
-  std::vector<int> steps;                   ///< of each interval
-  std::vector<double> end_s;                ///< of each interval
-  std::vector<char> valid;                  ///< whether all streams were there, and the ground was not
-  std::vector<TorsoAt> torso;               ///< at every bound: one more than intervals
-  std::vector<Eigen::Vector3d> force_m_s2;  ///< measured, mean over the interval
-  std::vector<double> left_V, right_V;      ///< of every physics step
+  std::vector<int> steps;                   ///< [interval] number of physics steps
+  std::vector<double> end_s;                ///< [interval]
+  std::vector<char> valid;                  ///< [interval] all streams have data, and the ground is not touched
+  std::vector<TorsoAt> torso;               ///< at the bounds of the intervals: one more than intervals
+  std::vector<Eigen::Vector3d> force_m_s2;  ///< [interval] measured specific force, mean over the interval
+  std::vector<double> left_V, right_V;      ///< [physics step]
 
   // the beats
-  std::vector<double> beat;         ///< at the middle of each interval: whole beats since the start, and the phase
-  std::size_t beats = 0;            ///< whole ones
-  std::vector<BeatMotion> regimes;  ///< of each
+  std::vector<double> beat;         ///< [interval] time at its middle, in beats since the start (beat_at)
+  std::size_t beats = 0;            ///< number of whole beats
+  std::vector<BeatMotion> regimes;  ///< [beat]
 
-  /// `nominal`: the vehicle that is believed to have flown. InputError naming `folder` where nothing of it can be replayed.
+  /// `nominal`: the vehicle that is believed to have flown. InputError naming `folder` where no part of the flight can be replayed.
   Recording(const std::filesystem::path& folder, flightlog::FlightLog flight_log, const model::Vehicle& nominal);
-  /// The same flight, from the same beat to the same beat, with another log of it: one whose sensors were corrected.
+  /// The same flight over the same beats, with another log: one in which errors of sensors were corrected.
   Recording(const Recording& other, flightlog::FlightLog flight_log);
 
   double interval_s(std::size_t k) const { return steps[k] * kPredictionStep_s; }
   std::size_t intervals() const { return steps.size(); }
-  /// Whole beats since the start, and the phase, at any time.
+  /// Time in beats since the start of beat 0; its fraction is the phase of the beat.
   double beat_at(double t_s) const;
 
  private:
@@ -72,9 +72,9 @@ struct Recording {
   void read_voltages();
   void find_phase();
   void read_regimes();
-  std::vector<double> phase_t_s_, phase_beats_;  ///< unwrapped, where the log has it
-  double phase_offset_ = 0, phase_hz_ = 0;
-  double first_beat_ = 0;  ///< of the command's, that is beat 0
+  std::vector<double> phase_t_s_, phase_beats_;  ///< unwrapped phase of the commands; empty: not logged
+  double phase_offset_ = 0, phase_hz_ = 0;       ///< fitted to the voltages where no phase is logged
+  double first_beat_ = 0;                        ///< number, counted by the command's phase, of the beat that is beat 0
 };
 
 }  // namespace flappy::gap

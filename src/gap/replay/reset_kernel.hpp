@@ -1,42 +1,43 @@
-// One interval of the IMU for a block of vehicles that all fly one recorded motion: compiled once for each instruction
-// set, as the step is.
+// The reset at the end of an interval of the IMU, for a block of vehicles that replay one recorded motion. Compiled once for each instruction
+// set, like the step of the simulation.
 #pragma once
 
 #include "sim/block.hpp"
 
 namespace flappy::gap {
 
-/// What candidates fly in: rounding is far below any sensor's noise, and a block holds twice as many as in double.
+/// Precision of replays: rounding errors are far below the noise of any sensor, and a block holds twice as many vehicles as in double.
 using Flown = float;
-/// Vehicles that a flight is predicted by at once: the lanes of a block.
+/// Number of vehicle hypotheses that are replayed at once: the lanes of a block.
 inline constexpr std::size_t kVehicles = sim::kLanes<Flown>;
 
-/// The torso origin where an interval begins or ends; body to world, velocity in W.
+/// Recorded motion of the torso origin at a bound of an interval: position and velocity in W, attitude body to world, body rate in B.
 struct TorsoAt {
   double position_m[3] = {0, 0, 0}, attitude[4] = {1, 0, 0, 0}, velocity_m_s[3] = {0, 0, 0},
          body_rate_rad_s[3] = {0, 0, 0};
 };
 
-/// What a vehicle's sensors would have shown over an interval, as rows of lanes.
+/// Rows of lanes: what the sensors of each vehicle would have measured over an interval.
 enum ResetRow : int {
-  kTurning = 0,  ///< mean change of rate over the interval, flown less recorded, rad/s^2, B: 3 rows
-  kForce = 3,    ///< mean specific force at the IMU, m/s^2, B as half-way: 3 rows
-  kStroke = 6,   ///< at the end, left and right
+  kTurning = 0,  ///< mean angular acceleration over the interval, simulated less recorded, rad/s^2, B: 3 rows
+  kForce = 3,    ///< mean specific force at the IMU, m/s^2, in B half-way through the interval: 3 rows
+  kStroke = 6,   ///< stroke angle at the end of the interval, rad: left, right
   kResetRows = 8
 };
 
-/// What a block keeps from one interval to the next.
+/// State that a block keeps from one interval to the next, and the rows of the last interval.
 struct ResetBlockState {
-  alignas(64) Flown imu_velocity_m_s[3][kVehicles];  ///< in W, where the interval began
+  alignas(64) Flown imu_velocity_m_s[3][kVehicles];  ///< velocity of the IMU at the start of the interval, in W
   alignas(64) Flown rows[kResetRows][kVehicles];
 };
 
-/// Reads what the interval from `from` to `to` gave and puts every torso back onto the record at `to`, wings kept; with
-/// `from` null it only puts. The body rate becomes what makes the flown turn the recorded one.
+/// Computes the rows of the interval from `from` to `to`, then resets every torso to the recorded motion at `to`; the wings keep their state.
+/// The body rate is not set to the recorded one: it is changed by the mean rate that the simulated rotation lacked. `from` null: the
+/// start of a flight; no rows, and the body rate is the recorded one.
 using ResetBlock = void (*)(sim::Block<Flown>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
                             const double imu_position_m[3], double gravity_m_s2, ResetBlockState& kept);
 
-/// Adds a sample of `width` signals of all lanes to the rows of a beat, each of `weights` times: rows [weight][signal][lane].
+/// Adds a sample, [signal][lane] with `width` signals, times each of `count` weights to the rows of a beat, [weight][signal][lane].
 using ProjectBlock = void (*)(const Flown* sample, const double* weights, int count, std::size_t width, Flown* rows);
 
 }  // namespace flappy::gap

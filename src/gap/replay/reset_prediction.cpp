@@ -15,27 +15,28 @@ FLAPPY_KERNELS(ProjectBlock, project_block_kernel);
 
 namespace {
 
-/// Channels of which a vehicle predicts a sample at every interval, and those of the meter.
+/// Number of channels that are predicted at every interval of the IMU, and of those that the power meter samples.
 constexpr std::size_t kSignals = kBattery, kMetered = sim::kMeterRows;
 static_assert(kPathX == kSignals + kMetered);
 static_assert(kTorqueX == int{kTurning} && kForceX == int{kForce} && kStrokeLeft == int{kStroke} &&
               kSignals == kResetRows);
 
-/// Steps by which rounding may put an instant off.
+/// Rounding error of a time, in steps.
 constexpr double kSameStep = 1e-3;
-/// What two good streams may disagree by for reasons that no entry knows, times the share that models get wrong.
+/// Signals of the path and turn channels. Times the shares of the model discrepancy, they give how much motion capture and the IMU may disagree
+/// for reasons that no effect describes.
 constexpr double kStreamSignal_m_s2 = 1, kStreamSignal_rad_s = 1;
 
-/// Of a second difference of positions over three beats, on the accelerations of the beats around.
+/// Weights that a second difference of positions over three beats gives to the accelerations of the beats around.
 constexpr std::size_t kHalfKernel = 2;
 constexpr double kKernel[] = {1.0 / 9, 2.0 / 9, 3.0 / 9, 2.0 / 9, 1.0 / 9};
 
-/// Voltages of steps, some steps later.
+/// Voltages delayed by a number of steps, linearly interpolated between steps.
 class ShiftedVoltage {
  public:
   explicit ShiftedVoltage(double steps)
       : whole_(static_cast<std::ptrdiff_t>(std::floor(steps))), share_(steps - std::floor(steps)) {}
-  /// Of `count` steps from `step` on, one for every `stride`.
+  /// Writes the delayed voltages of `count` steps from `step` on to every `stride`-th element of `to`.
   void put(const std::vector<double>& voltage_V, std::size_t step, int count, std::size_t stride, Flown* to) const {
     const auto size = static_cast<std::ptrdiff_t>(voltage_V.size()), first = static_cast<std::ptrdiff_t>(step) - whole_;
     const bool inside = first >= 1 && first + count <= size;
@@ -88,14 +89,14 @@ ResetPrediction::ResetPrediction(Recording recording) : recording_(std::move(rec
   compare_streams();
 }
 
-/// The samples of power.csv on the grid. A sample and a new voltage may share an instant, and the sample is of the new one:
-/// so it is taken from the first step that begins then or later, and the next.
+/// Places the samples of power.csv on the grid. Where a sample and a new voltage have the same time, the sample shows the new voltage. So it is
+/// predicted from the first step that does not begin before it and from the step after that, never from the step before.
 void ResetPrediction::lay_power(std::size_t first_beat) {
   const Recording& r = recording_;
   if (!r.log.power) return;
   std::vector<double> beat;
   std::vector<char> valid;
-  std::size_t step = 0, k = 0;  // the interval, and where it begins
+  std::size_t step = 0, k = 0;  // first step of interval k
   for (std::size_t i = 0; i < r.log.power->t_s.size(); ++i) {
     const double t_s = r.log.power->t_s[i] - r.log.header.power->latency_s;
     const double begins = (t_s - r.begin_s) / kPredictionStep_s, at = std::ceil(begins - kSameStep);
@@ -114,7 +115,7 @@ void ResetPrediction::lay_power(std::size_t first_beat) {
 
 namespace {
 
-/// Of signals side by side, [beat][coefficient][width], those of one lane of `stride`.
+/// Copies the rows of one lane of `together`, [beat][coefficient][signal][stride], to the channels from `first_channel` on.
 template <class Value>
 void put_channels(const std::vector<Value>& together, std::size_t beats, std::size_t signals, std::size_t stride,
                   std::size_t lane, std::size_t first_channel, Rows& rows) {
@@ -150,7 +151,7 @@ void ResetPrediction::compare_streams() {
                                : Eigen::Matrix3d::Identity());
   }
   smooth_forces(measured_, path_m_s2_);
-  // the size of what moved, for that of what models get wrong of it: as the torso's forces and rates
+  // constant signals, which scale the model discrepancy of these channels
   for (std::size_t j = 0; j < recording_.beats; ++j)
     for (std::size_t i = 0; i < 3; ++i) {
       signal_[j * kRowsPerBeat + (kPathX + i) * kCoefficients] = kStreamSignal_m_s2;
@@ -158,7 +159,8 @@ void ResetPrediction::compare_streams() {
     }
 }
 
-/// Mean forces as a second difference of positions has them, in W and back in B; and what motion capture adds to them.
+/// Weighs the mean forces of the beats around like a second difference of positions, in W, and expresses the result in B. `more_m_s2`: added in W,
+/// [axis][beat]; for measured forces, what motion capture says beyond the IMU.
 void ResetPrediction::smooth_forces(Rows& rows, const Eigen::Matrix3Xd& more_m_s2) const {
   const auto row = [&](std::size_t j, std::size_t i) { return j * kRowsPerBeat + (kForceX + i) * kCoefficients; };
   std::vector<Eigen::Vector3d> force(recording_.beats);
@@ -177,7 +179,7 @@ void ResetPrediction::weigh(Rows& rows) const {
   smooth_forces(rows, Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(recording_.beats)));
 }
 
-/// Of samples [interval][channel].
+/// `samples`: [interval][channel].
 Rows ResetPrediction::rows_of(const std::vector<double>& samples) const {
   Rows together(recording_.beats * kCoefficients * kSignals, 0), rows(recording_.beats * kRowsPerBeat, 0);
   imu_.project(samples.data(), kSignals, together.data());
@@ -185,7 +187,7 @@ Rows ResetPrediction::rows_of(const std::vector<double>& samples) const {
   return rows;
 }
 
-/// Of samples [sample][battery, left, right].
+/// Writes the rows of the battery and current channels. `samples`: [sample][battery, left, right].
 void ResetPrediction::put_power(const std::vector<double>& samples, Rows& rows) const {
   Rows together(recording_.beats * kCoefficients * kMetered, 0);
   power_.project(samples.data(), kMetered, together.data());
@@ -201,7 +203,7 @@ Rows ResetPrediction::declared_noise(std::uint64_t seed) const {
   for (std::size_t k = 0; k < recording_.intervals(); ++k) {
     double* s = &samples[k * kSignals];
     for (int i = 0; i < 3; ++i) {
-      // the reset rate holds the noise of the sample before
+      // the simulation was reset to a rate that has the noise of the sample before
       const double rate = h.imu.gyro_noise_rad_s * normal(random);
       s[kTorqueX + i] = (rate - before[i]) / recording_.interval_s(k);
       before[i] = rate;
@@ -263,7 +265,7 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const VehicleHypoth
   std::vector<Flown> voltages_V(static_cast<std::size_t>(longest) * 2 * kVehicles);
   constexpr std::size_t kSample = kSignals * kVehicles;
   std::vector<Flown> samples(r.intervals() * kSample);
-  // of the last step before an interval, and its own
+  // readings of the last step before an interval, then of each step of the interval
   constexpr std::size_t kMeter = kMetered * kVehicles;
   std::vector<Flown> meter(r.log.power ? (static_cast<std::size_t>(longest) + 1) * kMeter : 0);
   std::vector<double> power;
@@ -321,7 +323,7 @@ namespace {
 using R = const Recording&;
 using S = const BeatMotion&;
 
-/// How far what is near a surface reaches: a wing's length.
+/// Distance over which the influence of a surface decays: about the length of a wing.
 constexpr double kReach_m = 0.07;
 
 double near_wall(R r, S s) {
@@ -332,7 +334,7 @@ double near_wall(R r, S s) {
   return near;
 }
 
-/// Of the beat, or of what is nearest.
+/// Mean over the beat, or the nearest sample where the beat has none.
 double battery_V(R r, S s) {
   const flightlog::PowerStream& p = *r.log.power;
   const double late_s = r.log.header.power->latency_s, half_s = 0.5 / r.log.header.flapping_Hz;

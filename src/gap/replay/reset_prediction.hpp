@@ -1,10 +1,10 @@
-// Predictions with resets, as in multiple shooting (Bock, Plitt 1984): what the sensors of many vehicles would have shown, had
-// they flown a recorded flight. The voltages are the recorded ones, and the torso is reset to the recorded motion at every
-// interval of the IMU; wings and motors are the vehicle's own. So every interval tests the forces and torques of that moment
-// alone, and a whole flight costs its own length once. A vehicle's numbers depend on no other's.
+// Reset predictions, as in multiple shooting (Bock, Plitt 1984): what the sensors of many vehicles would have measured in a recorded flight. The
+// recorded voltages drive each vehicle, and its torso is reset to the recorded motion at every interval of the IMU; wings and motors keep their
+// own state. So each interval tests only the forces and torques of that moment, errors do not accumulate, and a flight is simulated once over
+// its length. The prediction of a vehicle does not depend on the other vehicles of its batch.
 //
-// The mean force of a beat is that of motion capture: an accelerometer folds what shakes faster than it samples into it, and a second
-// difference of positions over three beats, which weighs the beats in between as 1 2 3 2 1, does not. A prediction is weighed alike.
+// The measured mean force of a beat is that of motion capture: an accelerometer aliases vibration above its sampling rate into the mean, and a
+// second difference of positions over three beats, which weighs the beats around as 1 2 3 2 1, does not. Predicted forces are weighed likewise.
 #pragma once
 
 #include <deque>
@@ -35,12 +35,12 @@ class ResetPrediction final : public PredictedFlight {
   const DiagnosisPolicy& policy() const override { return kWingPolicy; }
   const Recording* recording() const override { return &recording_; }
   std::shared_ptr<const PredictedFlight> with_log(flightlog::FlightLog log) const override;
-  /// The last kMaxCorrected of them are kept.
+  /// The last kMaxCorrected results are cached.
   std::shared_ptr<const PredictedFlight> corrected(const EffectValues& sensors) const override;
   static constexpr std::size_t kMaxCorrected = 8;
 
  private:
-  /// One number of each beat.
+  /// value(recording, regime) of each beat.
   template <class Value>
   std::vector<double> each(const Value& value) const;
   Rows rows_of(const std::vector<double>& samples) const;
@@ -53,12 +53,13 @@ class ResetPrediction final : public PredictedFlight {
   Recording recording_;
 
   BeatProjection imu_, wings_, power_;
-  std::vector<char> compared_, smoothed_;  ///< beats
-  Eigen::Matrix3Xd path_m_s2_;             ///< of each beat, W
-  std::vector<Eigen::Matrix3d> attitude_;  ///< of each beat
+  std::vector<char> compared_, smoothed_;  ///< [beat] has path and turn rows; has mean forces of motion capture
+  Eigen::Matrix3Xd path_m_s2_;             ///< [axis][beat] rows of the path channels, W
+  std::vector<Eigen::Matrix3d> attitude_;  ///< [beat] B to W
   bool has_wings_ = false;
-  std::vector<std::size_t> power_sample_, power_step_;  ///< of power.csv on the grid; the step that begins with it
-  std::vector<double> power_late_;                      ///< or so many steps later
+  // for each sample of power.csv on the grid: its index, the first step that does not begin before it, and how many steps later that step begins
+  std::vector<std::size_t> power_sample_, power_step_;
+  std::vector<double> power_late_;
   Rows measured_, signal_;
   mutable std::mutex mutex_;
   mutable std::deque<std::pair<EffectValues, std::shared_ptr<const PredictedFlight>>> corrected_;

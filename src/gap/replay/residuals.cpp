@@ -24,7 +24,7 @@ std::vector<Residuals> predict_all(const Flights& flights, const std::vector<con
   return result;
 }
 
-/// Errors of sensors that are undone in the log. A beat-averaged vehicle has its sensors in its prediction.
+/// Errors of sensors that are undone in the log. A beat-averaged vehicle predicts with its effects of sensors, so these are not undone.
 EffectValues sensors_of(const VehicleHypothesis& h) {
   EffectValues sensors = h.vehicle.beat_averaged ? EffectValues() : sensor_effects(h.vehicle.effects);
   sensors.insert(h.sensors.begin(), h.sensors.end());
@@ -34,7 +34,7 @@ EffectValues sensors_of(const VehicleHypothesis& h) {
 }  // namespace
 
 std::vector<Residuals> residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads) {
-  // vehicles whose sensors agree share a log
+  // vehicles with the same errors of sensors share a corrected log
   std::map<EffectValues, std::vector<std::size_t>> by_sensors;
   for (std::size_t i = 0; i < vehicles.size(); ++i) by_sensors[sensors_of(vehicles[i])].push_back(i);
   std::vector<Residuals> list(vehicles.size());
@@ -55,7 +55,7 @@ std::vector<Residuals> residuals(const Flights& flights, const std::vector<Vehic
     if (sensors.empty()) compare(flights, which, threads);
     else corrected.emplace_back(sensors, which);
   }
-  // few logs leave threads to their flights
+  // if there are fewer corrected logs than threads, each log gets several threads for its flights
   const int at_once =
       std::max(1, io::thread_count(threads) / static_cast<int>(std::max<std::size_t>(1, corrected.size())));
   io::parallel_for(corrected.size(), threads, [&](std::size_t k) {

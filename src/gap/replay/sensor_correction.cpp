@@ -18,7 +18,7 @@ Vector3d vector(const Values& v, const char* x, const char* y, const char* z) {
   return {v.at(x), v.at(y), z ? v.at(z) : 0};
 }
 
-/// The columns of a vector in a stream.
+/// The three columns of a stream that hold a vector.
 struct Columns {
   flightlog::Column &x, &y, &z;
   Vector3d at(std::size_t i) const { return {x[i], y[i], z[i]}; }
@@ -61,7 +61,7 @@ void undo_rectification(const Values& v, double flapping_Hz, flightlog::ImuStrea
     sum[i + 1] = sum[i] + f;
     squares[i + 1] = squares[i] + f.cwiseProduct(f);
   }
-  // about a beat's worth of samples around each
+  // mean and mean square over one beat around each sample
   const double rate_hz = static_cast<double>(n - 1) / (imu.t_s.back() - imu.t_s.front());
   const auto half = static_cast<std::size_t>(std::max(1L, std::lround(rate_hz / flapping_Hz / 2)));
   for (std::size_t i = 0; i < n; ++i) {
@@ -106,7 +106,7 @@ flightlog::FlightLog without(const EffectValues& effects, flightlog::FlightLog l
     const auto at = effects.find(id);
     return at == effects.end() ? nullptr : &at->second;
   };
-  // the last of what a sensor did is undone first
+  // errors are undone in reverse of the order in which the sensor makes them
   if (const Values* v = given("imu_clock")) undo_clock(*v, log.imu.t_s);
   if (const Values* v = given("mocap_clock")) undo_clock(*v, log.mocap.t_s);
   if (const Values* v = given("power_clock"); v && log.power) undo_clock(*v, log.power->t_s);

@@ -1,20 +1,21 @@
-// Effects of sensors, taken back: what a log would have said, had they not been there. The vehicle's own effects are flown;
-// these are undone, so that one prediction serves all of them.
+// Undoes effects of sensors in a log: the result is the log that sensors without these effects would have written. Effects of the vehicle are
+// simulated instead. Undoing those of the sensors lets one simulation serve all of them.
 //
-//   gyro_bias                   gyro - drift (1 - exp(-t / warm_up)), t since the log began, less its mean
-//   accelerometer_misalignment  force turned back by a small rotation vector
-//   vibration_rectification     force - gain (mean square about the mean over a beat), on every axis
-//   mocap_tilt                  world turned back about x and y
-//   marker_offset               seen point - R offset
-//   mocap_delay                 poses earlier by what the header does not say
+//   gyro_bias                   gyro - drift (1 - exp(-t / warm_up)), t since the log began; the mean of the drift over the log is kept
+//   accelerometer_misalignment  specific force rotated back by a small rotation vector
+//   vibration_rectification     specific force - gain (mean square about the mean over a beat), on every axis
+//   mocap_tilt                  poses rotated back about x and y of W
+//   marker_offset               measured point - R offset
+//   mocap_delay                 poses earlier by the delay that the header does not declare
 //
-// So are departures of laboratories from their headers, which no catalogue has, for they are small and everywhere:
+// The following errors of declared sensors are undone likewise. They are no effects of the catalogue, for every laboratory has them and they are
+// small:
 //
-//   imu_mounting                gyro and force turned back by a small rotation vector
-//   imu_place                   the IMU sits elsewhere in B
-//   power_delay                 currents earlier by what the header does not say
-//   imu_clock, mocap_clock,     instants about the middle of the log, by a clock that runs so much too fast: a crystal's 50 ppm are 3 %
-//     power_clock                 of the fourth harmonic's period at either end of 10 s
+//   imu_mounting                gyro and specific force rotated back by a small rotation vector
+//   imu_place                   position of the IMU in B corrected
+//   power_delay                 samples of power.csv earlier by the delay that the header does not declare
+//   imu_clock, mocap_clock,     times scaled about the middle of the log, for a clock that runs fast by `rate`: at either end of 10 s, the
+//     power_clock                 50 ppm of a crystal are 3 % of the period of the fourth harmonic
 #pragma once
 
 #include <map>
@@ -24,11 +25,12 @@
 
 namespace flappy::gap {
 
+/// Parameter values by [effect or error of a sensor][parameter].
 using EffectValues = std::map<std::string, std::map<std::string, double>>;
 /// The effects of sensors among `effects`.
 EffectValues sensor_effects(const EffectValues& effects);
 
-/// `log` without the given effects of sensors; others are ignored.
+/// `log` with the given effects and errors of sensors undone; other effects are ignored.
 flightlog::FlightLog without(const EffectValues& effects, flightlog::FlightLog log);
 
 }  // namespace flappy::gap

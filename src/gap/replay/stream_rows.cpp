@@ -15,15 +15,15 @@ using Eigen::Vector3d;
 
 constexpr std::size_t kSpan = 3;
 
-/// Where the IMU alone says the torso is, at the bounds of its intervals.
+/// Motion of the torso by dead reckoning of the IMU, at the bounds of its intervals.
 struct Reckoned {
   std::vector<double> t_s;
   std::vector<Vector3d> position_m, velocity_m_s;
   std::vector<Quaterniond> attitude;
 };
 
-/// `force`, `turn`: of each interval of the recording, as measured or of noise alone. Forces are turned into W by the
-/// smoothed attitude, which is better than the reckoned one.
+/// `force`: specific force, B; `turn`: rotation vector, B; both [interval]. Forces are rotated into W by the smoothed attitude, which is more
+/// accurate than the reckoned one.
 Reckoned reckon(const Recording& r, const std::vector<Vector3d>& force, const std::vector<Vector3d>& turn,
                 double gravity) {
   Reckoned x;
@@ -46,7 +46,7 @@ Reckoned reckon(const Recording& r, const std::vector<Vector3d>& force, const st
   return x;
 }
 
-/// Differences of beat means.
+/// Rows from the beat means of `samples`, [pose][6]: difference of the path, rotation of the attitude; both in W.
 std::vector<StreamRow> differences(const Recording& r, const std::vector<double>& pose_s,
                                    const std::vector<double>& samples) {
   std::vector<double> beat;
@@ -68,7 +68,7 @@ std::vector<StreamRow> differences(const Recording& r, const std::vector<double>
     StreamRow& row = list[j];
     row.valid = true;
     row.path_m_s2 = (mean(j + kSpan, 0) - 2 * mean(j, 0) + mean(j - kSpan, 0)) / (span_s * span_s);
-    // in W, for there what has drifted apart stays as it is while the body turns
+    // in W, where an accumulated drift stays constant while the body turns
     row.turn_rad_s = r.smoother.at(r.regimes[j].t_s).attitude.conjugate() *
                      Vector3d((mean(j + kSpan, 3) - mean(j - kSpan, 3)) / (2 * span_s));
     sum += row.turn_rad_s;
@@ -113,7 +113,7 @@ std::vector<StreamRow> stream_noise(const Recording& r, std::uint64_t seed, bool
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
   const auto noise = [&](double sd) { return Vector3d(sd * normal(random), sd * normal(random), sd * normal(random)); };
-  // errors of path and angle that dead reckoning would make
+  // errors of path and angle by dead reckoning with noise alone
   std::vector<double> t_s = {r.begin_s};
   std::vector<Vector3d> path = {Vector3d::Zero()}, angle = {Vector3d::Zero()};
   Vector3d velocity = Vector3d::Zero();

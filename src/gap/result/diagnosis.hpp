@@ -12,9 +12,9 @@ namespace flappy::gap {
 
 /// A number with its 90 % interval, in SI units.
 struct Estimate {
-  std::string name;  ///< as "wind.speed_m_s", "imu_mounting.x_rad"
+  std::string name;  ///< for example "wind.speed_m_s", "imu_mounting.x_rad"
   double value = 0, low = 0, high = 0;
-  std::string unit;  ///< as "kg/m"; "" where it has none
+  std::string unit;  ///< for example "kg/m"; "": dimensionless
 };
 
 /// Share of the closable gap that a hypothesis closes (gap/localise/closure.hpp).
@@ -22,19 +22,19 @@ struct Closure {
   double value = 0, low = 0, high = 0;
 };
 
-/// none: the vehicle file explains the flights. parameters: it does with other parameters. effect: one effect or several of the catalogue
-/// are missing in it. unknown: something is missing that the catalogue does not have.
+/// none: the vehicle file explains the flights. parameters: the file explains them with other parameters. effect: one or several effects of the
+/// catalogue are missing in the file. unknown: something is missing that is not in the catalogue.
 enum class HypothesisKind { none, parameters, effect, unknown };
 
 /// One of the hypotheses that exclude each other; their probabilities add up to 1.
 struct RankedHypothesis {
   HypothesisKind kind = HypothesisKind::effect;
   std::vector<std::string> effects;
-  std::string group;       ///< groups of the effects, joined by +; of another kind its name
-  bool remainder = false;  ///< the effects and something unknown
+  std::string group;       ///< groups of the effects, joined by +; for another kind, its name
+  bool remainder = false;  ///< something unknown is missing in addition to the effects
   double probability = 0, log_evidence = 0, log_prior = 0;
-  std::vector<Estimate> parameters;  ///< of the effects: magnitudes, then shape parameters
-  std::optional<double> loss;        ///< mean loss in flights held out; none: it was not fitted
+  std::vector<Estimate> parameters;  ///< magnitudes, then shape parameters, of the effects
+  std::optional<double> loss;        ///< mean loss in held-out flights; none: it was not fitted by simulation
   double loss_gain_sd = 0;           ///< standard deviation of its gain over the loss of the parameters alone
   std::optional<Closure> closure;
 };
@@ -44,24 +44,24 @@ enum class VerdictKind { effect, group, parameters, none, unknown, data };
 
 struct Verdict {
   VerdictKind kind = VerdictKind::unknown;
-  std::vector<std::string> effects;  ///< of a group: those of its hypotheses that hold a twentieth of it or more
-  bool remainder = false;            ///< something unknown is missing beside the effects
-  double probability = 0;            ///< of a group: of all its hypotheses
+  std::vector<std::string> effects;  ///< for a group: effects of its hypotheses (naming.member_of_pool of verdict.toml)
+  bool remainder = false;            ///< something unknown is missing in addition to the effects
+  double probability = 0;            ///< for a group: the sum over all its hypotheses
 };
 
-/// The vehicle file; its parameters fitted; the most probable effects fitted as well.
+/// Stages of the residuals: the vehicle file as it is; its parameters fitted; the most probable effects fitted as well.
 enum class Stage { nominal, refit, effect };
 
-/// What a row of the table of residuals tests (gap/localise/where.hpp).
+/// Tests of residuals (gap/localise/where.hpp).
 enum class ResidualTest { channel, regime, phase, frequency, input, whiteness };
 
 /// Part of the beats or of the rows that a residual belongs to.
 struct Regime {
   enum class Third { all, low, middle, high };
-  std::string quantity;  ///< as "height", "frequency", "harmonic", or an input
+  std::string quantity;  ///< for example "height", "frequency", "harmonic", or the name of an input
   Third third = Third::all;
-  std::optional<double> low, high;  ///< bounds of the quantity; of an outer third one of them
-  std::string unit;                 ///< of the bounds
+  std::optional<double> low, high;  ///< bounds of the quantity; an outer third has only one
+  std::string unit;                 ///< unit of the bounds
 };
 
 /// A residual and that of noise alone, as root mean squares in the channel's unit.
@@ -71,22 +71,22 @@ struct ResidualLocation {
   std::string channel, unit;
   Regime regime;
   double gap = 0, noise_floor = 0;
-  double p_value = 1;       ///< that noise alone makes the residual
-  bool discovered = false;  ///< among all tests of its stage at most 5 % of these are false
+  double p_value = 1;       ///< p value of the null hypothesis that the residual is noise alone
+  bool discovered = false;  ///< significant; at most 5 % of the discoveries of a stage are false
 };
 
 /// A part of the residual that no effect explains.
 struct UnexplainedTerm {
   std::string channel;
-  int harmonic = 0;      ///< of the beat; 0: its mean
-  std::string function;  ///< of the regime, which the residual is proportional to
+  int harmonic = 0;      ///< harmonic of the beat; 0: its mean
+  std::string function;  ///< function of the regime to which the residual is proportional
   std::string
       regime;  ///< quantity that the function depends on: always, amplitude, velocity, height, heading, time, ...
-  double times_usual = 0;  ///< how many times larger it is than model discrepancy is as a rule
-  double gain_nats = 0;    ///< evidence that it brings
+  double times_prior_scale = 0;  ///< scale of the block over that of the robot; for other_law, the law factor
+  double gain_nats = 0;          ///< gain of evidence
 };
 
-/// A recorded flight beside both vehicles flown along the same path in simulation; NaN where a vehicle was lost.
+/// A quantity of a recorded flight, and its prediction by both vehicles along the same path in simulation; NaN if a vehicle was lost.
 struct ClosedLoop {
   std::string flight, quantity;
   double recorded = 0, nominal = 0, corrected = 0;
@@ -98,33 +98,33 @@ struct Course {
   std::vector<double> first, second;
 };
 
-/// The flight that tells the hypotheses apart best (gap/diagnose/next_experiment.hpp).
+/// The proposed flight, which separates the hypotheses best (gap/diagnose/next_experiment.hpp).
 struct NextExperiment {
   std::string manoeuvre;  ///< name of a configuration in configs/gap/experiments
-  /// The most probable hypothesis and the one that the flight tells from it best: effects joined by +, or a kind.
+  /// The most probable hypothesis, and the one that the flight separates from it best: effects joined by +, or a kind.
   std::vector<std::string> separates;
   double expected_nats = 0;  ///< expected evidence between these two
   double information = 0;    ///< expected information on all hypotheses, nats
   double course_step_s = 0;
-  std::vector<Course> courses;  ///< those that differ most first
+  std::vector<Course> courses;  ///< the largest difference first
 };
 
-/// Residual of one channel in flights held out, as root mean square.
+/// Residual of one channel in held-out flights, as root mean square.
 struct HeldOutError {
   std::string channel;
-  double rms = 0, low = 0, high = 0;  ///< interval of resampled blocks of beats
+  double rms = 0, low = 0, high = 0;  ///< 90 % interval by resampling blocks of beats
   double by_type = 0;                 ///< rms where all flights of a type are held out together
 };
 
-/// Controls of a diagnosis of a beat-averaged vehicle, in flights held out.
+/// Controls of a diagnosis of a beat-averaged vehicle, in held-out flights.
 struct Validation {
-  /// The vehicle file, its parameters fitted, then one effect more on each rung.
+  /// The vehicle file, then the file with its parameters fitted, then one effect more on each rung.
   struct Rung {
     std::string added;
     std::vector<HeldOutError> errors;
   };
   std::vector<Rung> ladder;
-  /// The contribution of an effect, and copies of it shifted in time, which should gain nothing.
+  /// Gain by the contribution of an effect, and by copies of it that are shifted in time, which should gain nothing.
   struct Control {
     std::string effect, channel;  ///< the channel in which the effect gains most
     double gain = 0;              ///< share of the rms that the effect removes
@@ -135,32 +135,32 @@ struct Validation {
   struct Agreement {
     std::string name;
     std::vector<double> value, sd;  ///< [flight]
-    double p_value = 1;             ///< that all flights have the same magnitude; NaN where one says nothing of it
+    double p_value = 1;             ///< p value of the null hypothesis that all flights have the same magnitude
   };
   std::vector<Agreement> agreements;
 };
 
 struct Diagnosis {
   std::vector<std::string> flights;          ///< folders of the logs
-  std::vector<flightlog::DataFault> faults;  ///< any: nothing was diagnosed
-  bool complete = true;                      ///< false: it was stopped before every effect was weighed
+  std::vector<flightlog::DataFault> faults;  ///< if not empty, nothing was diagnosed
+  bool complete = true;                      ///< false: stopped before every effect was weighed
   Verdict verdict;
-  std::vector<RankedHypothesis> hypotheses;  ///< those with effects first, each part by falling probability
+  std::vector<RankedHypothesis> hypotheses;  ///< those with effects, then the others; each by falling probability
   std::vector<UnexplainedTerm> unexplained;  ///< the largest gain first
   std::vector<std::string> jointly_with;     ///< effects that are fitted jointly with the unexplained terms
-  std::optional<UnexplainedTerm> other_law;  ///< where a named effect deviates most from the law of the catalogue
-  std::vector<Estimate> background;          ///< magnitudes in the corrected vehicle that are not told from chance
+  std::optional<UnexplainedTerm> other_law;  ///< largest deviation of a named effect from the law of the catalogue
+  std::vector<Estimate> background;          ///< further effects of the corrected vehicle, which may be due to chance
   std::vector<Estimate> sensors;             ///< errors of the declared sensors that the flights show
-  /// Vehicle parameters beside the named effects, in prior standard deviations, the farthest first.
+  /// Fitted parameters of the vehicle, jointly with the named effects, in prior standard deviations; the largest change first.
   std::vector<std::pair<std::string, double>> moved_parameters;
   std::vector<ResidualLocation> locations;
-  std::optional<double> nominal_loss, refit_loss, effect_loss;  ///< mean losses in flights held out
+  std::optional<double> nominal_loss, refit_loss, effect_loss;  ///< mean losses in held-out flights
   double noise_floor = 0;                                       ///< loss of noise alone
-  std::optional<Closure> closure;                               ///< of the most probable hypothesis that was fitted
+  std::optional<Closure> closure;                               ///< closure of the most probable fitted hypothesis
   std::vector<std::string> untestable;                          ///< effects that cannot show in these logs
-  std::optional<Validation> validation;                         ///< of a beat-averaged vehicle
+  std::optional<Validation> validation;                         ///< only for a beat-averaged vehicle
   std::vector<ClosedLoop> closed_loop;
-  std::optional<NextExperiment> next;  ///< none where no two hypotheses are left
+  std::optional<NextExperiment> next;  ///< none if fewer than two hypotheses are probable enough
 };
 
 const char* name_of(HypothesisKind kind);
@@ -168,13 +168,13 @@ const char* name_of(VerdictKind kind);
 const char* name_of(Stage stage);
 const char* name_of(ResidualTest test);
 
-/// As "height below 0.5 m", "harmonic 2 of the beat", "0.5 to 1 Hz".
+/// Text of a regime, for example "height below 0.5 m", "harmonic 2 of the beat", "0.5 to 1 Hz".
 std::string text_of(const Regime& regime, ResidualTest test);
 
-/// Discoveries of a stage that say where, the largest over its noise first; inputs and whiteness are left out.
+/// Discoveries of a stage by channel, regime, phase or frequency, not by input or whiteness; the largest relative to its noise first.
 std::vector<ResidualLocation> largest_discoveries(const Diagnosis& diagnosis, Stage stage, std::size_t most);
 
-/// Unit of a parameter from its name: "kg/m" of line_kg_m, "" where it has none.
+/// Unit of a parameter by the suffix of its name: "kg/m" for line_kg_m; "" if it has none.
 std::string unit_of(const std::string& name);
 
 }  // namespace flappy::gap

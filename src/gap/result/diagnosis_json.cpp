@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Rows of "where": the most remarkable of all locations, for a reader who wants no more.
+/// Most rows of "where", the largest discoveries.
 constexpr std::size_t kMaxWhere = 20;
 constexpr const char* kThirds[] = {"all", "low", "middle", "high"};
 
@@ -71,13 +71,17 @@ std::optional<Closure> closure_of(const Json& json) {
 }
 
 Json to_json(const UnexplainedTerm& t) {
-  return {{"channel", t.channel}, {"harmonic", t.harmonic},       {"function", t.function},
-          {"regime", t.regime},   {"times_usual", t.times_usual}, {"gain_nats", t.gain_nats}};
+  return {{"channel", t.channel},
+          {"harmonic", t.harmonic},
+          {"function", t.function},
+          {"regime", t.regime},
+          {"times_prior_scale", t.times_prior_scale},
+          {"gain_nats", t.gain_nats}};
 }
 
 UnexplainedTerm term_of(const Json& json) {
-  return {json.at("channel"), json.at("harmonic"),    json.at("function"),
-          json.at("regime"),  json.at("times_usual"), json.at("gain_nats")};
+  return {json.at("channel"), json.at("harmonic"),          json.at("function"),
+          json.at("regime"),  json.at("times_prior_scale"), json.at("gain_nats")};
 }
 
 Json to_json(const ResidualLocation& l) {

@@ -12,7 +12,7 @@ inline constexpr int kDiagnosisSchema = 2;
 
 nlohmann::ordered_json to_json(const Diagnosis& diagnosis);
 
-/// `file` stands for the place in errors. io::InputError where it is no diagnosis, or one of another schema.
+/// `file`: named in errors. io::InputError if `json` is not a diagnosis, or has another schema.
 Diagnosis diagnosis_from(const nlohmann::ordered_json& json, const std::filesystem::path& file);
 
 }  // namespace flappy::gap

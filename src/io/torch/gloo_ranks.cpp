@@ -1,4 +1,4 @@
-// Ranks that talk through Gloo, by LibTorch's c10d.
+// Ranks that communicate by Gloo, through LibTorch's c10d. A heartbeat in a key-value store, which rank 0 serves, detects lost ranks.
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -21,11 +21,11 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kMeeting = 60s;        // until all ranks are there
-constexpr auto kExchange = 24h * 30;  // a rank may take as long as it likes, while its heart beats
-constexpr auto kBeat = 500ms;         // of each rank's heart
-constexpr auto kSilence = 15s;        // after which a rank is lost
-constexpr auto kSilenceSuspect = 3s;  //   the same, where an exchange has failed
+constexpr auto kMeeting = 60s;        // longest wait for all ranks to appear
+constexpr auto kExchange = 24h * 30;  // a rank may take this long, as long as its heartbeat goes on
+constexpr auto kBeat = 500ms;         // period of each rank's heartbeat
+constexpr auto kSilence = 15s;        // a rank without heartbeat for this long is lost
+constexpr auto kSilenceSuspect = 3s;  //   after an exchange has failed
 
 c10::intrusive_ptr<c10d::TCPStore> store_of(const Rank& rank, bool serves, std::chrono::milliseconds timeout) {
   c10d::TCPStoreOptions options;
@@ -83,7 +83,7 @@ class GlooRanks : public Ranks {
     try {
       group_->allgather(out, in)->wait();
     } catch (const std::exception& e) {
-      suspicious_ = true;  // the heart finds out who it is
+      suspicious_ = true;  // the heartbeat finds out which rank is lost
       std::this_thread::sleep_for(kSilenceSuspect + 4 * kBeat);
       end("a rank is lost: " + std::string(e.what()).substr(0, std::string(e.what()).find('\n')));
     }
@@ -97,15 +97,15 @@ class GlooRanks : public Ranks {
     try {
       store_->set("left", word_of(rank()));
     } catch (const std::exception&) {
-      return;  // nobody is there to be told
+      return;  // no other rank is left to be told
     }
-    std::this_thread::sleep_for(3 * kBeat);  // as the store may be this process's
+    std::this_thread::sleep_for(3 * kBeat);  // this process may serve the store, which the others still have to read
   }
 
   void finish() override {
     wait();
     stop();
-    wait();  // the store serves until no heart beats any more
+    wait();  // serve the store until no heartbeat of any rank needs it
   }
 
  private:
@@ -117,15 +117,15 @@ class GlooRanks : public Ranks {
       const auto store = store_of(rank_, false, kSilence);
       std::unique_lock lock(mutex_);
       while (!wakes_.wait_for(lock, kBeat, [&] { return stops_; })) {
-        lock.unlock();  // as a store whose process stands still answers nothing, for ever
+        lock.unlock();  // unlock, because calls of the store never return if the process that serves it stands still
         const auto before = Clock::now();
         if (before - beaten_.load() > 4 * kBeat)
-          changed.assign(changed.size(), before);  // this very process stood still
+          changed.assign(changed.size(), before);  // this process itself stood still
         store->add(key(rank()), 1);
         for (int r = 0; r < size(); ++r) {
           const auto k = static_cast<std::size_t>(r);
           const std::int64_t now = store->add(key(r), 0);
-          // one's own silence, as after a stop of the process, is nobody else's
+          // if this call took long, this process or the store stood still, which says nothing about other ranks
           if (now != last[k] || Clock::now() - before > kSilenceSuspect / 2) last[k] = now, changed[k] = Clock::now();
           if (r != rank() &&
               Clock::now() - changed[k] > (suspicious_ ? Clock::duration(kSilenceSuspect) : Clock::duration(kSilence)))
@@ -136,7 +136,7 @@ class GlooRanks : public Ranks {
             const std::vector<std::uint8_t> word = store->get(fate);
             const int who = word.at(0) + 256 * word.at(1);
             if (who == rank()) continue;
-            if (rank() == 0) std::this_thread::sleep_for(3 * kBeat);  // until the others have read it, too
+            if (rank() == 0) std::this_thread::sleep_for(3 * kBeat);  // until the others have read the store
             if (fate == std::string("lost")) lost(who);
             end("rank " + std::to_string(who) + " ended: it says why");
           }
@@ -145,23 +145,23 @@ class GlooRanks : public Ranks {
       }
     } catch (const std::exception&) {
       const std::lock_guard lock(mutex_);
-      if (!stops_) lost(0);  // which serves the store
+      if (!stops_) lost(0);  // rank 0 serves the store
     }
   }
   static std::vector<std::uint8_t> word_of(int rank) {
     return {static_cast<std::uint8_t>(rank & 255), static_cast<std::uint8_t>(rank >> 8)};
   }
-  /// Before this process is lost itself, and rank 0 with the store.
+  /// Tells the others which rank is lost, waits for them to read it (rank 0 serves the store), then ends this process.
   [[noreturn]] void tell(c10d::Store& store, int rank) const {
     store.set("lost", word_of(rank));
     std::this_thread::sleep_for(3 * kBeat);
     lost(rank);
   }
-  /// Whether the heart goes on: it waits for the store that rank 0 serves.
+  /// Ends the process where the heartbeat no longer advances, because it waits for the store that rank 0 serves.
   void watch() {
     std::unique_lock lock(mutex_);
     for (auto woken = Clock::now(); !wakes_.wait_for(lock, kBeat, [&] { return stops_; }); woken = Clock::now()) {
-      if (Clock::now() - woken > 4 * kBeat) beaten_ = Clock::now();  // this very process stood still
+      if (Clock::now() - woken > 4 * kBeat) beaten_ = Clock::now();  // this process itself stood still
       if (Clock::now() - beaten_.load() > (suspicious_ ? Clock::duration(kSilenceSuspect) : Clock::duration(kSilence)))
         lost(0);
     }

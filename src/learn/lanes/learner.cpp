@@ -18,12 +18,12 @@ FLAPPY_KERNELS(UpdateKernel<double>, update_double);
 
 namespace {
 
-/// Gradients are kept in so many parts at most: chunks beyond it share one.
-constexpr std::size_t kMostParts = 16;
-/// Numbers that a thread steps at a time.
+/// Largest number of parts in which gradients are kept; with more chunks, several chunks share a part.
+constexpr std::size_t kMaxParts = 16;
+/// Number of weights that a thread steps at a time.
 constexpr std::ptrdiff_t kShard = 2048;
 
-/// Numbers that begin with a line of the cache.
+/// Array that begins at a cache line.
 template <class T>
 class AlignedArray {
  public:
@@ -49,7 +49,7 @@ NetworkShape network_shape(int inputs, const std::vector<int>& hidden, int outpu
   return {static_cast<int>(widths.size()) - 1, widths.data(), activation, bounded};
 }
 
-/// Calls visit(layer, input or -1 for the bias, output, place of the weight) in the order of an actor's file.
+/// Calls visit(layer, input or -1 for the bias, output, index of the weight) in the order of an actor's file.
 template <class Visit>
 void each_weight(const NetworkShape& net, const Visit& visit) {
   for (int l = 0; l < net.layers; ++l)
@@ -88,11 +88,11 @@ struct Learner<T>::Storage {
   LearnerOptions options;
   const UpdateKernel<T>* kernel;
   UpdatePlan<T> plan;
-  std::ptrdiff_t count;  // weights of all networks
-  std::size_t parts;     // of the gradients
+  std::ptrdiff_t count;  // number of weights of all networks
+  std::size_t parts;     // number of parts of the gradients
   AlignedArray<T> input_numbers, numbers, gradients, work;
-  std::vector<ChunkSums<T>> sums;  // of each chunk
-  std::vector<std::byte> parcels;  // for other ranks
+  std::vector<ChunkSums<T>> sums;  // [chunk]
+  std::vector<std::byte> parcels;  // message to other ranks
   std::ptrdiff_t work_size;
   LearnerCounters counters;
   UpdateMetrics metrics;
@@ -102,7 +102,7 @@ struct Learner<T>::Storage {
         kernel(&sim::kernel_of<T>(update_floats, update_doubles, o.instruction_set)),
         plan(p),
         count(p.weight_count()),
-        parts(std::min(kMostParts, o.batch / kChunk)),
+        parts(std::min(kMaxParts, o.batch / kChunk)),
         input_numbers(2 * static_cast<std::size_t>(p.input.count)),
         numbers(static_cast<std::size_t>(4 * count)),
         gradients(static_cast<std::size_t>(count) * parts),
@@ -149,9 +149,9 @@ struct Learner<T>::Storage {
     return a;
   }
 
-  /// Parts that are worked on here.
+  /// Range of gradient parts that this rank computes.
   std::pair<std::size_t, std::size_t> own_parts() const { return io::own_share(options.ranks, parts); }
-  /// Hands the gradients and sums of all parts to all ranks, in one message.
+  /// Exchanges the gradients and sums of all parts between ranks, in one message.
   void exchange() {
     if (options.ranks == nullptr) return;
     const std::size_t sent = static_cast<std::size_t>(plan.actor_learns ? count : plan.actor_at());
@@ -170,7 +170,7 @@ struct Learner<T>::Storage {
     each([](std::byte* parcel, void* here, std::size_t bytes) { std::memcpy(here, parcel, bytes); });
   }
 
-  /// Gradients of part `part`: of the chunks that share it, one after the other.
+  /// Computes gradient part `part`: the sum over the chunks that share it, in order.
   void work_on(std::size_t part, const Replay& replay, int thread) {
     T* place = work.data() + thread * work_size;
     const std::size_t chunks = sums.size();
@@ -184,7 +184,7 @@ struct Learner<T>::Storage {
     }
   }
 
-  /// A step of Adam for numbers from `at` on, by powers of beta that have counted it already.
+  /// Plan of a step of Adam for the weights from `at` on. The powers of beta already include this step.
   AdamPlan<T> adam(std::ptrdiff_t at, double rate, double beta1_power, double beta2_power) {
     AdamPlan<T> p{};
     p.weights = numbers.data() + at;
@@ -249,7 +249,7 @@ template <class T>
 Learner<T>& Learner<T>::operator=(Learner&&) noexcept = default;
 
 template <class T>
-void Learner<T>::update(const Replay& replay, double actor_rate, double critic_rate, const Companion& beside) {
+void Learner<T>::update(const Replay& replay, double actor_rate, double critic_rate, const ParallelWork& beside) {
   Storage& s = *storage_;
   const TransitionShape &have = replay.shape(), &want = s.options.shape;
   if (replay.size() == 0 || have.observation != want.observation || have.action != want.action)

@@ -2,9 +2,9 @@
 // For a transition (s, a, r, s') with discount d:
 //   a' = clip(mu'(s') + clip(noise, +-noise_clip), +-1)
 //   y  = r + d min_i Q'_i(s', a')
-//   critics descend  mean (Q_i(s, a) - y)^2,  or the mean of its Huber loss
-//   the actor, every policy_delay-th update, ascends  mean Q_1(s, mu(s))  by the critic as it was before this update
-//   Adam (Kingma and Ba 2015); targets move by tau whenever the actor does
+//   critics minimise  mean (Q_i(s, a) - y)^2,  or the mean Huber loss
+//   the actor, in every policy_delay-th update, maximises  mean Q_1(s, mu(s)),  with the critic before this update
+//   Adam (Kingma and Ba 2015); targets move by tau in the updates in which the actor learns
 // DDPG: twin off, policy_delay 1, no noise. The bits are the same for any number of threads and any instruction set.
 #pragma once
 
@@ -28,53 +28,55 @@ struct Normaliser {
 
 struct LearnerOptions {
   TransitionShape shape;
-  std::vector<int> actor_hidden = {32, 32}, critic_hidden = {64, 64};  ///< widths
+  std::vector<int> actor_hidden = {32, 32}, critic_hidden = {64, 64};  ///< widths of hidden layers
   policy::Activation actor_activation = policy::Activation::relu, critic_activation = policy::Activation::relu;
-  Normaliser input;               ///< of the actor and the critics
-  double last_layer_scale = 0.1;  ///< of the first weights of the actor's last layer and the critics'
+  Normaliser input;               ///< normaliser of the observations, for actor and critics
+  double last_layer_scale = 0.1;  ///< scale of the initial weights in the last layers of actor and critics
 
   bool twin = true;
   int policy_delay = 2;
-  double noise_sd = 0.2, noise_clip = 0.5;  ///< of the target's action; sd 0: none
+  double noise_sd = 0.2, noise_clip = 0.5;  ///< noise on the target actor's action; sd 0: none
   double tau = 0.005;
-  double huber =
-      0;  ///< where squares turn into lines (the loss is then e^2 / 2 below, as torch's huber_loss); 0: squares
+  /// Error beyond which the loss is linear; below it, the loss is e^2 / 2, as in torch's huber_loss. 0: the loss is e^2
+  /// everywhere.
+  double huber = 0;
   double beta1 = 0.9, beta2 = 0.999, epsilon = 1e-8;
   std::size_t batch = 256;  ///< a multiple of kChunk
 
   std::uint64_t seed = 0;
   int threads = 1;
-  io::Ranks* ranks = nullptr;   ///< do their shares of every batch; none: all of it is done here
-  std::string instruction_set;  ///< empty: the best one
+  io::Ranks* ranks = nullptr;   ///< each rank does its share of every batch; null: this process does all
+  std::string instruction_set;  ///< empty: the best one of this processor
 
-  // what LibTorch alone does
-  bool layer_norm = false;                     ///< in all networks, before hidden activations
-  double weight_decay = 0, gradient_clip = 0;  ///< AdamW's; largest norm of a gradient (0: none), the critics' together
-  std::string device = "cpu";                  ///< or "cuda"
+  // options of LibTorch only
+  bool layer_norm = false;  ///< layer norm before hidden activations, in all networks
+  /// Weight decay of AdamW; largest norm of a gradient (0: none), where the critics have one joint norm.
+  double weight_decay = 0, gradient_clip = 0;
+  std::string device = "cpu";  ///< or "cuda"
 };
 
-/// std::invalid_argument for options that make no learner.
+/// Throws std::invalid_argument for invalid options.
 void check_options(const LearnerOptions& options);
 
-/// The first weight of this number, output by output, of a layer: uniform within +-scale/sqrt(inputs), as torch's nn.Linear; biases
-/// are 0. `network`: 0 the actor's, then the critics'.
+/// Initial weight of a layer, uniform within +-scale/sqrt(inputs), as in torch's nn.Linear; initial biases are 0.
+/// `number`: index of the weight, output by output. `network`: 0 for the actor, then the critics.
 double first_weight(std::uint64_t seed, int network, int layer, int inputs, std::uint32_t number, double scale);
 
-/// Further work for the threads of an update, behind its own: run(0) to run(items - 1), each once, in any order and at the
-/// same time. run must neither throw nor touch what the update reads.
-struct Companion {
+/// Additional work for the threads of an update: run(0) to run(items - 1), each once, in any order and in parallel.
+/// run() must not throw and must not change anything that the update reads.
+struct ParallelWork {
   std::size_t items = 0;
   std::function<void(std::size_t)> run;
 };
 
-/// Of the last update, summed in a fixed order.
+/// Metrics of the last update, summed in a fixed order.
 struct UpdateMetrics {
-  double critic_loss = 0;  ///< mean over critics and batch; not finite when something is broken
-  double mean_q = 0;       ///< of Q_1(s, a)
-  double actor_q = 0;      ///< of Q_1(s, mu(s)), when the actor last learnt
+  double critic_loss = 0;  ///< mean over critics and batch; not finite if learning diverged
+  double mean_q = 0;       ///< mean of Q_1(s, a)
+  double actor_q = 0;      ///< mean of Q_1(s, mu(s)) in the last update in which the actor learnt
 };
 
-/// What a learner counts. Powers of beta are running products, so that a resumed run has their very bits.
+/// Counters of a learner. Powers of beta are running products; they are saved, so that a resumed run has the same bits.
 struct LearnerCounters {
   std::uint64_t updates = 0;
   double critic_beta1 = 1, critic_beta2 = 1, actor_beta1 = 1, actor_beta2 = 1;
@@ -83,27 +85,27 @@ struct LearnerCounters {
 template <class T>
 class Learner {
  public:
-  /// std::invalid_argument for options that make no learner, or an instruction set that this processor has not.
+  /// Throws std::invalid_argument for invalid options, or for an instruction set that this processor does not have.
   explicit Learner(const LearnerOptions& options);
   ~Learner();
   Learner(Learner&&) noexcept;
   Learner& operator=(Learner&&) noexcept;
 
-  /// One gradient step, at the given rates of Adam. Allocates nothing. std::invalid_argument where `replay` is empty or has
-  /// another shape.
-  void update(const Replay& replay, double actor_rate, double critic_rate, const Companion& beside = {});
+  /// One gradient step at the given learning rates of Adam; its threads also do the work `beside`. Allocates no memory.
+  /// Throws std::invalid_argument if `replay` is empty or has another shape.
+  void update(const Replay& replay, double actor_rate, double critic_rate, const ParallelWork& beside = {});
 
   const LearnerOptions& options() const;
   const UpdateMetrics& metrics() const;
 
-  /// The actor as it is; task and names of inputs and outputs are left to the caller.
+  /// The present actor, without task and names of inputs and outputs.
   policy::Actor actor() const;
-  /// Starts from this actor instead: weights and target's. std::invalid_argument where its shape is another.
+  /// Replaces the weights of the actor and of its target. Throws std::invalid_argument if the shape is another.
   void set_actor(const policy::Actor& actor);
-  /// Actions of `count` observations, row by row: what flight::evaluate gives, to the bit.
+  /// Actions for `count` observations, [count][observations] to [count][actions]; the same bits as policy::evaluate().
   void act(const float* observations, std::size_t count, T* actions) const;
 
-  /// All that updates change, for checkpoints: weights, targets and Adam's moments of critics and actor; and the counters.
+  /// State for checkpoints, together with the counters: weights, targets and Adam's moments of critics and actor.
   std::span<T> numbers();
   std::span<const T> numbers() const;
   LearnerCounters& counters();

@@ -1,5 +1,5 @@
-// Products of small matrices. Every element is one chain of fused multiply-adds in the order of k, so its bits depend
-// neither on tiles nor on the width of registers. For files that are compiled once for each instruction set.
+// Products of small matrices. Every element is one chain of fused multiply-adds in the order of k, so its bits do not depend on
+// tiles or on the width of registers. For files that are compiled once for each instruction set.
 #pragma once
 
 #include <utility>
@@ -8,7 +8,7 @@
 
 namespace flappy::learn {
 
-/// A matrix that is only read number by number: element (i, k) stands at data[i row + k column].
+/// A matrix that is read element by element: element (i, k) is data[i row + k column].
 template <class T>
 struct Strided {
   const T* data;
@@ -20,7 +20,8 @@ inline namespace FLAPPY_ISA {
 using sim::kWidth;
 using sim::Lanes;
 
-/// What the registers hold: kTile sums of one register each, with room for what they are made of.
+/// Sizes of a tile of C: at most kTile registers of sums, which leave room for the factors, in at most kTileRows rows
+/// of kTileVectors registers.
 #if defined(__AVX512F__)
 inline constexpr int kTile = 24, kTileVectors = 4, kTileRows = 12;
 #elif defined(__AVX2__) && !defined(FLAPPY_SCALAR)
@@ -29,6 +30,7 @@ inline constexpr int kTile = 12, kTileVectors = 2, kTileRows = 6;
 inline constexpr int kTile = 4, kTileVectors = 2, kTileRows = 2;
 #endif
 
+/// multiply() for kRows rows and kVectors registers of columns.
 template <class T, int kRows, int kVectors, bool kAccumulate>
 FLAPPY_INLINE void multiply_tile(int depth, Strided<T> a, const T* b, std::ptrdiff_t b_row, T* c,
                                  std::ptrdiff_t c_row) {
@@ -57,7 +59,7 @@ FLAPPY_INLINE void multiply_tile(int depth, Strided<T> a, const T* b, std::ptrdi
     for (int j = 0; j < kVectors; ++j) sum[i][j].store(c + i * c_row + j * kWidth<T>);
 }
 
-/// The last rows, fewer than a tile has.
+/// multiply() for the last rows, which are fewer than in a tile.
 template <class T, int kRows, int kVectors, bool kAccumulate>
 FLAPPY_INLINE void multiply_rest(int rows, int depth, Strided<T> a, const T* b, std::ptrdiff_t b_row, T* c,
                                  std::ptrdiff_t c_row) {
@@ -67,7 +69,7 @@ FLAPPY_INLINE void multiply_rest(int rows, int depth, Strided<T> a, const T* b, 
   }
 }
 
-/// Columns of C, as many as kVectors registers hold.
+/// multiply() for kVectors registers of columns.
 template <class T, int kVectors, bool kAccumulate>
 void multiply_panel(int rows, int depth, Strided<T> a, const T* b, std::ptrdiff_t b_row, T* c, std::ptrdiff_t c_row) {
   constexpr int kRows = kTile / kVectors < kTileRows ? kTile / kVectors : kTileRows;
@@ -76,7 +78,8 @@ void multiply_panel(int rows, int depth, Strided<T> a, const T* b, std::ptrdiff_
   multiply_rest<T, kRows - 1, kVectors, kAccumulate>(rows, depth, a, b, b_row, c, c_row);
 }
 
-/// C[rows][columns] = sum over k < depth of A(i, k) B[k][j], or added to what C holds. `columns` is a multiple of 16.
+/// C[i][j] = sum over k < depth of A(i, k) B[k][j], for i < rows, j < columns; with kAccumulate added to C. `columns`
+/// is a multiple of 16. `b_row`, `c_row`: lengths of the rows of B and C.
 template <class T, bool kAccumulate = false>
 void multiply(int rows, int columns, int depth, Strided<T> a, const T* b, std::ptrdiff_t b_row, T* c,
               std::ptrdiff_t c_row) {
@@ -91,13 +94,14 @@ void multiply(int rows, int columns, int depth, Strided<T> a, const T* b, std::p
   if (j < columns) multiply_panel<T, 1, kAccumulate>(rows, depth, a, b + j, b_row, c + j, c_row);
 }
 
+/// Interleaves the low or high halves of two registers: x0, y0, x1, y1, ...
 template <bool kHigh, class L, std::size_t... i>
 FLAPPY_INLINE L interleaved(L x, L y, std::index_sequence<i...>) {
   constexpr std::size_t kN = sizeof...(i), kFrom = kHigh ? kN / 2 : 0;
   return L(__builtin_shufflevector(x.raw, y.raw, (i % 2 == 0 ? kFrom + i / 2 : kN + kFrom + i / 2)...));
 }
 
-/// to[j][i] = from[i][j] for N rows and columns: each pass of perfect shuffles moves one bit of i into j.
+/// to[j][i] = from[i][j] for N rows and columns. Each pass of perfect shuffles moves one bit of the index i into j.
 template <class T, int N>
 FLAPPY_INLINE void transpose_tile(const T* from, std::ptrdiff_t from_row, T* to, std::ptrdiff_t to_row) {
   using L = Lanes<T, N>;

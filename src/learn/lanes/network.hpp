@@ -1,6 +1,6 @@
-// Multilayer perceptrons, forward and backward, for kChunk samples at once: a row of numbers for each neuron, a sample in
-// each column. Weights of a layer stand as [1 + inputs][padded outputs], the first row being the bias, so that a layer is
-// one product with rows of which the first is all ones. Padded weights are zero, have no gradient, and stay zero.
+// Multilayer perceptrons, forward and backward, for kChunk samples at once. Values are [neuron][sample]. Weights of a layer are
+// [1 + inputs][padded outputs], the first row is the bias; a layer is one matrix product, because the first row of its inputs
+// is all ones. Padding weights are 0, have no gradient, and stay 0.
 #pragma once
 
 #include "learn/lanes/matrix.hpp"
@@ -11,15 +11,14 @@ namespace flappy::learn {
 
 FLAPPY_INLINE constexpr int padded(int width) { return (width + 15) / 16 * 16; }
 
-/// Widths and activations of a network, and where its numbers stand.
+/// Widths and activations of a network, and offsets of its weights and values.
 struct NetworkShape {
   int layers = 0;
-  int widths[policy::kMaxLayers + 1]{};  // inputs, then outputs of each layer
+  int widths[policy::kMaxLayers + 1]{};  // number of inputs, then number of outputs of each layer
   policy::Activation hidden = policy::Activation::relu;
-  bool bounded = false;                              // the last layer's outputs: tanh, or as they are
-  std::ptrdiff_t weights[policy::kMaxLayers + 1]{};  // where each layer's begin; then their number
-  std::ptrdiff_t
-      values[policy::kMaxLayers + 1]{};  // where the rows of each layer's inputs begin, ones first; then outputs'
+  bool bounded = false;                              // activation of the last layer: tanh, else none
+  std::ptrdiff_t weights[policy::kMaxLayers + 1]{};  // offset of each layer's weights; then their number
+  std::ptrdiff_t values[policy::kMaxLayers + 1]{};   // offset of each layer's inputs, with ones; then of the outputs
 
   NetworkShape() = default;
   NetworkShape(int depth, const int* width, policy::Activation activation, bool is_bounded)
@@ -49,19 +48,19 @@ inline constexpr std::ptrdiff_t kRow = kChunk;
 template <class T>
 using L = Lanes<T, kWidth<T>>;
 
-/// Calls op(lanes of `count` rows, their place) for all of them.
+/// Calls op(offset) for each register of lanes in `count` rows.
 template <class T, class Op>
 FLAPPY_INLINE void for_rows(int count, const Op& op) {
   for (std::ptrdiff_t i = 0; i < count * kRow; i += kWidth<T>) op(i);
 }
 
-/// The rows that layer `l` takes in (of the last layer: gives), without the ones.
+/// The input rows of layer `l`, without the row of ones; for l == net.layers, the output rows of the network.
 template <class T>
 FLAPPY_INLINE T* rows_of(const NetworkShape& net, T* values, int l) {
   return values + net.values[l] + kRow;
 }
 
-/// Rows of ones, which no pass changes.
+/// Writes the rows of ones. No pass changes them, so this is needed only once.
 template <class T>
 FLAPPY_INLINE void put_ones(const NetworkShape& net, T* values) {
   for (int l = 0; l < net.layers; ++l)
@@ -75,7 +74,7 @@ FLAPPY_INLINE void activate_rows(policy::Activation kind, int rows, T* at) {
   else for_rows<T>(rows, [&](std::ptrdiff_t i) { tanh(L<T>::load(at + i)).store(at + i); });
 }
 
-/// From the gradient of the loss by what an activation gives, `out`, to that by what it takes, in place.
+/// Converts, in place, the gradient of the loss by an activation's outputs `out` to that by its inputs.
 template <class T>
 FLAPPY_INLINE void backpropagate(policy::Activation kind, int rows, const T* out, T* gradient) {
   if (kind == policy::Activation::relu)
@@ -89,7 +88,7 @@ FLAPPY_INLINE void backpropagate(policy::Activation kind, int rows, const T* out
     });
 }
 
-/// From the first rows of `values` to the last.
+/// Forward pass: computes all rows of `values` from the inputs of the first layer.
 template <class T>
 void forward(const NetworkShape& net, const T* weights, T* values) {
   for (int l = 0; l < net.layers; ++l) {
@@ -102,14 +101,16 @@ void forward(const NetworkShape& net, const T* weights, T* values) {
   }
 }
 
-/// What the backward pass works in: the loss's gradients by the outputs of two layers, [widest][kChunk], and one transposed.
+/// Work memory of the backward pass: gradients of the loss by the outputs of two layers, [widest][kChunk], and one
+/// transposed.
 template <class T>
 struct ActivationGradients {
   T *now, *next, *transposed;
 };
 
-/// Backpropagation of a sum over samples, given its gradient by the outputs in s.now. The gradient by the weights is written or
-/// added to `gradient` unless that is null; that by `inputs` of the network's inputs from number `first` goes to s.now.
+/// Backward pass for a sum over samples. s.now holds its gradient by the outputs. The gradient by the weights is
+/// written to `gradient`, or added if `accumulate`; null: not computed. At the end s.now holds the gradient by the
+/// network's inputs `first` to `first` + `inputs` - 1.
 template <class T>
 void backward(const NetworkShape& net, const T* weights, const T* values, ActivationGradients<T>& s, T* gradient,
               bool accumulate, int first, int inputs) {

@@ -1,5 +1,5 @@
-// What an update does with one chunk of its batch, and then with the gradients. Compiled once for each instruction set
-// (FLAPPY_ISA); the bits are the same on all of them.
+// Gradients of one chunk of the batch, and the step of Adam. Compiled once for each instruction set (FLAPPY_ISA); all give the same
+// bits.
 #include "learn/lanes/update.hpp"
 
 #include "sim/noise.hpp"
@@ -9,7 +9,7 @@ namespace flappy::learn {
 inline namespace FLAPPY_ISA {
 namespace {
 
-/// Halves are added until one number is left: the same order for any width of register.
+/// Sum of a row by halving: the order of additions is the same for any width of register.
 template <class T>
 FLAPPY_INLINE T folded(T* numbers) {
   for (std::ptrdiff_t half = kRow / 2; half > 0; half /= 2)
@@ -17,7 +17,7 @@ FLAPPY_INLINE T folded(T* numbers) {
   return numbers[0];
 }
 
-/// The chunk's transitions, a row of kChunk for each of their numbers.
+/// Copies the chunk's transitions and transposes them to [column][kChunk].
 template <class T>
 FLAPPY_INLINE void gather(const UpdatePlan<T>& plan, const Workspace<T>& w, const float* memory,
                           const std::uint32_t* rows) {
@@ -33,7 +33,7 @@ FLAPPY_INLINE void gather(const UpdatePlan<T>& plan, const Workspace<T>& w, cons
   transpose(kRow, static_cast<int>(wide), w.gathered, wide, w.columns, kRow);
 }
 
-/// Rows as a network sees them.
+/// Normalises and clips input rows for a network.
 template <class T>
 FLAPPY_INLINE void normalise(const InputView<T>& view, const T* from, T* to) {
   const L<T> clip(view.clip);
@@ -50,7 +50,7 @@ FLAPPY_INLINE void copy_rows(int count, const T* from, T* to) {
   for_rows<T>(count, [&](std::ptrdiff_t i) { L<T>::load(from + i).store(to + i); });
 }
 
-/// The action that the target of the critics is taken at: the target actor's, with clipped noise.
+/// Adds clipped noise to the target actor's actions, and clips the result (target policy smoothing of TD3).
 template <class T>
 FLAPPY_INLINE void add_noise(const UpdatePlan<T>& plan, std::uint32_t sample, int actions, T* rows) {
   std::uint32_t number[kChunk], update[kChunk];
@@ -68,8 +68,8 @@ FLAPPY_INLINE void add_noise(const UpdatePlan<T>& plan, std::uint32_t sample, in
     }
 }
 
-/// Targets y of the critics, into w.target. A discount of 0 hides what comes next, which the clip has made finite
-/// whatever it was.
+/// Computes the targets y of the critics into w.target. A discount of 0 removes the next observation; the clip has made
+/// it finite, so that 0 times its value is 0.
 template <class T>
 FLAPPY_INLINE void find_targets(const UpdatePlan<T>& plan, const Workspace<T>& w, std::uint32_t sample) {
   const int actions = plan.actor.widths[plan.actor.layers];
@@ -95,7 +95,7 @@ FLAPPY_INLINE void find_targets(const UpdatePlan<T>& plan, const Workspace<T>& w
   });
 }
 
-/// Gradient of the loss by the critic's outputs, into w.gradients.now; returns the sum of the losses.
+/// Computes the gradient of the loss by the critic's outputs into w.gradients.now; returns the sum of the losses.
 template <class T>
 FLAPPY_INLINE T find_loss(const UpdatePlan<T>& plan, const Workspace<T>& w, const T* q) {
   T* loss = w.q;

@@ -1,27 +1,28 @@
-// The parts of an update that are compiled once for each instruction set.
+// Interface to the parts of an update that are compiled once for each instruction set.
 #pragma once
 
 #include "learn/lanes/network.hpp"
 
 namespace flappy::learn {
 
-/// What networks see: columns of a transition now and next, normalised as flight::ActorView has it.
+/// Inputs of the networks: columns of a transition for the observation and the next one, and their normaliser as in
+/// policy::ActorView.
 template <class T>
 struct InputView {
   int count = 0;
-  std::ptrdiff_t now = 0, next = 0;  // columns
+  std::ptrdiff_t now = 0, next = 0;  // first columns of observation and next observation
   const T *mean = nullptr, *scale = nullptr;
   T clip = 0;
 };
 
-/// The same for all chunks of an update.
+/// Parameters that all chunks of an update share.
 template <class T>
 struct UpdatePlan {
   NetworkShape actor, critic;
   int critics = 1;
-  const T *weights = nullptr, *targets = nullptr;  // of the critics, then of the actor
+  const T *weights = nullptr, *targets = nullptr;  // [weight]: critics, then actor
   InputView<T> input;
-  std::ptrdiff_t action = 0, reward = 0, discount = 0, row = 0;  // columns of a transition, and how many
+  std::ptrdiff_t action = 0, reward = 0, discount = 0, row = 0;  // columns of a transition, and their number
   T noise_sd = 0, noise_clip = 0, huber = 0;
   T critic_share = 0, actor_share = 0;  // weight of one sample in the gradients of the losses
   std::uint64_t seed = 0;
@@ -32,7 +33,7 @@ struct UpdatePlan {
   FLAPPY_INLINE std::ptrdiff_t weight_count() const { return actor_at() + actor.weight_count(); }
 };
 
-/// Of one chunk.
+/// Sums over the samples of one chunk.
 template <class T>
 struct ChunkSums {
   T loss = 0, q = 0, actor_q = 0;
@@ -40,12 +41,12 @@ struct ChunkSums {
 
 inline namespace FLAPPY_ISA {
 
-/// Where one thread works: as many numbers as count() says.
+/// Work memory of one thread: count() numbers.
 template <class T>
 struct Workspace {
   T* gathered;        // [kChunk][row]: transitions
-  T* columns;         // [row][kChunk]: the same, transposed
-  T *actor, *critic;  // values of their neurons
+  T* columns;         // [row][kChunk]: the transitions, transposed
+  T *actor, *critic;  // values of the neurons
   T *target, *q;      // [kChunk]
   ActivationGradients<T> gradients;
 
@@ -71,27 +72,27 @@ struct Workspace {
 
 }  // namespace FLAPPY_ISA
 
-/// Adam for a stretch of numbers: sums the parts of their gradients in order, steps, and moves the targets.
+/// A step of Adam for a range of weights: sums the parts of their gradients in order, steps, and moves the targets.
 template <class T>
 struct AdamPlan {
   T *weights, *targets, *first, *second;
   const T* gradients;
   std::ptrdiff_t parts, part_size;
   T beta1, beta2, epsilon;
-  T rate;         // over 1 - beta1^t
+  T rate;         // learning rate / (1 - beta1^t)
   T second_root;  // 1 / sqrt(1 - beta2^t)
   T tau;          // 0: targets stay
 };
 
 template <class T>
 struct UpdateKernel {
-  /// Writes the gradients of kChunk samples to `gradient`, or adds them where it is to accumulate. `rows` are their transitions
-  /// in `memory`, `sample` is the number of the first in the batch.
+  /// Writes the gradients of kChunk samples to `gradient`, or adds them if `accumulate`. `rows`: rows of their
+  /// transitions in `memory`. `sample`: number of the first sample in the batch.
   ChunkSums<T> (*chunk)(const UpdatePlan<T>&, T* work, const float* memory, const std::uint32_t* rows,
                         std::uint32_t sample, T* gradient, bool accumulate);
-  /// Numbers `begin` to `end`, multiples of 16.
+  /// A step of Adam for weights `begin` to `end` - 1; both are multiples of 16.
   void (*adam)(const AdamPlan<T>&, std::ptrdiff_t begin, std::ptrdiff_t end);
-  /// Actions of kChunk observations, row by row.
+  /// Actions for kChunk observations: [kChunk][observations] to [kChunk][actions].
   void (*act)(const UpdatePlan<T>&, T* work, const float* observations, T* actions);
 };
 

@@ -13,17 +13,17 @@
 #include "io/files.hpp"
 
 extern "C" {
-void sgemm_();  // of whichever BLAS the system gives LibTorch
+void sgemm_();  // from the BLAS that LibTorch uses on this system
 void openblas_set_num_threads(int) __attribute__((weak));
 }
 
 namespace flappy::learn {
 namespace {
 
-/// One perceptron; its tensors are parts of others, which hold all numbers of all networks side by side, so that Adam and the targets'
-/// step are a few operations on one tensor each.
+/// One perceptron. Its tensors are views of tensors that hold the numbers of all networks, so that Adam and the
+/// targets' step are a few operations on one tensor.
 struct Perceptron {
-  std::vector<torch::Tensor> weights, biases, gains, shifts;  // the last two with layer norm alone
+  std::vector<torch::Tensor> weights, biases, gains, shifts;  // gains and shifts only with layer norm
   policy::Activation hidden;
   bool bounded;
 
@@ -49,7 +49,6 @@ struct Perceptron {
     }
     return bounded ? torch::tanh(x) : x;
   }
-  /// All of its tensors.
   std::vector<torch::Tensor> parameters() const {
     std::vector<torch::Tensor> all;
     for (const auto* list : {&weights, &biases, &gains, &shifts}) all.insert(all.end(), list->begin(), list->end());
@@ -69,7 +68,7 @@ struct Shape {
   }
 };
 
-/// The network whose numbers begin at `at` of `numbers`: for each layer its weights [out][in], its biases, gains and shifts.
+/// The network whose numbers begin at index `at` of `numbers`: for each layer weights [out][in], biases, gains, shifts.
 Perceptron network(const Shape& s, const torch::Tensor& numbers, std::int64_t at) {
   Perceptron p{{}, {}, {}, {}, s.hidden, s.bounded};
   const auto take = [&](std::int64_t count) {
@@ -148,7 +147,7 @@ class Learner : public TorchLearner {
     gradients_.zero_();
     UpdateMetrics m;
     const torch::Tensor seen = see(part(layout.observation, inputs()));
-    if (batch.actor_learns) {  // by the critic as it is before its step, whose own gradient of this is thrown away
+    if (batch.actor_learns) {  // with the critic before its step; only the actor's gradient is computed
       const torch::Tensor q = networks_[0].forward(torch::cat({seen, networks_.back().forward(seen)}, 1));
       const std::vector<torch::Tensor> parameters = networks_.back().parameters();
       const torch::Tensor loss = -share * q.mean();
@@ -221,8 +220,8 @@ class Learner : public TorchLearner {
     const auto count = static_cast<std::int64_t>(numbers.size());
     return torch::from_blob(const_cast<double*>(numbers.data()), {count}, torch::kDouble).to(as_);
   }
-  /// A step of Adam (Kingma and Ba 2015, arXiv 1412.6980) for `count` numbers from `at` on, of a gradient whose norm is limited
-  /// first; weights decay apart from it (Loshchilov and Hutter 2019, arXiv 1711.05101).
+  /// A step of Adam (Kingma and Ba 2015, arXiv 1412.6980) for `count` numbers from index `at` on. First limits the norm
+  /// of the gradient; weight decay is decoupled (Loshchilov and Hutter 2019, arXiv 1711.05101).
   void adam(std::int64_t at, std::int64_t count, const Step& step) {
     const auto part = [&](const torch::Tensor& t) { return t.narrow(0, at, count); };
     const torch::Tensor g = part(gradients_), m = part(numbers_[2]), v = part(numbers_[3]), x = part(numbers_[0]);
@@ -232,12 +231,13 @@ class Learner : public TorchLearner {
     v.mul_(o_.beta2).addcmul_(g, g, 1 - o_.beta2);
     x.addcdiv_(m, v.sqrt().mul_(step.root).add_(o_.epsilon), -step.rate * step.first);
   }
-  /// Its thread works alone: the others fly meanwhile.
+  /// Makes LibTorch and its BLAS use the calling thread only, because the other threads fly at the same time.
   static void alone() {
     if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);
     at::set_num_threads(1);
   }
-  /// Calls visit(place outside, place inside) for every number: biases stand before weights outside.
+  /// Calls visit(index outside, index inside) for every number. Outside, in actor files, an output's bias precedes its
+  /// weights.
   template <class Visit>
   void visit(const Visit& visit) const {
     std::size_t outside = 0, at = 0;
@@ -254,7 +254,7 @@ class Learner : public TorchLearner {
   }
 
   LearnerOptions o_;
-  torch::TensorOptions as_;    // device and precision
+  torch::TensorOptions as_;    // device and precision of all tensors
   std::vector<Shape> shapes_;  // critics, then the actor
   torch::Tensor numbers_[4], gradients_;
   std::int64_t actor_at_ = 0;

@@ -1,4 +1,4 @@
-// The accelerometer's axes turned against the gyro's and the body's by a small rotation vector e:
+// The accelerometer's axes are turned against those of the gyro and the body by a small rotation vector e:
 //   measured = R(e) f
 // [1] Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed., 2004, ch. 8: cross-axis errors. Valid for
 //     the few degrees of a soldered part.

@@ -1,13 +1,13 @@
-// Air that a wing accelerates with it: strips of rho pi/4 c^2 per span, moved by the velocity v_n of mid-chord along the
-// wing's normal (+x of the wing), and of rho pi/128 c^4 turned about it,
+// Air that a wing accelerates: strips of rho pi/4 c^2 per span, which move with the velocity v_n of mid-chord along the wing's normal (+x of the
+// wing), and rho pi/128 c^4 per span, which turns about mid-chord,
 //   dF = -factor rho pi/4 c^2 v_n' dr     dM = -factor rho pi/128 c^4 Omega_y' dr     v_n = v_x - c/2 Omega_y - s r Omega_z
-// v: of the shoulder in the air, Omega: of the wing, in the wing's frame; ' is the rate of change of these components. So the
-// wing's force and moments are rates of three momenta, linear in u = (v_x, Omega_y, Omega_z) by the planform's c^2 r^n.
+// v: velocity of the shoulder in the air, Omega: angular velocity of the wing, both in the wing's frame; ' is the rate of change of these
+// components. So the wing's force and moments are rates of three momenta, linear in u = (v_x, Omega_y, Omega_z) with the planform's c^2 r^n.
 // [1] Sane, Dickinson, J. Exp. Biol. 205, 2002 (after Sedov 1965). [2] Whitney, Wood, J. Fluid Mech. 660, 2010.
 //     Like them, without Kirchhoff's terms Omega x momentum: separated flow has no leading-edge suction.
-// In time: the momenta's differences from step to step are what the wing, and through the shoulder the body, feels one step
-// later, so none is lost. To the hinges their own part is added as inertia in the same step, and its lagged share given
-// back: added mass may exceed the wing's own. The body's part may lag, being below a tenth of the body's.
+// In time: the wing, and through the shoulder the body, feels the difference of the momenta from one step to the next one step later, so no
+// momentum is lost. For the hinges, their own part is added as inertia in the same step and its lagged share is subtracted, because added mass may
+// exceed the wing's own. The body's part may lag, because it is below a tenth of the body's mass.
 #pragma once
 
 #include "model/effects/effect.hpp"
@@ -18,7 +18,7 @@ inline namespace FLAPPY_ISA {
 struct AddedMass {
   static constexpr EffectInfo kInfo{"added_mass", Stage::wing, 1, "wing_inertia", "Sane, Dickinson 2002"};
   static constexpr std::array<EffectParameter, 1> kParameters{{{"factor", 0, 5, 1, 0, 3}}};
-  static constexpr int kStates = 11;  // whether there was a step before; of each side: u, beta', theta' then
+  static constexpr int kStates = 11;  // 1 after the first step; per side: u, beta', theta' of the last step
 
   /// u of one side.
   template <int side, class T>
@@ -40,7 +40,7 @@ struct AddedMass {
                                 WingWrench<T>& air) {
     constexpr double out = side;
     constexpr int kRow = side > 0 ? 1 : 6;
-    const SideFigures<T>& f = of_side<side>(s.figures);
+    const SideConstants<T>& f = of_side<side>(s.constants);
     const WingPose<T>& g = of_side<side>(s.pose);
     const Vec3<T> u = motion<side>(s), last{state.get(kRow), state.get(kRow + 1), state.get(kRow + 2)};
     const T rate = T(q[0] * s.per_step) * state.get(0);
@@ -67,7 +67,7 @@ struct AddedMass {
   template <int side, class T>
   static FLAPPY_INLINE void carry(const T& factor, const Surroundings<T>& s, const StateRows<T>& state, Hinges<T>& h) {
     constexpr int kRow = side > 0 ? 1 : 6;
-    const SideFigures<T>& f = of_side<side>(s.figures);
+    const SideConstants<T>& f = of_side<side>(s.constants);
     const WingPose<T>& g = of_side<side>(s.pose);
     const T stroke = factor * T(f.added_span2_kg_m2 * T(g.theta.cos * g.theta.cos));
     const T rotation = factor * f.added_chord2_kg_m2;

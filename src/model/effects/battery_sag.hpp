@@ -1,11 +1,10 @@
-// A battery that gives way under load and empties, with a driver whose commands are shares d = V / nominal of its voltage:
+// A battery whose voltage falls under load and with discharge, and a driver whose commands are shares d = V / nominal of the battery's voltage:
 //   V_b = nominal - source_ohm I - fade Q     I = d_l i_l + d_r i_r     i = (d V_b - K N phi') / R     dQ/dt = I
-// with phi' the motor's rate about the stroke axis; solved for V_b. The motors get d V_b. I is what a pulse-width-modulated
-// bridge draws for the currents of both motors: the power is the same on both sides of it, and what a motor gives back
-// flows back.
-// [1] Chen, Rincon-Mora, Accurate electrical battery model, IEEE Trans. Energy Conversion 21(2), 2006: source voltage of the
+// with phi' the motor's rate about the stroke axis; solved for V_b. The motors get d V_b. I is what a pulse-width-modulated bridge draws for the
+// currents of both motors: its input and output power are equal, and energy that a motor returns flows back into the battery.
+// [1] Chen, Rincon-Mora, Accurate electrical battery model, IEEE Trans. Energy Conversion 21(2), 2006: source voltage as a function of the
 //     charge, less a series resistance times the current; here linear in the charge, without its slow RC pairs.
-// Valid over the flat part of a discharge; an empty battery gives nothing. A flight starts with a full one.
+// Valid over the flat part of a discharge; V_b without load is never below 0. A flight starts with a full battery.
 #pragma once
 
 #include "model/effects/effect.hpp"
@@ -17,14 +16,14 @@ struct BatterySag {
   static constexpr EffectInfo kInfo{"battery_sag", Stage::drive, 2, "thrust_loss", "Chen, Rincon-Mora 2006"};
   static constexpr std::array<EffectParameter, 3> kParameters{
       {{"source_ohm", 0, 50, 1, 0, 3}, {"fade_V_C", 0, 5, 0.05, 0, 0.15}, {"nominal_V", 1, 60, 18, 12, 24}}};
-  static constexpr int kStates = 2;  // Q as a slow sum
+  static constexpr int kStates = 2;  // Q as a compensated sum (StateRows::add)
 
   template <class T>
   static FLAPPY_INLINE void hinges(const T (&q)[3], const Surroundings<T>& s, const StateRows<T>& state,
                                    Sides<Hinges<T>>& h) {
     const T share_l = h.left.voltage_V / q[2], share_r = h.right.voltage_V / q[2];
-    const T emf_l = s.figures.left.back_emf_V_s * h.left.motor_rate_rad_s;
-    const T emf_r = s.figures.right.back_emf_V_s * h.right.motor_rate_rad_s;
+    const T emf_l = s.constants.left.back_emf_V_s * h.left.motor_rate_rad_s;
+    const T emf_r = s.constants.right.back_emf_V_s * h.right.motor_rate_rad_s;
     const T per_ohm_l = share_l / h.left.resistance_ohm, per_ohm_r = share_r / h.right.resistance_ohm;
     const T full = max(T(q[2] - q[1] * state.get(0)), T(0));
     const T battery_V = T(full + q[0] * T(per_ohm_l * emf_l + per_ohm_r * emf_r)) /

@@ -4,7 +4,7 @@
 // Valid for |v| up to a few m/s (Re 1e3 to 1e4 on a 20 mm torso). C_d A of a 12 g vehicle: 1e-3 to 2e-3 m^2.
 #pragma once
 
-#include "model/effects/mean_effect.hpp"
+#include "model/effects/beat_averaged_effect.hpp"
 
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
@@ -24,11 +24,12 @@ struct BodyDrag {
     load.moment_B = load.moment_B + cross(arm - s.com_m, force);
   }
 
-  // The area of robots of up to some 100 g.
-  static constexpr std::array<EffectParameter, 2> kMeanParameters{
+  // Drag areas of robots of up to about 100 g.
+  static constexpr std::array<EffectParameter, 2> kBeatAveragedParameters{
       {{"drag_area_m2", 0, 0.5, 0.02, 0, 0.06}, {"centre_z_m", -0.3, 0.3, 0, -0.05, 0.05}}};
   template <class T>
-  static FLAPPY_INLINE void mean_load(const T (&q)[2], const MeanState<T>& s, MeanLoads<T>& load) {
+  static FLAPPY_INLINE void beat_averaged_load(const T (&q)[2], const BeatAveragedState<T>& s,
+                                               BeatAveragedLoads<T>& load) {
     const Vec3<T> arm{T(0), T(0), q[1]};
     const Vec3<T> v = (s.velocity_B_m_s + cross(s.rate_rad_s, arm)) - s.wind_B_m_s;
     const T drag = T(T(-0.5) * s.air_density_kg_m3) * T(q[0] * sqrt(dot(v, v)));

@@ -1,7 +1,7 @@
-// The torso's centre of mass is not where the model has it: shifted by (x, y, z) in B, its inertia about itself unchanged.
-// Under a thrust F the vehicle then turns with (moved lever) x F: 1 mm on a 12 g vehicle is 31 rad/s^2 of pitch
-// by the torso's inertia alone; wings that are carried along take a fifth of it.
-// [1] Goldstein, Classical Mechanics, ch. 5: rigid bodies. Exact; only the battery and the boards are assumed to have moved.
+// The torso's centre of mass differs from that of the vehicle file by (x, y, z) in B; its inertia about it is unchanged.
+// A thrust F then has the moment r x F, r from the new centre of mass: 1 mm on a 12 g vehicle is 31 rad/s^2 of pitch with the torso's inertia
+// alone; the wings, which are carried along, reduce it by a fifth.
+// [1] Goldstein, Classical Mechanics, ch. 5: rigid bodies. Exact, under the assumption that only battery and boards moved.
 #pragma once
 
 #include "model/effects/effect.hpp"

@@ -1,10 +1,10 @@
-// The voltage arrives late: V(t - delay). A delay of whole and parts of a step is interpolated linearly between steps;
-// before a flight began there was no voltage.
+// The voltage arrives late: V(t - delay). Fractions of a step are interpolated linearly between steps; before the start of a
+// flight the voltage is 0.
 // [1] Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., ch. 4: transport delay.
 // Valid up to kSlots - 2 steps, 25 ms at 1e-4 s; the delay is rounded to 1/1024 of a step.
 #pragma once
 
-#include "model/effects/mean_effect.hpp"
+#include "model/effects/beat_averaged_effect.hpp"
 
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
@@ -13,7 +13,7 @@ struct CommandDelay {
   static constexpr EffectInfo kInfo{"command_delay", Stage::drive, 1, "drive_lag", "Franklin, Powell, Workman, ch. 4"};
   static constexpr std::array<EffectParameter, 1> kParameters{{{"delay_s", 0, 0.02, 0.009, 0, 0.02}}};
   static constexpr int kSlots = 256,
-                       kStates = 2 * kSlots + 1;  // voltages of the last steps, left and right; the newest
+                       kStates = 2 * kSlots + 1;  // the last kSlots voltages, left and right; slot of the newest
 
   template <class T>
   static FLAPPY_INLINE void hinges(const T (&q)[1], const Surroundings<T>& s, const StateRows<T>& state,
@@ -35,9 +35,9 @@ struct CommandDelay {
     }
   }
 
-  static constexpr std::array<EffectParameter, 1> kMeanParameters{{{"delay_s", 0, 0.5, 0.03, 0, 0.1}}};
+  static constexpr std::array<EffectParameter, 1> kBeatAveragedParameters{{{"delay_s", 0, 0.5, 0.03, 0, 0.1}}};
   template <class T>
-  static FLAPPY_INLINE void mean_drive(const T (&q)[1], MeanDrive<T>& drive) {
+  static FLAPPY_INLINE void beat_averaged_drive(const T (&q)[1], BeatAveragedDrive<T>& drive) {
     drive.delay_s += q[0];
   }
 };

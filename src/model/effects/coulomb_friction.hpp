@@ -2,7 +2,7 @@
 //   f (1 + extra exp(-|phi'| / stribeck))      f: friction of the base model; phi': the motor's rate about the stroke axis
 // [1] Armstrong-Helouvry, Dupont, Canudas de Wit, A survey of models, analysis tools and compensation methods for the control
 //     of machines with friction, Automatica 30(7), 1994, sec. 2: stiction, and friction falling with speed.
-// No memory of the contact (presliding, rising static friction). The larger friction sticks as the base model's does.
+// No memory of the contact (presliding, rising static friction). The larger friction sticks like that of the base model.
 #pragma once
 
 #include "model/effects/effect.hpp"

@@ -1,10 +1,10 @@
-// The motor's voltage follows the driver's as a first-order lag, from none at the start of a flight:
-//   lag dV/dt = V_driver - V      exact for a voltage that holds over a step; V is taken at the end of the step
-// [1] Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., ch. 4. Stands for filters of the driver.
-// The winding's L/R, which the base model neglects, would lag the back-EMF, too.
+// The motor's voltage follows the driver's as a first-order lag, from 0 at the start of a flight:
+//   lag dV/dt = V_driver - V      exact for a voltage that is constant over a step; V is taken at the end of the step
+// [1] Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., ch. 4. It describes filters of the driver. It does not describe the
+// winding's L/R, which the base model neglects: that would also lag the back-EMF.
 #pragma once
 
-#include "model/effects/mean_effect.hpp"
+#include "model/effects/beat_averaged_effect.hpp"
 #include "model/math.hpp"
 
 namespace flappy::model {
@@ -14,7 +14,7 @@ struct DriverBandwidth {
   static constexpr EffectInfo kInfo{"driver_bandwidth", Stage::drive, 1, "drive_lag",
                                     "Franklin, Powell, Workman, ch. 4"};
   static constexpr std::array<EffectParameter, 1> kParameters{{{"lag_s", 0, 0.02, 0.001, 0, 0.003}}};
-  static constexpr int kStates = 2;  // voltages
+  static constexpr int kStates = 2;  // voltages, left and right
 
   template <class T>
   static FLAPPY_INLINE void hinges(const T (&q)[1], const Surroundings<T>& s, const StateRows<T>& state,
@@ -29,9 +29,9 @@ struct DriverBandwidth {
     follow(1, h.right);
   }
 
-  static constexpr std::array<EffectParameter, 1> kMeanParameters{{{"lag_s", 0, 1, 0.05, 0, 0.15}}};
+  static constexpr std::array<EffectParameter, 1> kBeatAveragedParameters{{{"lag_s", 0, 1, 0.05, 0, 0.15}}};
   template <class T>
-  static FLAPPY_INLINE void mean_drive(const T (&q)[1], MeanDrive<T>& drive) {
+  static FLAPPY_INLINE void beat_averaged_drive(const T (&q)[1], BeatAveragedDrive<T>& drive) {
     drive.lag_s += q[0];
   }
 };

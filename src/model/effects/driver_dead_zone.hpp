@@ -1,7 +1,7 @@
-// A driver whose output starts at a voltage: V - dead sgn V beyond it, none within.
+// A driver with a dead zone: its output is V - dead sgn V outside the zone, 0 within.
 // [1] Tao, Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, 1996, ch. 2: dead zone.
-// Like a half bridge's dead time and the drop of its switches: what is lost is lost at every voltage. Theirs goes with the
-// sign of the current, which is another where back-EMF exceeds the voltage.
+// It resembles a half bridge's dead time and the voltage drop of its switches, which reduce every voltage. Their sign is that of the current, which
+// differs from that of the voltage where back-EMF exceeds the voltage.
 #pragma once
 
 #include "model/effects/effect.hpp"

@@ -1,18 +1,18 @@
-// An effect beyond the base model is one file in this folder: a struct with
-//   kInfo                what it is called, where it acts, which parameters are its sizes, its source
-//   kParameters          their names, units and ranges: sizes first, then shapes
-//   kStates              rows of memory that it keeps from step to step, 0 at a reset; none where it is missing
-//   one or more stages   static templates that change what the stage hands on
-// and one line in registry.hpp. Simulation, randomisation, the vehicle file and diagnosis read that one
-// description. A stage is found by its name; an effect without it costs nothing there. In the order of a step:
-//   vehicle(parameters, Vehicle&)                            the vehicle as it is built, before anything is derived
-//   motor(parameters, surroundings, state, Sides<Hinges>&)   rate of each motor, where it is not its wing's
+// Each effect beyond the base model is one file in this folder: a struct with
+//   kInfo                id, stage, number of magnitudes, group, source
+//   kParameters          names with units, and ranges: magnitudes first, then shape parameters
+//   kStates              number of rows of memory from step to step, 0 at a reset; an effect without memory omits it
+//   one or more stages   static templates that change the result of a stage of the step
+// and one line in registry.hpp. Simulation, randomisation, the vehicle file and diagnosis all read that one description. A stage is found by its
+// name; an effect without it costs nothing there. In the order of a step:
+//   vehicle(parameters, Vehicle&)                            the vehicle, before constants are derived from it
+//   motor(parameters, surroundings, state, Sides<Hinges>&)   rate of each motor, if it differs from that of its wing
 //   hinges(parameters, surroundings, state, Sides<Hinges>&)  motors, springs and stops of both sides
 //   wind(parameters, surroundings, state, Vec3&)             velocity of the air, in B
-//   air<side>(parameters, surroundings, state, WingWrench&)  what the air does to a wing
-//   world(parameters, surroundings, state, BodyLoad&)        loads on the body besides its wings
-//   after(parameters, surroundings, state, Sides<Hinges>)    what to remember of the step
-// A lane in which all sizes of an effect are 0 gets back, to the bit, what the stage was handed.
+//   air<side>(parameters, surroundings, state, WingWrench&)  force and moment of the air on a wing
+//   world(parameters, surroundings, state, BodyLoad&)        loads on the body in addition to those of its wings
+//   after(parameters, surroundings, state, Sides<Hinges>)    updates the memory at the end of the step
+// In a lane in which all magnitudes of an effect are 0, the result of the stage stays the same to the bit.
 #pragma once
 
 #include <array>
@@ -24,72 +24,72 @@ namespace flappy::model {
 
 struct Vehicle;
 
-/// The stage of the step that an effect acts on; of body: the vehicle itself, which costs the step nothing.
+/// The stage of the step in which an effect acts. body: it changes the vehicle itself, which costs the step nothing.
 enum class Stage { body, drive, wing, air, world, sensor };
 
 struct EffectParameter {
-  const char* name;   ///< with its unit as suffix
+  const char* name;   ///< including the unit as suffix
   double low, high;   ///< accepted in a vehicle file
-  double typical;     ///< when switched on without a figure of its own
-  double prior_low;   ///< 90 % of what is plausible lies
+  double typical;     ///< value of an effect that is switched on without a value
+  double prior_low;   ///< 90 % of the prior probability lies
   double prior_high;  ///<   between these
 };
 
 struct EffectInfo {
   const char* id;
   Stage stage;
-  int sizes;          ///< so many leading parameters are sizes: the effect vanishes, to the bit, when all of them are 0
-  const char* group;  ///< of effects that short or gentle flights cannot tell apart, or ""
+  int magnitudes;  ///< number of leading parameters that are magnitudes: the effect vanishes, to the bit, when all of them are 0
+  const char* group;  ///< group of effects that short or gentle flights cannot tell apart, or ""
   const char* source;
 };
 
 inline namespace FLAPPY_ISA {
 
-/// Figures of one side that the base model has no use for.
+/// Constants of one side that the base model does not need.
 template <class T>
-struct SideFigures {
+struct SideConstants {
   T resistance_ohm, back_emf_V_s;  // of the motor, the latter per stroke rate
-  T electric_damping_Nm_s;         // back-EMF's share of the stroke damping
+  T electric_damping_Nm_s;         // share of the back-EMF in the stroke damping
   T rotor_spin_kg_m2;              // S of motor.hpp
   T wing_length_m, mean_chord_m;
-  // added mass of strips, rho pi/4 c^2 each: its integral, and those of c/2, r, c^2/4 + c^2/32, r^2, r c/2 times it
+  // added mass of strips, rho pi/4 c^2 each: its integral, and its integrals times c/2, r, c^2/4 + c^2/32, r^2, r c/2
   T added_kg, added_chord_kg_m, added_span_kg_m, added_chord2_kg_m2, added_span2_kg_m2, added_cross_kg_m2;
 };
 
-/// How motor, gear, spring and stops of one side act in a step. Torques are about beta and theta.
+/// Motor, gear, spring and stops of one side in a step. Torques are about beta and theta.
 template <class T>
 struct Hinges {
-  T source_share;      // of its nominal voltage
+  T source_share;      // voltage of the battery as a share of its nominal voltage
   T voltage_V;         // at the motor
-  T motor_rate_rad_s;  // phi', about the stroke axis: the wing's psi' but for play; known from hinges() on
+  T motor_rate_rad_s;  // phi', about the stroke axis; psi' if the gear has no play; known from hinges() on
   T resistance_ohm, torque_per_V_Nm, damping_Nm_s, stiffening_kg_m2, friction_Nm, rotor_kg_m2;  // as in SideParameters
   T spring_positive_Nm_rad, spring_negative_Nm_rad;
   T rotation_lower_rad, rotation_upper_rad;
-  // besides: -0 where there is none, which changes no sum
+  // added by effects; initially -0, because adding -0 changes no bit of a sum
   T stroke_torque_Nm, rotation_torque_Nm, rotation_inertia_kg_m2, cross_inertia_kg_m2;
 };
 
-/// What effects may look at.
+/// Quantities that effects may read.
 template <class T>
 struct Surroundings {
   const Parameters<T>& p;
-  const State<T>& x;  // in after(): at the end of the step, all else at its start
+  const State<T>& x;  // in after(): at the end of the step; all other members are at its start
   const Sides<WingPose<T>>& pose;
-  const Sides<SideFigures<T>>& figures;
+  const Sides<SideConstants<T>>& constants;
   Matrix3<T> attitude;     // R_WB
   Vec3<T> position_m;      // torso origin, in W
   Vec3<T> velocity_B_m_s;  // of the torso origin, in B
-  Vec3<T> com_m;           // vehicle's centre of mass from the torso origin, in B
+  Vec3<T> com_m;           // the vehicle's centre of mass from the torso origin, in B
   T stroke_plane_m;        // height of the shoulders above the torso origin along z of B
   T step_s, per_step, gravity;
   T ground_z_m, ceiling_z_m;
   T wall_clearance_m, wall_normal_x, wall_normal_y;  // of the torso origin to the nearest wall
   Vec3<T> wind_B_m_s;                                // velocity of the air; known from air() on
   Sides<Vec3<T>> shoulder_B_m_s;                     // of the shoulders in that air, in B; known from air() on
-  T lift_N;                                          // of both wings along z of B; known to world()
+  T lift_N;                                          // of both wings along z of B; known from world() on
 };
 
-/// An effect's rows of memory. Lanes in which its sizes are 0 keep theirs.
+/// An effect's rows of memory. Lanes in which its magnitudes are 0 keep theirs unchanged.
 template <class T>
 struct StateRows {
   Element<T>* rows;
@@ -98,7 +98,8 @@ struct StateRows {
 
   FLAPPY_INLINE T get(int row) const { return T::load(rows + row * stride); }
   FLAPPY_INLINE void set(int row, const T& value) const { where(on, value, get(row)).store(rows + row * stride); }
-  /// Adds to a slow sum that begins at `row` what single precision would lose (Kahan 1965).
+  /// Adds to a compensated sum in `row` and `row + 1`, so that small increments survive in single precision (Kahan
+  /// 1965).
   FLAPPY_INLINE void add(int row, const T& increment) const {
     const T sum = get(row), more = increment - get(row + 1);
     const T next = sum + more;
@@ -107,7 +108,8 @@ struct StateRows {
   }
 };
 
-// What stages change, lane by lane. Written out, so that compilers keep it in registers.
+// Lane-by-lane choice between results of stages. Written out member by member, so that compilers keep them in
+// registers.
 
 template <class T>
 FLAPPY_INLINE Hinges<T> where(auto m, const Hinges<T>& a, const Hinges<T>& b) {
@@ -149,7 +151,7 @@ FLAPPY_INLINE auto& of_side(S& s) {
   else return s.right;
 }
 
-/// The air that a wing meets: velocity of its shoulder and angular velocity of its leading edge's frame E, both in E.
+/// Flow at a wing: velocity of its shoulder in the air, and angular velocity of its leading edge's frame E, both in E.
 template <class T>
 struct WingFlow {
   Vec3<T> v, w;

@@ -1,12 +1,12 @@
-// Flapping counter-force: wings that beat to and fro brake whatever carries them, for the half-stroke against the motion meets more air than
-// that with it. Over a beat
-//   F_i = -rate_i m (f / f_nominal) v_i     i = x, y, z in B; v: of the robot in the air; that along z is known as heave damping
-// linear in velocity and in the beat's frequency f. The multibody model has it without this entry: it is what its wings do.
+// Flapping counter-force: flapping wings brake the motion of the robot, because the half-stroke against the motion meets more air than the one with
+// it. Over a beat
+//   F_i = -rate_i m (f / f_nominal) v_i     i = x, y, z in B; v: velocity of the robot in the air; the component along z is called heave damping
+// It is linear in velocity and in the beat frequency f. The multibody model includes it without this effect, through the air on its wings.
 // [1] Cheng, Deng, Translational and rotational damping of flapping flight and its dynamics and stability at hovering, IEEE Trans. Robotics
 //     27(5), 2011: linear in velocity, and larger with stroke amplitude and frequency. Valid for v well below the wings' own speed.
 #pragma once
 
-#include "model/effects/mean_effect.hpp"
+#include "model/effects/beat_averaged_effect.hpp"
 
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
@@ -17,7 +17,8 @@ struct FlappingCounterForce {
       {{"x_per_s", 0, 20, 2, 0, 5}, {"y_per_s", 0, 20, 2, 0, 5}, {"z_per_s", 0, 20, 1, 0, 5}}};
 
   template <class T>
-  static FLAPPY_INLINE void mean_load(const T (&q)[3], const MeanState<T>& s, MeanLoads<T>& load) {
+  static FLAPPY_INLINE void beat_averaged_load(const T (&q)[3], const BeatAveragedState<T>& s,
+                                               BeatAveragedLoads<T>& load) {
     const Vec3<T> v = s.velocity_B_m_s - s.wind_B_m_s;
     load.force_N = load.force_N - T(s.mass_kg * s.beat_share) * Vec3<T>{q[0] * v.x, q[1] * v.y, q[2] * v.z};
   }

@@ -2,12 +2,12 @@
 //   k = 1 + gain exp(-h / length)      h: height of the stroke plane over the ground
 // [1] He, Kou, Calaf, Leang, In-ground-effect modeling and nonlinear-disturbance observer for multirotor unmanned aerial
 //     vehicle control, J. Dyn. Syst. Meas. Control 141(7), 071013, 2019: k = 1 + C_a exp(-C_b h / R), fitted to small rotors.
-// Finite when standing, unlike 1 / (1 - (R / 4h)^2) (Cheeseman and Bennett 1955), which it meets within 0.4 % for
-// h > R with gain 0.27, length 0.7 R. The plane takes the downwash away: for the same power, that is the same drag of the
-// wings, there is more lift, so the force in the plane of the strokes stays. A level attitude and a flat ground are assumed; below the ground h counts as 0.
+// Finite when standing, unlike 1 / (1 - (R / 4h)^2) (Cheeseman and Bennett 1955), from which it differs by at most 0.4 % for h > R with gain 0.27,
+// length 0.7 R. The ground reduces the downwash: for the same power, and so the same drag of the wings, the lift is larger. Therefore the force in
+// the plane of the strokes is unchanged. Assumes a level attitude and a flat ground; below the ground h counts as 0.
 #pragma once
 
-#include "model/effects/mean_effect.hpp"
+#include "model/effects/beat_averaged_effect.hpp"
 
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
@@ -23,10 +23,11 @@ struct GroundEffect {
     air = with_lift(air, T(T(1) + q[0] * exp_negative(T(height / q[1]))));
   }
 
-  static constexpr std::array<EffectParameter, 2> kMeanParameters{
+  static constexpr std::array<EffectParameter, 2> kBeatAveragedParameters{
       {{"gain", 0, 1, 0.15, 0, 0.45}, {"length_m", 0.005, 2, 0.1, 0.03, 0.3}}};
   template <class T>
-  static FLAPPY_INLINE void mean_load(const T (&q)[2], const MeanState<T>& s, MeanLoads<T>& load) {
+  static FLAPPY_INLINE void beat_averaged_load(const T (&q)[2], const BeatAveragedState<T>& s,
+                                               BeatAveragedLoads<T>& load) {
     const T height = max(T(s.position_m.z - s.ground_z_m), T(0));
     load.force_N.z += T(q[0] * exp_negative(T(height / q[1]))) * s.thrust_N;
   }

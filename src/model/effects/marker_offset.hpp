@@ -1,10 +1,10 @@
-// The tracked point lies off the torso origin by d, in B:
+// The tracked point is offset from the torso origin by d, in B:
 //   seen position = p + R_WB d
 // [1] Furgale, Rehder and Siegwart, Unified temporal and spatial calibration for multi-sensor systems, IROS 2013: the
 //     lever arm between sensors.
 #pragma once
 
-#include "model/effects/mean_effect.hpp"
+#include "model/effects/beat_averaged_effect.hpp"
 
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
@@ -15,12 +15,12 @@ struct MarkerOffset {
                                                                {"y_m", -0.05, 0.05, 0.002, -0.006, 0.006},
                                                                {"z_m", -0.05, 0.05, 0.002, -0.006, 0.006}}};
 
-  /// The specific force of the point that is seen: a' d + w (w d) more.
-  static constexpr std::array<EffectParameter, 3> kMeanParameters{{{"x_m", -0.5, 0.5, 0.02, -0.06, 0.06},
-                                                                   {"y_m", -0.5, 0.5, 0.02, -0.06, 0.06},
-                                                                   {"z_m", -0.5, 0.5, 0.02, -0.06, 0.06}}};
+  /// In addition, the specific force of the tracked point is larger by w' x d + w x (w x d).
+  static constexpr std::array<EffectParameter, 3> kBeatAveragedParameters{{{"x_m", -0.5, 0.5, 0.02, -0.06, 0.06},
+                                                                           {"y_m", -0.5, 0.5, 0.02, -0.06, 0.06},
+                                                                           {"z_m", -0.5, 0.5, 0.02, -0.06, 0.06}}};
   template <class T>
-  static FLAPPY_INLINE void mean_seen(const T (&q)[3], const MeanState<T>& s, Vec3<T>& force_m_s2) {
+  static FLAPPY_INLINE void beat_averaged_seen(const T (&q)[3], const BeatAveragedState<T>& s, Vec3<T>& force_m_s2) {
     const Vec3<T> d{q[0], q[1], q[2]};
     force_m_s2 = force_m_s2 + (cross(s.turning_rad_s2, d) + cross(s.rate_rad_s, cross(s.rate_rad_s, d)));
   }

@@ -1,6 +1,7 @@
-// Poses arrive later, by a constant, than their declared latency says: one that was declared to be of the time t shows
+// Poses arrive later than their declared latency by a constant: a pose that is declared for the time t shows
 //   p(t - delay), R_WB(t - delay)
-// between the ends of control periods by cubics through positions and rates (Hermite); before a flight began it stood at its start.
+// interpolated between the ends of control periods by cubics through positions and rates (Hermite); before the start of a flight the pose is its
+// first.
 // [1] Furgale, Rehder and Siegwart, Unified temporal and spatial calibration for multi-sensor systems, IROS 2013: the
 //     time offset between sensors.
 #pragma once
@@ -14,7 +15,7 @@ struct MocapDelay {
   static constexpr EffectInfo kInfo{"mocap_delay", Stage::sensor, 1, "", "Furgale, Rehder, Siegwart, IROS 2013"};
   static constexpr std::array<EffectParameter, 1> kParameters{{{"delay_s", -0.02, 0.02, 0.005, -0.012, 0.012}}};
   static constexpr int kSlots = 64, kRows = 13,
-                       kStates = kSlots * kRows;  // true motion at the start of the last periods
+                       kStates = kSlots * kRows;  // true motion at the start of each of the last periods
 };
 
 }  // namespace FLAPPY_ISA

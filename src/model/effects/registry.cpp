@@ -15,60 +15,64 @@ void change(const double* parameters, Vehicle& v) {
 }
 
 template <int I>
-EffectEntry entry() {
+CatalogueEffect effect_at() {
   using Effect = EffectAt<I>;
-  EffectEntry e{Effect::kInfo,
-                {Effect::kParameters.begin(), Effect::kParameters.end()},
-                effect_rows_before<I>(),
-                states_of<Effect>(),
-                nullptr,
-                {}};
+  CatalogueEffect e{Effect::kInfo,
+                    {Effect::kParameters.begin(), Effect::kParameters.end()},
+                    effect_rows_before<I>(),
+                    states_of<Effect>(),
+                    nullptr,
+                    {}};
   if constexpr (Effect::kInfo.stage == Stage::body) e.change = change<Effect>;
   return e;
 }
 
-/// A stage that reads its parameters as an array.
+/// Calls a stage that takes its parameters as an array.
 template <auto stage, std::size_t count, class... Further>
 void staged(const double* parameters, Further... further) {
   stage(*reinterpret_cast<const double(*)[count]>(parameters), further...);
 }
 
 template <class Effect>
-EffectEntry mean_entry() {
-  constexpr std::size_t kCount = mean_parameters<Effect>().size();
+CatalogueEffect averaged_effect() {
+  constexpr std::size_t kCount = beat_averaged_parameters<Effect>().size();
   EffectInfo info = Effect::kInfo;
-  if constexpr (requires { Effect::kMeanSizes; }) info.sizes = Effect::kMeanSizes;
-  EffectEntry e{info, {mean_parameters<Effect>().begin(), mean_parameters<Effect>().end()}, 0, 0, nullptr, {}};
+  if constexpr (requires { Effect::kBeatAveragedMagnitudes; }) info.magnitudes = Effect::kBeatAveragedMagnitudes;
+  CatalogueEffect e{
+      info, {beat_averaged_parameters<Effect>().begin(), beat_averaged_parameters<Effect>().end()}, 0, 0, nullptr, {}};
   if constexpr (Effect::kInfo.stage == Stage::body) e.change = change<Effect>;
-  if constexpr (requires { Effect::template mean_drive<double>; })
-    e.mean.drive = staged<Effect::template mean_drive<double>, kCount, MeanDrive<double>&>;
-  if constexpr (requires { Effect::template mean_wind<double>; })
-    e.mean.wind = staged<Effect::template mean_wind<double>, kCount, const MeanState<double>&, Vec3<double>&>;
-  if constexpr (requires { Effect::template mean_load<double>; })
-    e.mean.load = staged<Effect::template mean_load<double>, kCount, const MeanState<double>&, MeanLoads<double>&>;
-  if constexpr (requires { Effect::template mean_seen<double>; })
-    e.mean.seen = staged<Effect::template mean_seen<double>, kCount, const MeanState<double>&, Vec3<double>&>;
+  if constexpr (requires { Effect::template beat_averaged_drive<double>; })
+    e.averaged.drive = staged<Effect::template beat_averaged_drive<double>, kCount, BeatAveragedDrive<double>&>;
+  if constexpr (requires { Effect::template beat_averaged_wind<double>; })
+    e.averaged.wind =
+        staged<Effect::template beat_averaged_wind<double>, kCount, const BeatAveragedState<double>&, Vec3<double>&>;
+  if constexpr (requires { Effect::template beat_averaged_load<double>; })
+    e.averaged.load = staged<Effect::template beat_averaged_load<double>, kCount, const BeatAveragedState<double>&,
+                             BeatAveragedLoads<double>&>;
+  if constexpr (requires { Effect::template beat_averaged_seen<double>; })
+    e.averaged.seen =
+        staged<Effect::template beat_averaged_seen<double>, kCount, const BeatAveragedState<double>&, Vec3<double>&>;
   return e;
 }
 
 template <class... Effect>
-std::vector<EffectEntry> mean_list(std::tuple<Effect...>*) {
-  return {mean_entry<Effect>()...};
+std::vector<CatalogueEffect> averaged_list(std::tuple<Effect...>*) {
+  return {averaged_effect<Effect>()...};
 }
 
-const std::vector<EffectEntry>& means() {
-  static const std::vector<EffectEntry> all = mean_list(static_cast<MeanEffects*>(nullptr));
+const std::vector<CatalogueEffect>& means() {
+  static const std::vector<CatalogueEffect> all = averaged_list(static_cast<BeatAveragedEffects*>(nullptr));
   return all;
 }
 
 template <int... I>
-std::vector<EffectEntry> list(std::integer_sequence<int, I...>) {
-  return {entry<I>()...};
+std::vector<CatalogueEffect> list(std::integer_sequence<int, I...>) {
+  return {effect_at<I>()...};
 }
 
 }  // namespace
 
-std::vector<double> EffectEntry::values(const std::map<std::string, double>& given) const {
+std::vector<double> CatalogueEffect::values(const std::map<std::string, double>& given) const {
   std::vector<double> list;
   for (const EffectParameter& p : parameters) {
     const auto own = given.find(p.name);
@@ -77,47 +81,47 @@ std::vector<double> EffectEntry::values(const std::map<std::string, double>& giv
   return list;
 }
 
-std::vector<double> EffectEntry::values_of(const Vehicle& vehicle) const {
+std::vector<double> CatalogueEffect::values_of(const Vehicle& vehicle) const {
   const auto own = vehicle.effects.find(info.id);
   if (own != vehicle.effects.end()) return values(own->second);
   std::vector<double> typical = values({});
-  std::fill_n(typical.begin(), info.sizes, 0.0);
+  std::fill_n(typical.begin(), info.magnitudes, 0.0);
   return typical;
 }
 
-bool EffectEntry::acts(const std::vector<double>& values) const {
-  return std::any_of(values.begin(), values.begin() + info.sizes, [](double size) { return size != 0; });
+bool CatalogueEffect::acts(const std::vector<double>& values) const {
+  return std::any_of(values.begin(), values.begin() + info.magnitudes, [](double magnitude) { return magnitude != 0; });
 }
 
-const std::vector<EffectEntry>& effects() {
-  static const std::vector<EffectEntry> all = list(std::make_integer_sequence<int, kEffects>());
+const std::vector<CatalogueEffect>& effects() {
+  static const std::vector<CatalogueEffect> all = list(std::make_integer_sequence<int, kEffects>());
   return all;
 }
 
 namespace {
 
-const EffectEntry* entry_of(const std::string& id) {
+const CatalogueEffect* effect_named(const std::string& id) {
   for (const auto* catalogue : {&effects(), &means()})
-    for (const EffectEntry& e : *catalogue)
+    for (const CatalogueEffect& e : *catalogue)
       if (e.info.id == id) return &e;
   return nullptr;
 }
 
 }  // namespace
 
-const std::vector<EffectEntry>& catalogue_of(const Vehicle& vehicle) {
-  static const std::vector<EffectEntry> seen = [] {
-    std::vector<EffectEntry> of_sensors;
-    for (const EffectEntry& e : effects())
+const std::vector<CatalogueEffect>& catalogue_of(const Vehicle& vehicle) {
+  static const std::vector<CatalogueEffect> seen = [] {
+    std::vector<CatalogueEffect> of_sensors;
+    for (const CatalogueEffect& e : effects())
       if (e.info.stage == Stage::sensor) of_sensors.push_back(e);
     return of_sensors;
   }();
   return vehicle.beat_averaged ? means() : vehicle.jointed ? seen : effects();
 }
 
-const EffectEntry* find_effect(const Vehicle& vehicle, const std::string& id) {
-  const std::vector<EffectEntry>& all = catalogue_of(vehicle);
-  const auto found = std::ranges::find_if(all, [&](const EffectEntry& e) { return e.info.id == id; });
+const CatalogueEffect* find_effect(const Vehicle& vehicle, const std::string& id) {
+  const std::vector<CatalogueEffect>& all = catalogue_of(vehicle);
+  const auto found = std::ranges::find_if(all, [&](const CatalogueEffect& e) { return e.info.id == id; });
   return found == all.end() ? nullptr : &*found;
 }
 
@@ -137,16 +141,16 @@ int effect_index(const char* id) {
   return -1;
 }
 
-bool is_effect(const std::string& id) { return entry_of(id) != nullptr; }
+bool is_effect(const std::string& id) { return effect_named(id) != nullptr; }
 
 std::string group_of(const std::string& id) {
-  const EffectEntry* entry = entry_of(id);
+  const CatalogueEffect* entry = effect_named(id);
   return entry == nullptr || *entry->info.group == 0 ? id : entry->info.group;
 }
 
-std::vector<std::string> whole_group(const std::vector<EffectEntry>& catalogue, const std::string& id) {
+std::vector<std::string> whole_group(const std::vector<CatalogueEffect>& catalogue, const std::string& id) {
   std::vector<std::string> all;
-  for (const EffectEntry& e : catalogue)
+  for (const CatalogueEffect& e : catalogue)
     if (group_of(e.info.id) == group_of(id)) all.emplace_back(e.info.id);
   return all;
 }

@@ -1,4 +1,4 @@
-// Every effect beyond the base model. A new one is added here, and nowhere else.
+// All effects beyond the base model. A new effect is added here, and nowhere else.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +11,7 @@
 #include "model/effects/added_mass.hpp"
 #include "model/effects/battery_sag.hpp"
 #include "model/effects/battery_thrust.hpp"
+#include "model/effects/beat_averaged_effect.hpp"
 #include "model/effects/body_drag.hpp"
 #include "model/effects/ceiling_effect.hpp"
 #include "model/effects/clap_and_fling.hpp"
@@ -25,7 +26,6 @@
 #include "model/effects/gyro_bias.hpp"
 #include "model/effects/inertia_products.hpp"
 #include "model/effects/marker_offset.hpp"
-#include "model/effects/mean_effect.hpp"
 #include "model/effects/mocap_delay.hpp"
 #include "model/effects/mocap_tilt.hpp"
 #include "model/effects/rotational_lift.hpp"
@@ -47,18 +47,18 @@
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
-/// Within a stage they act in this order: the vehicle; the voltage from the command to the motor; stroke and stops; the air,
-/// first what makes the wing's force, then what scales it; loads on the body. Sensors last.
+/// Order within a stage: changes of the vehicle; the voltage from the command to the motor; stroke and stops; the air,
+/// first what causes the wing's force, then what scales it; loads on the body; sensors last.
 using Effects = std::tuple<ComOffset, InertiaProducts, WingInertiaShape, WingDamage, CommandDelay, DriverDeadZone,
                            DriverBandwidth, WindingHeating, BatterySag, CoulombFriction, SpringHardening,
                            StopCompliance, GearBacklash, Wind, WingFlexibility, RotationalLift, WakeCapture,
                            ClapAndFling, GroundEffect, CeilingEffect, AddedMass, WallEffect, BodyDrag, Tether, GyroBias,
                            AccelerometerMisalignment, VibrationRectification, MocapTilt, MarkerOffset, MocapDelay>;
 
-/// Those that have a stage for the mean of a beat, in the order in which they act.
-using MeanEffects = std::tuple<ComOffset, InertiaProducts, CommandDelay, DriverBandwidth, BatteryThrust, Wind,
-                               GroundEffect, BodyDrag, Tether, FlappingCounterForce, TranslationalLift,
-                               StrokePlaneActuation, ThrustAxisTilt, MocapTilt, MarkerOffset>;
+/// Effects that have a beat-averaged stage, in the order in which they act.
+using BeatAveragedEffects = std::tuple<ComOffset, InertiaProducts, CommandDelay, DriverBandwidth, BatteryThrust, Wind,
+                                       GroundEffect, BodyDrag, Tether, FlappingCounterForce, TranslationalLift,
+                                       StrokePlaneActuation, ThrustAxisTilt, MocapTilt, MarkerOffset>;
 
 inline constexpr int kEffects = std::tuple_size_v<Effects>;
 static_assert(kEffects <= 64, "a set of effects is a word");
@@ -72,17 +72,17 @@ constexpr int states_of() {
   else return 0;
 }
 
-/// Rows of parameters before those of effect `I`; of all effects for I = kEffects.
+/// Number of rows of parameters before those of effect `I`; of all effects for I = kEffects.
 template <int I>
 constexpr int effect_rows_before() {
   if constexpr (I == 0) return 0;
   else return effect_rows_before<I - 1>() + static_cast<int>(EffectAt<I - 1>::kParameters.size());
 }
 inline constexpr int kEffectParameterRows = effect_rows_before<kEffects>();
-/// Rows that effects read: their parameters, then the figures of the left and of the right side.
-inline constexpr int kEffectRows = kEffectParameterRows + 2 * kRows<SideFigures>;
+/// Number of rows that effects read: their parameters, then the SideConstants of the left and of the right side.
+inline constexpr int kEffectRows = kEffectParameterRows + 2 * kRows<SideConstants>;
 
-/// Rows of memory of the effects in `set`.
+/// Number of rows of memory of the effects in `set`.
 template <int I = 0>
 constexpr int state_rows(std::uint64_t set) {
   if constexpr (I == kEffects) return 0;
@@ -91,38 +91,39 @@ constexpr int state_rows(std::uint64_t set) {
 
 }  // namespace FLAPPY_ISA
 
-/// What the rest of the project knows of an effect, within the beat or as a mean over beats.
-struct EffectEntry {
+/// Description of an effect for the rest of the project, within the beat or as a mean over beats.
+struct CatalogueEffect {
   EffectInfo info;
   std::vector<EffectParameter> parameters;
-  int first_row;                                       ///< of its parameters in a block's effect rows
+  int first_row;                                       ///< first row of its parameters among a block's effect rows
   int states;                                          ///< rows of memory
   void (*change)(const double* parameters, Vehicle&);  ///< its stage `vehicle`, or null
-  MeanStages mean;                                     ///< of a robot that is known by the beat
+  BeatAveragedStages averaged;                         ///< for beat-averaged robots
 
-  /// Its parameters: those given, typical ones for the others.
+  /// Values of all parameters: those in `given`, and typical values for the others.
   std::vector<double> values(const std::map<std::string, double>& given) const;
-  /// Those of a vehicle; its sizes are 0 where the vehicle has no such effect.
+  /// Values of all parameters in a vehicle; the magnitudes are 0 if the vehicle does not have the effect.
   std::vector<double> values_of(const Vehicle& vehicle) const;
-  /// Whether it does anything with these parameters.
+  /// Whether any magnitude among these values differs from 0.
   bool acts(const std::vector<double>& values) const;
 };
 
-/// Those that act within the beat, by index, which is also the bit of an effect in a block's set.
-const std::vector<EffectEntry>& effects();
-/// Those that a vehicle may have: the former, or, of one that is known by the beat, those with a stage for its mean.
-const std::vector<EffectEntry>& catalogue_of(const Vehicle& vehicle);
-/// Null where the vehicle's catalogue has no such entry.
-const EffectEntry* find_effect(const Vehicle& vehicle, const std::string& id);
-/// Bits of those that act on sensors alone.
+/// The effects within the beat. The index of an effect is also its bit in a block's set.
+const std::vector<CatalogueEffect>& effects();
+/// The effects that a vehicle may have: effects(); for a beat-averaged robot those with a beat-averaged stage; with
+/// articulated wings those of sensors.
+const std::vector<CatalogueEffect>& catalogue_of(const Vehicle& vehicle);
+/// Null if the vehicle's catalogue does not have the effect.
+const CatalogueEffect* find_effect(const Vehicle& vehicle, const std::string& id);
+/// Bits of the effects in Stage::sensor.
 std::uint64_t sensor_effects();
-/// Index of `id`, or -1.
+/// Index of `id` in effects(), or -1.
 int effect_index(const char* id);
-/// Whether any kind of vehicle has such an entry.
+/// Whether any kind of vehicle may have the effect.
 bool is_effect(const std::string& id);
-/// What an effect is grouped with (EffectInfo::group): its group's name, or its own where it has none.
+/// The group of an effect (EffectInfo::group), or its own id if it has no group.
 std::string group_of(const std::string& id);
-/// All entries of an effect's group in a catalogue, in its order.
-std::vector<std::string> whole_group(const std::vector<EffectEntry>& catalogue, const std::string& id);
+/// Ids of all effects of the same group in a catalogue, in the order of the catalogue.
+std::vector<std::string> whole_group(const std::vector<CatalogueEffect>& catalogue, const std::string& id);
 
 }  // namespace flappy::model

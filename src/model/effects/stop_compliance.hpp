@@ -1,10 +1,9 @@
-// Stops of the wing's rotation as spring and damper instead of hard: a wing that is x beyond its stop feels
-//   tau = -(k x + d theta')  as long as that pushes it back      k = 1 / compliance     d = 2 damping_ratio sqrt(k I)
-// with I the wing's inertia about its leading edge. x and theta' are those at the end of the step (implicit Euler): the torque
-// of the old rate, and h (k h + d) as inertia on the hinge. That is stable for any k, damps a little more, and tends to the
-// hard stop's landing for k -> infinity.
-// [1] Hunt, Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42(2), 1975, sec. 1: the
-//     linear spring and damper that they start from. Beyond 1.7 rad the stop is hard again.
+// Stops of the wing's rotation as spring and damper instead of hard stops: a wing that is x beyond its stop feels
+//   tau = -(k x + d theta')  while that pushes it back      k = 1 / compliance     d = 2 damping_ratio sqrt(k I)
+// with I the wing's inertia about its leading edge. x and theta' are taken at the end of the step (implicit Euler): the torque with the old rate, and
+// h (k h + d) as inertia on the hinge. This is stable for any k, damps slightly more, and tends to the landing on the hard stop for k -> infinity.
+// [1] Hunt, Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42(2), 1975, sec. 1: the linear spring and
+//     damper from which they start. At 1.7 rad there is a hard stop again.
 #pragma once
 
 #include "model/effects/effect.hpp"
@@ -16,7 +15,7 @@ struct StopCompliance {
   static constexpr EffectInfo kInfo{"stop_compliance", Stage::wing, 1, "", "Hunt, Crossley 1975"};
   static constexpr std::array<EffectParameter, 2> kParameters{
       {{"compliance_rad_Nm", 0, 1000, 50, 0, 150}, {"damping_ratio", 0, 2, 0.5, 0.2, 0.8}}};
-  static constexpr double kReach_rad = 1.7;  // of the wing, to where the stop is hard again
+  static constexpr double kReach_rad = 1.7;  // rotation angle at which the stop is hard again
 
   template <class T>
   static FLAPPY_INLINE void hinges(const T (&q)[2], const Surroundings<T>& s, const StateRows<T>&,

@@ -1,11 +1,11 @@
-// A servo that moves the stroke plane, or the wings' dihedral, to pitch the robot, pushes it forward too:
-//   F_x = m (shift s + swing ds/dt)     s: sum of the actuators that do so
-// the thrust is tilted by the former, and wings that are swung push air by the latter.
+// A servo that pitches the robot by moving the stroke plane, or the wings' dihedral, also pushes it forward:
+//   F_x = m (shift s + swing ds/dt)     s: sum of the actuators that move the stroke plane
+// The first term is the tilt of the thrust, the second the air that the swung wings push.
 // [1] Karasek, Muijres, De Wagter, Remes, de Croon, A tailless aerial robotic flapper reveals that flies use torque coupling in rapid banked
 //     turns, Science 361, 2018: dihedral shifts the thrust against the centre of mass.
 #pragma once
 
-#include "model/effects/mean_effect.hpp"
+#include "model/effects/beat_averaged_effect.hpp"
 
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
@@ -16,7 +16,8 @@ struct StrokePlaneActuation {
       {{"shift_m_s2", -200, 200, 10, -20, 20}, {"swing_m_s", -20, 20, 1, -2, 2}}};
 
   template <class T>
-  static FLAPPY_INLINE void mean_load(const T (&q)[2], const MeanState<T>& s, MeanLoads<T>& load) {
+  static FLAPPY_INLINE void beat_averaged_load(const T (&q)[2], const BeatAveragedState<T>& s,
+                                               BeatAveragedLoads<T>& load) {
     load.force_N.x += s.mass_kg * T(q[0] * s.stroke_plane + q[1] * s.stroke_plane_1_s);
   }
 };

@@ -1,11 +1,11 @@
-// A cable that hangs from below the torso's origin to the ground: it weighs down with the length that is in the air, and pulls
-// weakly back to above its anchor,
+// A cable that hangs from below the torso's origin to the ground: it pulls down with the weight of the length in the air, and weakly towards its
+// anchor,
 //   F_z = -line g h      F_x = -stiffness (x - anchor_x)      F_y = -stiffness (y - anchor_y)      h: height over the ground
 // [1] Irvine, Cable Structures, 1981, ch. 1: a slack line carries its own weight, and pulls sideways in proportion to small
-//     offsets. The line's inertia, its damping and its drag are left out; below the ground h counts as 0.
+//     offsets. Neglects the line's inertia, damping and drag; below the ground h counts as 0.
 #pragma once
 
-#include "model/effects/mean_effect.hpp"
+#include "model/effects/beat_averaged_effect.hpp"
 
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
@@ -29,7 +29,8 @@ struct Tether {
   }
 
   template <class T>
-  static FLAPPY_INLINE void mean_load(const T (&q)[5], const MeanState<T>& s, MeanLoads<T>& load) {
+  static FLAPPY_INLINE void beat_averaged_load(const T (&q)[5], const BeatAveragedState<T>& s,
+                                               BeatAveragedLoads<T>& load) {
     const T height = max(T(s.position_m.z - s.ground_z_m), T(0));
     const Vec3<T> force{q[1] * T(q[2] - s.position_m.x), q[1] * T(q[3] - s.position_m.y),
                         -T(T(q[0] * s.gravity_m_s2) * height)};

@@ -1,9 +1,9 @@
-// The thrust is not along z of B but turned by small angles about x and y, as where wings or markers were mounted askew:
+// The thrust is turned from z of B by small angles about x and y, for example because wings or markers are not mounted straight:
 //   F_x = T y, F_y = -T x     T: thrust along z
 // [1] Goldstein, Classical Mechanics, ch. 4: small rotations.
 #pragma once
 
-#include "model/effects/mean_effect.hpp"
+#include "model/effects/beat_averaged_effect.hpp"
 
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
@@ -14,7 +14,8 @@ struct ThrustAxisTilt {
       {{"x_rad", -0.5, 0.5, 0.03, -0.1, 0.1}, {"y_rad", -0.5, 0.5, 0.03, -0.1, 0.1}}};
 
   template <class T>
-  static FLAPPY_INLINE void mean_load(const T (&q)[2], const MeanState<T>& s, MeanLoads<T>& load) {
+  static FLAPPY_INLINE void beat_averaged_load(const T (&q)[2], const BeatAveragedState<T>& s,
+                                               BeatAveragedLoads<T>& load) {
     load.force_N.x += s.thrust_N * q[1];
     load.force_N.y -= s.thrust_N * q[0];
   }

@@ -1,12 +1,12 @@
-// Translational lift: wings that travel sideways carry more,
-//   F_z = gain m v_h^2     v_h: speed in the air across z of B
-// the even part of what travel does to a flapping wing, as its pressure goes with the square of velocity; the odd part cancels over a beat.
+// Translational lift: wings of a robot that moves sideways have more lift,
+//   F_z = gain m v_h^2     v_h: speed in the air perpendicular to z of B
+// This is the even part of the influence of speed, because pressure is proportional to the square of velocity; the odd part cancels over a beat.
 // [1] Olejnik et al., An experimental study of wind resistance and power consumption in MAVs with a low-speed multi-fan wind system, 2022
-//     (arXiv 2202.06723): in forward flight the wings of a flapper carry more, those of a quadrotor hardly.
-// The multibody model has it without this entry.
+//     (arXiv 2202.06723): in forward flight the wings of a flapper have more lift, those of a quadrotor hardly.
+// The multibody model includes it without this effect.
 #pragma once
 
-#include "model/effects/mean_effect.hpp"
+#include "model/effects/beat_averaged_effect.hpp"
 
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
@@ -16,7 +16,8 @@ struct TranslationalLift {
   static constexpr std::array<EffectParameter, 1> kParameters{{{"gain_per_m", -5, 5, 0.3, -1, 1}}};
 
   template <class T>
-  static FLAPPY_INLINE void mean_load(const T (&q)[1], const MeanState<T>& s, MeanLoads<T>& load) {
+  static FLAPPY_INLINE void beat_averaged_load(const T (&q)[1], const BeatAveragedState<T>& s,
+                                               BeatAveragedLoads<T>& load) {
     const Vec3<T> v = s.velocity_B_m_s - s.wind_B_m_s;
     load.force_N.z += T(q[0] * s.mass_kg) * T(v.x * v.x + v.y * v.y);
   }

@@ -1,8 +1,8 @@
 // A bias of every accelerometer axis that grows with the vibration along it:
 //   bias = K_2 (mean over a beat of (f - mean f)^2)
-// [1] IEEE Std 1293-2018, Linear, single-axis, nongyroscopic accelerometers: the second-order coefficient K_2. 1e-3 s^2/m is
-//     that of consumer parts (10 mg/g^2 / 9.81 m/s^2).
-// The simulated sensor takes the mean over the wing beat before, which ends where the fraction of the phase wraps; none in the first.
+// [1] IEEE Std 1293-2018, Linear, single-axis, nongyroscopic accelerometers: the second-order coefficient K_2. Consumer parts have
+//     1e-3 s^2/m (10 mg/g^2 / 9.81 m/s^2).
+// The simulated sensor takes the mean over the previous wing beat, which ends where the fraction of the phase wraps; the bias is 0 in the first beat.
 #pragma once
 
 #include "model/effects/effect.hpp"
@@ -14,7 +14,7 @@ struct VibrationRectification {
   static constexpr EffectInfo kInfo{"vibration_rectification", Stage::sensor, 1, "", "IEEE Std 1293-2018, annex"};
   static constexpr std::array<EffectParameter, 1> kParameters{{{"gain_s2_m", -0.05, 0.05, 0.001, -0.003, 0.003}}};
   static constexpr int kStates =
-      11;  // bias; of this beat: samples, sums of the forces and of their squares; last phase
+      11;  // bias; in this beat: samples, sums of the forces and of their squares; last phase
 };
 
 }  // namespace FLAPPY_ISA

@@ -1,12 +1,12 @@
-// A wing that has reversed meets the air it had set in motion, which still moves the old way and dies down within the half
-// stroke: the blade-element force at the rate |psidot| + w less that at |psidot|,
+// After a reversal, a wing meets the air that it had set in motion, which still moves in the old direction and decays within the half stroke: the
+// blade-element force at the rate |psidot| + w less that at |psidot|,
 //   w = gain p exp(-t / (decay t_half))
-// t: since the last reversal; t_half, p: of the half stroke before it, how long it took and its highest rate.
+// t: time since the last reversal; t_half, p: duration and highest rate of the half stroke before it.
 // [1] Dickinson, Lehmann, Sane, Wing rotation and the aerodynamic basis of insect flight, Science 284, 1999: a peak of force
 //     just after reversal, where the wing itself hardly moves, of either sign with the timing of the rotation.
 // [2] Lehmann, The mechanisms of lift enhancement in insect flight, Naturwissenschaften 91, 2004: decays within a tenth to a
 //     fifth of the half stroke.
-// Phenomenological: the gain stands for what depends on amplitude and rotation. None before the second reversal of a flight.
+// Phenomenological: the gain stands for the influence of amplitude and rotation. 0 before the second reversal of a flight.
 #pragma once
 
 #include "model/effects/effect.hpp"
@@ -19,7 +19,8 @@ struct WakeCapture {
   static constexpr EffectInfo kInfo{"wake_capture", Stage::air, 1, "unsteady_lift", "Dickinson, Lehmann, Sane 1999"};
   static constexpr std::array<EffectParameter, 2> kParameters{
       {{"gain", -1, 1, 0.08, -0.24, 0.24}, {"decay", 0.01, 1, 0.15, 0.05, 0.25}}};
-  /// Of each side: direction of the stroke, time since it changed, the time before that; highest rate since and before.
+  /// Per side: direction of the stroke, time since the last reversal, duration of the half stroke before it; highest
+  /// rate since that reversal, and in the half stroke before it.
   static constexpr int kStates = 10;
 
   template <int side, class T>

@@ -1,9 +1,9 @@
-// Side force and roll near a vertical wall, in proportion to the lift and dying down with the clearance d of the torso:
+// Side force and roll moment near a vertical wall, in proportion to the lift; they decay with the clearance d of the torso:
 //   F = side_gain L exp(-d / length) n      M_x = roll_gain L exp(-d / length) n_y     n: the wall's normal; n_y in B
 // Positive gains push away from the wall and raise the wing that is farther from it. L: force of the wings along z of B.
 // [1] Robinson, Chung, Ryan, Computational investigation of micro rotorcraft near-wall hovering aerodynamics, ICUAS 2014:
 //     near a wall small rotors keep their thrust and gain a side force and a tilting moment, of either sign with the distance.
-// The exponential is that of the ground effect. The nearest wall alone counts; behind it d counts as 0.
+// The exponential is that of the ground effect. Only the nearest wall counts; behind it d counts as 0.
 #pragma once
 
 #include "model/effects/effect.hpp"

@@ -1,13 +1,13 @@
-// Air that moves, constant and gusting, alike over the whole vehicle, in W; the wings and the drag of the body meet it:
+// Wind, constant and gusting, uniform over the whole vehicle, in W; it acts on the wings and on the drag of the body:
 //   (x, y, z) + sqrt(2/3) gust sum_k sin(w_k t + k j 2 pi / 3)     k = 0, 1, 2; j = 0, 1, 2 for x, y, z
-//   w_k = 0.618, 1, 1.732 / gust_time: no two in a whole ratio, so that gusts never repeat
-// Each axis has the given rms and no correlation with another. No random numbers: a flight is the same every time.
+//   w_k = 0.618, 1, 1.732 / gust_time: no two in a ratio of whole numbers, so that gusts never repeat
+// Each axis has the given rms, and the axes are uncorrelated. No random numbers: a flight is the same every time.
 // [1] Shinozuka, Jan, Digital simulation of random processes and its applications, J. Sound Vib. 25(1), 1972: a random
 //     process as a sum of sines.
-// Gusts are long against the vehicle; shear and the wake's drift are left out. Phases begin at 0 with a flight.
+// Assumes gusts that are long against the vehicle; neglects shear and the drift of the wake. Phases are 0 at the start of a flight.
 #pragma once
 
-#include "model/effects/mean_effect.hpp"
+#include "model/effects/beat_averaged_effect.hpp"
 #include "model/math.hpp"
 
 namespace flappy::model {
@@ -41,11 +41,11 @@ struct Wind {
     wind_B = transpose_times(s.attitude, Vec3<T>{q[0] + size * gust[0], q[1] + size * gust[1], q[2] + size * gust[2]});
   }
 
-  static constexpr int kMeanSizes = 3;
-  static constexpr std::array<EffectParameter, 3> kMeanParameters{
+  static constexpr int kBeatAveragedMagnitudes = 3;
+  static constexpr std::array<EffectParameter, 3> kBeatAveragedParameters{
       {{"x_m_s", -5, 5, 0.3, -0.9, 0.9}, {"y_m_s", -5, 5, 0.3, -0.9, 0.9}, {"z_m_s", -5, 5, 0.1, -0.3, 0.3}}};
   template <class T>
-  static FLAPPY_INLINE void mean_wind(const T (&q)[3], const MeanState<T>& s, Vec3<T>& wind_B) {
+  static FLAPPY_INLINE void beat_averaged_wind(const T (&q)[3], const BeatAveragedState<T>& s, Vec3<T>& wind_B) {
     wind_B = wind_B + transpose_times(s.attitude, Vec3<T>{q[0], q[1], q[2]});
   }
 };

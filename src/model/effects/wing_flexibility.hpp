@@ -1,11 +1,11 @@
-// A wing that its load twists: the rotation angle falls behind linearly along the span, in proportion to the normal force,
+// A wing that twists under load: the rotation angle falls behind linearly along the span, in proportion to the normal force,
 //   theta(r) = theta - twist F_N r / R
-// felt by the air at the centre of pressure r_cp, where the force of the whole wing is taken: effect on the mean. F_N > 0
-// pushes the trailing edge towards +x, which is to smaller theta on both sides. F_N is that of the untwisted wing: one step
-// of the fixed point, whose next is smaller by twist dF_N/dtheta, 0.05 at the typical size.
+// The air on the whole wing is evaluated with theta(r_cp), at the centre of pressure r_cp, so the effect is a mean. F_N > 0 pushes the trailing edge
+// towards +x, which reduces theta on both sides. F_N is that of the untwisted wing: one step of a fixed-point iteration, whose next step is smaller
+// by the factor twist dF_N/dtheta, 0.05 at the typical magnitude.
 // [1] Nakata, Liu, Aerodynamic performance of a hovering hawkmoth with flexible wings: a computational approach, Proc. R. Soc.
-//     B 279, 2012: passive twist, and what it does to force and efficiency. The linear law is ours.
-// Static deflection (the wing's own modes are far above the beat); turned by no more than 0.5 rad.
+//     B 279, 2012: passive twist, and its influence on force and efficiency. The linear law is ours.
+// Static deflection (the wing's own modes are far above the beat); the twist is limited to 0.5 rad.
 #pragma once
 
 #include "model/effects/effect.hpp"
@@ -20,7 +20,7 @@ struct WingFlexibility {
   template <int side, class T>
   static FLAPPY_INLINE void air(const T (&q)[1], const Surroundings<T>& s, const StateRows<T>&, WingWrench<T>& air) {
     const SideParameters<T>& p = of_side<side>(s.p);
-    const T at = p.span_to_pressure_m / of_side<side>(s.figures).wing_length_m;
+    const T at = p.span_to_pressure_m / of_side<side>(s.constants).wing_length_m;
     const T twist = clamp(T(q[0] * T(air.normal_force_N * at)), T(-0.5), T(0.5));
     const T theta = clamp(T(of_side<side>(s.x).rotation_rad - twist), T(-kLargestAngle_rad), T(kLargestAngle_rad));
     const WingFlow<T> f = flow<side>(s);

@@ -40,7 +40,7 @@ JobStatus status_of(const JobStatusMessage& m) {
   return {m.id, m.kind, m.config, m.state, static_cast<int>(m.attempts), m.exit_code, m.progress, m.message, m.folder};
 }
 
-/// A file's name as a server gives it: below a folder, whatever the server is.
+/// Checks a file name from the server, which need not be trusted. Throws io::InputError unless it stays below the folder.
 fs::path safe(const std::string& name) {
   fs::path path(name);
   const bool odd = name.empty() || path.is_absolute() ||
@@ -98,12 +98,12 @@ CommandResult CommandClient::ask(Command command) {
   put(m.kind, command.kind, "kind");
   put(m.config, command.config, "config");
   m.job = command.job;
-  std::vector<char[kMostOfOverride + 1]> overrides(command.overrides.size());
+  std::vector<char[kMaxOfOverride + 1]> overrides(command.overrides.size());
   for (std::size_t i = 0; i < overrides.size(); ++i) put(overrides[i], command.overrides[i], "--set");
   const auto count = static_cast<std::uint32_t>(overrides.size());
-  if (count > kMostOverrides)
+  if (count > kMaxOverrides)
     throw io::InputError("--set: is given " + std::to_string(count) + " times; accepted: at most " +
-                         std::to_string(kMostOverrides));
+                         std::to_string(kMaxOverrides));
   m.overrides = {count, count, overrides.data(), false};
   if (!command_.write(m)) throw io::InputError("the server takes nothing");
   return await(command.id, {});
@@ -148,7 +148,7 @@ std::size_t CommandClient::fetch(std::uint64_t job, const fs::path& folder,
     CommandResult r = ask(command);
     for (const double until_s = io::steady_seconds() + timeout_s_; !r.accepted && r.message.starts_with(kTooMany);) {
       if (io::steady_seconds() > until_s) break;
-      io::sleep_until(io::steady_seconds() + 0.2);  // one command for each file
+      io::sleep_until(io::steady_seconds() + 0.2);  // every file takes one command, so many files reach the rate limit
       r = ask(command);
     }
     if (!r.accepted) throw io::InputError(r.message);

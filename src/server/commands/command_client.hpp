@@ -1,4 +1,4 @@
-// Asks a server of jobs over DDS (command_server.hpp).
+// Sends commands to flappy-server over DDS (command_server.hpp).
 #pragma once
 
 #include <functional>
@@ -12,16 +12,17 @@ namespace flappy::server {
 
 class CommandClient {
  public:
-  /// io::InputError, here and below, where no server answers within the time.
+  /// Throws io::InputError where no server answers within `timeout_s`; so do ask, list and fetch.
   CommandClient(const io::DdsConfig& config, double timeout_s);
 
-  /// What the server says of it; its id is made here where it has none.
+  /// Sends a command and returns the server's answer. An empty id is replaced by a random one.
   CommandResult ask(Command command);
   /// All jobs, newest first.
   std::vector<JobStatus> list();
-  /// Jobs as they change, until `see` says false.
+  /// Calls `see` with each job that changes, until `see` or `keep_going` returns false.
   void watch(const std::function<bool(const JobStatus& job)>& see, const std::function<bool()>& keep_going);
-  /// Files of a job into a folder, under their names; how many. `see` is told of each before it comes.
+  /// Downloads the files of a job into `folder`, under their names, and returns their number. Calls `see` before each
+  /// download.
   std::size_t fetch(std::uint64_t job, const std::filesystem::path& folder,
                     const std::function<void(const JobFile&)>& see);
 
@@ -36,7 +37,7 @@ class CommandClient {
   Reader<JobStatusMessage> jobs_;
   Reader<FileChunk> files_;
   WaitSet waiting_;
-  std::vector<JobStatus> heard_;  // that nobody has looked at
+  std::vector<JobStatus> heard_;  // received, not yet passed on
 };
 
 }  // namespace flappy::server

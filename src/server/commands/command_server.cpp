@@ -13,9 +13,9 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kQueueLook{100};  // between looks at the queue
-constexpr std::size_t kMostTransfers = 16;
-constexpr double kMostOfSpeed_m_s = 100;  // beyond it, two poses are of two flights
+constexpr milliseconds kQueueLook{100};  // between updates from the queue
+constexpr std::size_t kMaxTransfers = 16;
+constexpr double kMaxOfSpeed_m_s = 100;  // at a higher speed, the two poses belong to different flights
 
 template <std::size_t kSize>
 void put(char (&to)[kSize], const std::string& from) {
@@ -26,7 +26,7 @@ void put(char (&to)[kSize], const std::string& from) {
 
 }  // namespace
 
-CommandServer::CommandServer(const io::DdsConfig& config, Commands& commands, Watched& watched)
+CommandServer::CommandServer(const io::DdsConfig& config, Commands& commands, LiveState& watched)
     : commands_(commands),
       watched_(watched),
       participant_(config),
@@ -40,7 +40,7 @@ CommandServer::CommandServer(const io::DdsConfig& config, Commands& commands, Wa
   state_.source = "/" + config.name_space;
   if (config.commands) {
     asked_.emplace(participant_, topic_name(config.name_space, 0, "command"),
-                   kPieces);  // who asks too fast waits, and is answered
+                   kPieces);  // no command is dropped: a client that sends too fast waits
     waiting_.add(asked_->entity());
   }
   thread_ = std::thread([this] { run(); });
@@ -61,7 +61,7 @@ void CommandServer::run() {
       looked_s = io::steady_seconds();
       show_changes(false);
       look();
-    } catch (const std::exception& e) {  // one that nobody sent; the queue goes on
+    } catch (const std::exception& e) {  // not the fault of a client; the queue goes on
       io::log(io::LogLevel::error, std::string("dds: ") + e.what());
       std::this_thread::sleep_for(kQueueLook);
     }
@@ -91,7 +91,7 @@ void CommandServer::answer(const Command& command) {
   results_.write(m);
 }
 
-/// The names of all files, or the pieces of one from now on.
+/// Sends the list of files, or begins the transfer of one file.
 CommandResult CommandServer::fetch(const Command& command) {
   CommandResult r{command.id, true, command.job, ""};
   try {
@@ -113,7 +113,7 @@ CommandResult CommandServer::fetch(const Command& command) {
     const auto found = std::ranges::find(files, command.config, &JobFile::name);
     if (found == files.end())
       throw io::InputError("file: \"" + shown(command.config) + "\" is none of job " + std::to_string(command.job));
-    if (transfers_.size() >= kMostTransfers)
+    if (transfers_.size() >= kMaxTransfers)
       throw io::InputError("too many files at a time; accepted: the same one later");
     transfers_.push_back({command.id, command.job, found->bytes, 0, found->name});
     r.message = found->name + ": " + std::to_string(found->bytes) + " bytes";
@@ -124,7 +124,7 @@ CommandResult CommandServer::fetch(const Command& command) {
   return r;
 }
 
-/// One piece of each file that is on its way, so that nobody waits for another's checkpoint.
+/// Sends one piece of each transfer in turn, so that no client waits for another's checkpoint.
 void CommandServer::send_pieces() {
   for (std::size_t k = transfers_.size(); k > 0; --k) {
     Transfer t = transfers_.front();
@@ -132,9 +132,9 @@ void CommandServer::send_pieces() {
     std::string data;
     try {
       data = commands_.chunk(t.job, t.name, t.offset);
-    } catch (const io::InputError&) {  // it is gone: the last piece comes too early, which its receiver sees
+    } catch (const io::InputError&) {  // the file is gone: its last piece comes too early, which the client notices
     }
-    data.resize(std::min<std::uint64_t>(data.size(), t.size - t.offset));  // a file may grow meanwhile
+    data.resize(std::min<std::uint64_t>(data.size(), t.size - t.offset));  // the file may grow meanwhile
     FileChunk m{};
     put(m.id, t.id);
     m.job = t.job;
@@ -142,7 +142,7 @@ void CommandServer::send_pieces() {
     m.size = t.size;
     m.offset = t.offset;
     const std::uint64_t after = t.size - t.offset - data.size();
-    m.left = data.empty() ? 0 : static_cast<std::uint32_t>((after + kMostOfChunk - 1) / kMostOfChunk);
+    m.left = data.empty() ? 0 : static_cast<std::uint32_t>((after + kMaxOfChunk - 1) / kMaxOfChunk);
     const auto size = static_cast<std::uint32_t>(data.size());
     m.data = {size, size, reinterpret_cast<std::uint8_t*>(data.data()), false};
     const bool sent = files_.write(m);
@@ -174,7 +174,7 @@ void CommandServer::show_changes(bool all) {
   shown_ = std::move(jobs);
 }
 
-/// What the watched flapper's topics say.
+/// Updates the live state from the topics of the watched flapper; the velocity is the difference of two poses.
 void CommandServer::look() {
   bool any = false;
   imu_.take([&](const Imu& m, const dds_sample_info_t&) {
@@ -186,7 +186,7 @@ void CommandServer::look() {
     const std::array<double, 3> p{m.pose.position.x, m.pose.position.y, m.pose.position.z};
     for (std::size_t i = 0; i < 3; ++i) {
       const double v = (p[i] - state_.position_m[i]) / passed_s;
-      state_.v_WB_W_m_s[i] = std::abs(v) < kMostOfSpeed_m_s ? v : 0;
+      state_.v_WB_W_m_s[i] = std::abs(v) < kMaxOfSpeed_m_s ? v : 0;
     }
     state_.t_s = t_s;
     state_.position_m = p;

@@ -1,12 +1,12 @@
-// The queue of jobs over DDS. All topics are reliable; strings are bounded by their types.
+// Serves the queue of jobs over DDS. All topics are reliable; their types bound every string.
 //
-//   /flappy/jobs             JobStatus       each job when it changes, and all of them upon "list"
-//   /flappy/command          Command         taken, where commands are; pieces of a file are asked for by verb "fetch": config is its
-//                                            name below the job's folder, nothing asks for the names
-//   /flappy/command_result   CommandResult   in answer to every command; of "list", job is how many JobStatus came
-//   /flappy/files            FileChunk       in answer to "fetch"
+//   /flappy/jobs             JobStatus       each job when it changes, and all jobs after the command "list"
+//   /flappy/command          Command         subscribed where commands are enabled; for "fetch", config names a file below the job's folder,
+//                                            and an empty config asks for the list of files
+//   /flappy/command_result   CommandResult   answer to every command; for "list", job is the number of JobStatus sent
+//   /flappy/files            FileChunk       answer to "fetch"
 //
-// A client's rate is counted by its process, whatever id it gives its commands.
+// Rates are limited per client process, whatever ids its commands have.
 #pragma once
 
 #include <atomic>
@@ -17,14 +17,14 @@
 
 #include "server/dds/participant.hpp"
 #include "server/jobs/commands.hpp"
-#include "server/watched.hpp"
+#include "server/live_state.hpp"
 
 namespace flappy::server {
 
 class CommandServer {
  public:
-  /// Answers from now on, in a thread of its own; shows who looks at the watched flapper what its topics say.
-  CommandServer(const io::DdsConfig& config, Commands& commands, Watched& watched);
+  /// Starts to answer, in a thread of its own. Also sets `watched` from the topics of the watched flapper.
+  CommandServer(const io::DdsConfig& config, Commands& commands, LiveState& watched);
   ~CommandServer();
 
  private:
@@ -43,10 +43,10 @@ class CommandServer {
   void look();
 
   Commands& commands_;
-  Watched& watched_;
+  LiveState& watched_;
   Participant participant_;
   Writer<JobStatusMessage> jobs_;
-  std::optional<Reader<CommandMessage>> asked_;  // where commands are taken
+  std::optional<Reader<CommandMessage>> asked_;  // empty where commands are disabled
   Writer<CommandResultMessage> results_;
   Writer<FileChunk> files_;
   Reader<PoseStamped> pose_;
@@ -55,9 +55,9 @@ class CommandServer {
   WaitSet waiting_;
   std::map<std::uint64_t, JobStatus> shown_;
   std::deque<Transfer> transfers_;
-  WatchedState state_;
+  ShownState state_;
   std::atomic<bool> over_ = false;
-  std::thread thread_;  // last: it uses the others
+  std::thread thread_;  // last member, because the thread uses the others
 };
 
 }  // namespace flappy::server

@@ -1,4 +1,4 @@
-// Messages on the wire, by the names that ROS 2 has for them. idlc writes the structs of src/server/idl.
+// Short names of the DDS message structs, which idlc generates from src/server/idl.
 #pragma once
 
 #include <flappy_msgs.h>
@@ -53,12 +53,12 @@ FLAPPY_MESSAGE(FileChunk, flappy_msgs_msg_dds__FileChunk_)
 FLAPPY_MESSAGE(CommandResultMessage, flappy_msgs_msg_dds__CommandResult_)
 #undef FLAPPY_MESSAGE
 
-/// "sensor_msgs/msg/Imu" of "sensor_msgs::msg::dds_::Imu_".
+/// Turns "sensor_msgs::msg::dds_::Imu_" into "sensor_msgs/msg/Imu".
 std::string ros_name(const std::string& dds_name);
-/// Seconds as ROS 2 has them: whole nanoseconds, rounded.
+/// Converts seconds to whole nanoseconds, rounded.
 Time time_of(double t_s);
 double seconds_of(const Time& t);
-/// Of the wall clock: what belongs to no flight.
+/// Wall-clock time, for messages that belong to no flight.
 Time now();
 
 }  // namespace flappy::server

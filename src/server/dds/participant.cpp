@@ -17,11 +17,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// ROS 2 processes that do not use multicast ask the first so many ports of a machine, and take one of them.
-constexpr int kMostParticipants = 99;
-/// Messages on their way where none may be dropped.
-constexpr std::int32_t kMostKept = 64;
-/// A reliable reader that does not take what it is sent stops us no longer than this.
+/// ROS 2 processes without multicast probe this many ports of a machine, and each of them uses one.
+constexpr int kMaxParticipants = 99;
+/// Most samples that are kept where none may be dropped.
+constexpr std::int32_t kMaxKept = 64;
+/// The longest time for which a slow reliable reader may block write().
 constexpr dds_duration_t kBlocks = DDS_MSECS(100);
 
 struct QosDeleter {
@@ -35,7 +35,7 @@ Qos qos_of(const Quality& quality, const std::string& user_data) {
   dds_qset_durability(q.get(), quality.kept ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   if (quality.depth == kAllOfIt) {
     dds_qset_history(q.get(), DDS_HISTORY_KEEP_ALL, 0);
-    dds_qset_resource_limits(q.get(), kMostKept, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+    dds_qset_resource_limits(q.get(), kMaxKept, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   } else {
     dds_qset_history(q.get(), DDS_HISTORY_KEEP_LAST, quality.depth);
   }
@@ -45,11 +45,11 @@ Qos qos_of(const Quality& quality, const std::string& user_data) {
   return q;
 }
 
-/// What DDS Security is to be told, of an enclave's files.
+/// Configures DDS Security with the files of an enclave. Throws InputError where one is missing.
 void secure(dds_qos_t* q, const fs::path& keys) {
   const auto file = [&](const char* property, const char* name) {
     const fs::path path = keys / name;
-    io::read_text(path);  // says so where it is missing
+    io::read_text(path);  // throws where it is missing
     dds_qset_prop(q, property, ("file:" + fs::absolute(path).string()).c_str());
   };
   file("dds.sec.auth.identity_ca", "identity_ca.cert.pem");
@@ -69,13 +69,13 @@ void secure(dds_qos_t* q, const fs::path& keys) {
   plugin("access", "dds_security_ac", "access_control");
 }
 
-/// What Cyclone DDS says, a line a second at most: a stranger's malformed packets would fill the log, a line each.
+/// Logs Cyclone DDS's messages, at most one a second: otherwise malformed packets of a stranger would fill the log.
 void hear_cyclone() {
   static std::mutex mutex;
   static io::CalmLog log;
   const auto sink = [](void*, const dds_log_data_t* said) {
     std::string line = said->message;
-    if (line.find("is not multicast-capable") != std::string::npos) return;  // as the loopback interface is not
+    if (line.find("is not multicast-capable") != std::string::npos) return;  // expected for the loopback interface
     while (line.ends_with('\n')) line.pop_back();
     const std::lock_guard lock(mutex);
     log.warn("dds: " + line.substr(0, 300), io::steady_seconds());
@@ -84,8 +84,8 @@ void hear_cyclone() {
   std::call_once(once, [&] { dds_set_log_sink(sink, nullptr); });
 }
 
-/// The domain of a configuration, told how to find others by the first participant of this process in it. One that is made so does
-/// not read CYCLONEDDS_URI.
+/// The domain of a configuration. The first participant of this process in it creates the domain with cyclone_xml(); a domain that is created
+/// this way does not read CYCLONEDDS_URI.
 std::shared_ptr<const Entity> domain_of(const io::DdsConfig& c) {
   static std::mutex mutex;
   static std::map<int, std::weak_ptr<const Entity>> domains;
@@ -98,12 +98,12 @@ std::shared_ptr<const Entity> domain_of(const io::DdsConfig& c) {
   return domain;
 }
 
-/// Topics of ROS 2 are "rt" and the name.
+/// The DDS name of a ROS 2 topic is "rt" and its name.
 Entity make_topic(const Participant& p, const dds_topic_descriptor_t& type, const std::string& name) {
   return {dds_create_topic(p.get(), &type, ("rt" + name).c_str(), nullptr, nullptr), name};
 }
 
-/// The type's hash, by which ROS 2 knows it from Iron on.
+/// User data of a reader or writer: the hash by which ROS 2, from Iron on, identifies the type.
 std::string user_data(const dds_topic_descriptor_t& type) {
   using namespace flightlog::ros;
   return "typehash=" + type_hash(*standard_messages().layout(ros_name(type.m_typename))) + ";";
@@ -154,9 +154,9 @@ Entity::~Entity() {
 std::string cyclone_xml(const io::DdsConfig& c) {
   if (c.from_environment) return "";
   std::string interfaces, general, peers;
-  // an interface without multicast makes Cyclone DDS ask ports one by one, of which others then take the first, too
+  // on an interface without multicast, Cyclone DDS probes ports one by one; so we have to use the first free ports, too
   const std::string ports = "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>" +
-                            std::to_string(kMostParticipants) + "</MaxAutoParticipantIndex>";
+                            std::to_string(kMaxParticipants) + "</MaxAutoParticipantIndex>";
   switch (c.reach) {
     case io::Reach::loopback:
       interfaces = "<NetworkInterface address=\"127.0.0.1\"/>";

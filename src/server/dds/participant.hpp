@@ -1,4 +1,4 @@
-// Cyclone DDS as ROS 2 uses it: names, quality of service, type hashes. What fails here is the user's network or keys: InputError.
+// Cyclone DDS used as ROS 2 uses it: names, quality of service, type hashes. Failures are caused by the user's network or keys: InputError.
 #pragma once
 
 #include <dds/dds.h>
@@ -17,27 +17,27 @@
 
 namespace flappy::server {
 
-/// As ROS 2 expects of a topic: what its subscriptions of that kind match.
+/// Quality of service of a topic, chosen so that ROS 2's usual subscriptions of such a topic match.
 struct Quality {
-  bool reliable, kept;  ///< kept: late joiners get the last `depth`
-  int depth;            ///< kAllOfIt: nothing is dropped, and a writer waits for who is slow
+  bool reliable, kept;  ///< kept: readers that join late get the last `depth` messages
+  int depth;            ///< kAllOfIt: nothing is dropped, and a writer waits for slow readers
 };
 inline constexpr int kAllOfIt = 0;
 inline constexpr Quality kSensorData{false, false, 5}, kReliable{true, false, 10}, kLatched{true, true, 1};
-/// What both ends of a conversation offer and ask for.
+/// For commands, their results and files: server and client use the same quality.
 inline constexpr Quality kAnswers{true, false, 1000}, kPieces{true, false, kAllOfIt};
 
-/// "/flappy/pose" of the first flapper, "/flappy_3/pose" of the fourth.
+/// For example "/flappy/pose" for slot 0 and "/flappy_3/pose" for slot 3.
 std::string topic_name(const std::string& name_space, std::size_t slot, const std::string& name);
 
-/// What Cyclone DDS is told of interfaces and peers; empty where the environment alone says it.
+/// Cyclone DDS's XML configuration of interfaces and peers; empty where the environment configures it.
 std::string cyclone_xml(const io::DdsConfig& config);
 
-/// An entity of Cyclone DDS, and what it holds goes with it.
+/// Owns an entity of Cyclone DDS; deletes it together with the entities that it contains.
 class Entity {
  public:
   Entity() = default;
-  /// InputError "what: the reason" for a handle that is an error.
+  /// Throws InputError "dds: what: reason" where `handle` is an error code.
   Entity(dds_entity_t handle, const std::string& what);
   ~Entity();
   Entity(Entity&& other) noexcept : handle_(std::exchange(other.handle_, 0)) {}
@@ -51,28 +51,28 @@ class Entity {
   dds_entity_t handle_ = 0;
 };
 
-/// One process in a domain. It outlives its writers and readers.
+/// This process as a participant of a DDS domain. It must outlive its writers and readers.
 class Participant {
  public:
   explicit Participant(const io::DdsConfig& config);
   dds_entity_t get() const { return participant_.get(); }
 
  private:
-  std::shared_ptr<const Entity> domain_;  // of all participants of this process in it
+  std::shared_ptr<const Entity> domain_;  // shared by all participants of this process in that domain
   Entity participant_;
 };
 
 namespace detail {
-/// `name` as ROS 2 writes it: "/flappy/pose".
+/// `name` is the ROS 2 name, such as "/flappy/pose".
 Entity make_writer(const Participant&, const dds_topic_descriptor_t&, const std::string& name, const Quality&);
 Entity make_reader(const Participant&, const dds_topic_descriptor_t&, const std::string& name, const Quality&);
 bool write(const Entity&, const void* message);
 std::size_t matched(const Entity&, bool writer);
-/// Calls see for each message, oldest first.
+/// Takes all messages that have arrived, oldest first; returns their number.
 std::size_t take(const Entity&, const std::function<void(const void*, const dds_sample_info_t&)>& see);
 }  // namespace detail
 
-/// The process that wrote a message that a reader took, as DDS knows it; empty where it is gone.
+/// Identifies the participant that wrote a message, by its DDS key in hexadecimal; empty where it is gone.
 std::string writer_of(const Entity& reader, const dds_sample_info_t& info);
 
 template <class M>
@@ -80,7 +80,8 @@ class Writer {
  public:
   Writer(const Participant& p, const std::string& name, const Quality& quality)
       : writer_(detail::make_writer(p, descriptor<M>(), name, quality)) {}
-  /// False where it could not be handed over in time; text and lists that `message` points to are copied.
+  /// Copies the message with the text and lists that it points to. Returns false where it could not be handed over
+  /// within 0.1 s.
   bool write(const M& message) const { return detail::write(writer_, &message); }
   std::size_t readers() const { return detail::matched(writer_, true); }
   const Entity& entity() const { return writer_; }
@@ -94,7 +95,8 @@ class Reader {
  public:
   Reader(const Participant& p, const std::string& name, const Quality& quality)
       : reader_(detail::make_reader(p, descriptor<M>(), name, quality)) {}
-  /// Hands out what has arrived; `see(message, info)` must copy what it keeps. Returns how many there were.
+  /// Calls `see(message, info)` for each message that has arrived and returns their number. `see` must copy what it
+  /// keeps.
   std::size_t take(const auto& see) const {
     return detail::take(reader_, [&](const void* m, const dds_sample_info_t& i) { see(*static_cast<const M*>(m), i); });
   }
@@ -105,12 +107,12 @@ class Reader {
   Entity reader_;
 };
 
-/// Waits until any of some readers has something to take.
+/// Waits until one of several readers has a message to take.
 class WaitSet {
  public:
   explicit WaitSet(const Participant& p);
   void add(const Entity& reader);
-  /// False after the time.
+  /// Returns false where none arrived within `at_most`.
   bool wait(std::chrono::nanoseconds at_most) const;
 
  private:

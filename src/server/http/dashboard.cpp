@@ -15,8 +15,8 @@
 #include "server/http/listener.hpp"
 #include "server/http/web.hpp"
 #include "server/jobs/commands.hpp"
-#include "server/jobs/kinds.hpp"
-#include "server/jobs/minder.hpp"
+#include "server/jobs/job_types.hpp"
+#include "server/jobs/supervisor.hpp"
 
 namespace flappy::server {
 namespace {
@@ -27,11 +27,11 @@ using httplib::Response;
 using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kJobs = 200, kLogBytes = 32'768, kCurveBytes = 4'000'000, kCurvePoints = 500;
-constexpr std::size_t kThreads = 6;  // that answer besides the streams
+constexpr std::size_t kThreads = 6;  // in addition to one for each stream of /events
 constexpr std::chrono::milliseconds kEventEvery{100};
 constexpr double kHeartbeat_s = 10;
 
-/// Nothing but our own files, and nothing inline.
+/// The page may load this server's own files only, and no inline script or style.
 const httplib::Headers kHeaders = {
     {"Content-Security-Policy",
      "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; object-src 'none'"},
@@ -50,7 +50,7 @@ void answer(Response& response, const Json& json) {
   response.set_content(json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n", "application/json");
 }
 
-/// "127.0.0.1:8080", "[::1]:8080"
+/// Splits "127.0.0.1:8080" or "[::1]:8080" into address and port.
 std::pair<std::string, int> split_address(const std::string& listen) {
   const std::size_t colon = listen.rfind(':');
   const std::string port = colon == std::string::npos ? "" : listen.substr(colon + 1);
@@ -67,7 +67,7 @@ std::string lower(std::string text) {
   return text;
 }
 
-/// What a Host header names: without port, without brackets.
+/// The host of a Host header in lower case, without port and brackets.
 std::string host_of(const std::string& header) {
   const std::size_t colon = header.rfind(':');
   const bool port =
@@ -92,7 +92,7 @@ Json json_of(const Job& job) {
           {"ended_s", job.ended_s}};
 }
 
-Json json_of(const std::optional<WatchedState>& state) {
+Json json_of(const std::optional<ShownState>& state) {
   if (!state) return nullptr;
   return {{"source", state->source},
           {"t_s", state->t_s},
@@ -103,7 +103,7 @@ Json json_of(const std::optional<WatchedState>& state) {
           {"battery_V", state->battery_V ? Json(*state->battery_V) : Json(nullptr)}};
 }
 
-/// What a training has recorded so far, thinned to what a screen shows.
+/// The training curve from the end of metrics.jsonl, thinned to at most kCurvePoints points.
 Json curve_of(const fs::path& run) {
   const std::string text = tail_of(run / "metrics.jsonl", kCurveBytes);
   std::vector<Json> records;
@@ -124,7 +124,7 @@ Json curve_of(const fs::path& run) {
 }  // namespace
 
 struct Dashboard::Parts {
-  Parts(const Queue& its_queue, const Watched& its_watched, const ServerConfig& config)
+  Parts(const Queue& its_queue, const LiveState& its_watched, const ServerConfig& config)
       : queue(its_queue),
         watched(its_watched),
         output(config.jobs.folders.output),
@@ -138,7 +138,7 @@ struct Dashboard::Parts {
   void stream_events(Response& response);
 
   const Queue& queue;
-  const Watched& watched;
+  const LiveState& watched;
   fs::path output;
   int most_streams;
   std::set<std::string> hosts;
@@ -155,7 +155,7 @@ void Dashboard::Parts::route() {
       answer(response, status, line);
       return httplib::Server::HandlerResponse::Handled;
     };
-    // a page from elsewhere may have led a browser here under its own name
+    // against DNS rebinding: a foreign page may have led the browser here under a name of its own
     if (request.get_header_value_count("Host") != 1 || !hosts.contains(host_of(request.get_header_value("Host"))))
       return refuse(421, "Host: is not this server's; accepted: localhost, its address, http.hosts");
     if (request.method != "GET" && request.method != "HEAD") {
@@ -222,7 +222,7 @@ void Dashboard::Parts::route() {
   listener.Get("/events", [this](const Request&, Response& response) { stream_events(response); });
 }
 
-/// One thread for each client that follows, so there are few.
+/// Every client of /events occupies a thread, so their number is limited.
 void Dashboard::Parts::stream_events(Response& response) {
   if (streams.fetch_add(1) >= most_streams) {
     --streams;
@@ -260,7 +260,7 @@ void Dashboard::Parts::stream_events(Response& response) {
       [this](bool) { --streams; });
 }
 
-Dashboard::Dashboard(const Queue& queue, const Watched& watched, const ServerConfig& config)
+Dashboard::Dashboard(const Queue& queue, const LiveState& watched, const ServerConfig& config)
     : parts_(std::make_unique<Parts>(queue, watched, config)) {
   auto [host, port] = split_address(config.http.listen);
   parts_->hosts.insert(lower(host));
@@ -277,7 +277,7 @@ Dashboard::Dashboard(const Queue& queue, const Watched& watched, const ServerCon
 
 Dashboard::~Dashboard() {
   parts_->over = true;
-  // stop() has no effect on a listener that is about to begin
+  // stop() has no effect before the listener runs
   while (!parts_->listener.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   parts_->listener.stop();
   parts_->thread.join();

@@ -1,12 +1,13 @@
-// A page that shows queue, curves, logs and the watched flapper. Read only: no request changes anything.
+// A web page that shows the queue, training curves, logs and the live state. Read only: no request changes anything.
 //
-//   GET /                       the page; page.css, page.js and what it imports; three.min.js
+//   GET /                       the page; also page.css, icon.svg, page.js with its imports, three.min.js
 //   GET /api/jobs               the newest jobs, newest first
-//   GET /api/jobs/ID/curve      {"update": [...], "success_rate": [...], "return_mean": [...]} of a training
-//   GET /api/jobs/ID/log        the last lines of its log
-//   GET /api/jobs/ID/history    the states that it came to
-//   GET /api/watched            the watched flapper's state, or null
-//   GET /events                 server-sent events: "jobs" when the queue has changed, "watched" with the state
+//   GET /api/jobs/ID/curve      {"update": [...], "success_rate": [...], "return_mean": [...]} of a training job
+//   GET /api/jobs/ID/log        the last lines of the job's log
+//   GET /api/jobs/ID/files      [{"name", "bytes"}, ...]: the files of the job's folder
+//   GET /api/jobs/ID/history    [{"time_s", "state", "attempt", "why"}, ...]: the states that the job came to
+//   GET /api/watched            the live state, or null
+//   GET /events                 server-sent events: "jobs" when the queue changed, "watched" with the live state
 #pragma once
 
 #include <memory>
@@ -14,21 +15,22 @@
 
 #include "server/jobs/queue.hpp"
 #include "server/jobs/server_config.hpp"
-#include "server/watched.hpp"
+#include "server/live_state.hpp"
 
 namespace flappy::server {
 
-inline constexpr std::size_t kMostOfRequest = 16'384;  ///< bytes of a request, headers included
+inline constexpr std::size_t kMaxOfRequest = 16'384;  ///< bytes of a request, including its headers
 
 class Dashboard {
  public:
-  /// Listens from now on, in threads of its own. io::InputError where it cannot.
-  Dashboard(const Queue& queue, const Watched& watched, const ServerConfig& config);
+  /// Starts to listen, in threads of its own. Throws io::InputError where config.http.listen is malformed or cannot be
+  /// bound.
+  Dashboard(const Queue& queue, const LiveState& watched, const ServerConfig& config);
   ~Dashboard();
   Dashboard(const Dashboard&) = delete;
   Dashboard& operator=(const Dashboard&) = delete;
 
-  /// As "127.0.0.1:8080": with the port that port 0 became.
+  /// ADDRESS:PORT, such as "127.0.0.1:8080"; if port 0 was configured, the port that the system assigned.
   const std::string& address() const { return address_; }
 
  private:

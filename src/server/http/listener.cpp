@@ -24,7 +24,7 @@ class PatientStream : public httplib::Stream {
       : socket_(socket), patience_s_(patience_s), until_s_(io::steady_seconds() + patience_s) {}
 
   bool is_readable() const override { return wait(POLLIN, until_s_); }
-  /// False, too, once the client is gone.
+  /// Also false once the client has closed the connection.
   bool is_writable() const override {
     char byte = 0;
     const ssize_t count = recv(socket_, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
@@ -67,10 +67,10 @@ class PatientStream : public httplib::Stream {
 
   socket_t socket_;
   double patience_s_, until_s_;
-  std::size_t left_ = kMostOfRequest;
+  std::size_t left_ = kMaxOfRequest;
 };
 
-/// What the client still sends is taken away, or it would not see the answer.
+/// Discards what the client still sends; otherwise closing would reset the connection and the client might not see the answer.
 void close_after_answer(socket_t socket) {
   shutdown(socket, SHUT_WR);
   std::array<char, 4096> rest;
@@ -123,7 +123,7 @@ void BoundedPool::work() {
 
 Listener::Listener(std::size_t threads, double patience_s) : patience_s_(patience_s) {
   new_task_queue = [threads] { return new BoundedPool(threads, kWaiting); };  // httplib deletes it
-  // httplib would share the port with whoever asks
+  // httplib's default would share the port with any other process that asks
   set_socket_options([](socket_t socket) {
     const int yes = 1;
     setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);

@@ -1,5 +1,5 @@
-// cpp-httplib's server, but for what it leaves open: a client that is slow with its request, or with taking the answer, is cut off;
-// connections that nobody has time for are closed rather than kept; one request is answered on each.
+// cpp-httplib's server with limits that it lacks: a client that is slow to send its request or to take the answer is cut off; connections beyond
+// the capacity are closed instead of kept; each connection serves one request.
 #pragma once
 
 #include <httplib.h>
@@ -12,7 +12,7 @@
 
 namespace flappy::server {
 
-/// Runs calls on so many threads, and lets so many wait. What comes beyond is called at once, with turned_away() true.
+/// Runs calls on `threads` threads and queues up to `waiting` more. Further calls run at once in the caller, with turned_away() true.
 class BoundedPool : public httplib::TaskQueue {
  public:
   BoundedPool(std::size_t threads, std::size_t waiting);
@@ -33,9 +33,10 @@ class BoundedPool : public httplib::TaskQueue {
 
 class Listener : public httplib::Server {
  public:
-  /// `threads` answer at a time. A request has to come, and each piece of an answer to be taken, within `patience_s`.
+  /// Up to `threads` requests are answered at a time. A whole request has to arrive, and each piece of an answer to be
+  /// taken, within `patience_s`.
   Listener(std::size_t threads, double patience_s);
-  /// Lets more than httplib's five arrive at once. Once it is bound.
+  /// Raises the backlog of connections from httplib's 5 to 128. Call it once the listener is bound.
   void widen();
 
  private:

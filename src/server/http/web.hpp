@@ -1,4 +1,4 @@
-// The files of the dashboard's page, as they stand in src/server/http/web, and what it shares with src/view/web: put into the program when it is built.
+// The files of the dashboard's page (src/server/http/web and parts of src/view/web), embedded in the program when it is built.
 #pragma once
 
 #include <map>
@@ -6,7 +6,7 @@
 
 namespace flappy::server {
 
-/// Text by the file's name.
+/// [file name] text of the file.
 extern const std::map<std::string_view, std::string_view> kWeb;
 
 }  // namespace flappy::server

@@ -1,4 +1,4 @@
-// Where attempts of jobs run: on this machine, or wherever Slurm puts them.
+// Backends run the attempts of jobs: on this machine, or on the nodes that Slurm assigns.
 #pragma once
 
 #include <filesystem>
@@ -17,20 +17,21 @@ enum class Life { alive, gone, unknown };
 class Backend {
  public:
   virtual ~Backend() = default;
-  /// Starts the minder of a job that the queue has as running, in the job's folder, which `lock` holds; the queue is told what is known of
-  /// it. std::system_error or io::InputError where that fails.
+  /// Starts the supervisor of `job`, which the queue has as running, in `folder`; the supervisor inherits `lock`. Tells
+  /// the queue the process or the Slurm job that runs it. Throws std::system_error or io::InputError where the start
+  /// fails.
   virtual void start(Queue& queue, const Job& job, const std::filesystem::path& folder,
-                     const std::vector<std::string>& minder, const JobLock& lock) = 0;
-  /// Of an attempt that this server or one before it started.
+                     const std::vector<std::string>& supervisor, const JobLock& lock) = 0;
+  /// Whether the last attempt of `job` still runs; this server or an earlier one may have started it.
   virtual Life look(Queue& queue, const Job& job, const std::filesystem::path& folder) = 0;
-  /// Asks the program to stop cleanly, or kills it. False where it cannot be reached yet.
+  /// Asks the program to stop cleanly, or kills it. Returns false where it cannot be reached yet.
   virtual bool stop(const Job& job, bool kill) = 0;
-  /// Whether its jobs end with the server, and with the machine.
+  /// Whether its jobs run on this machine, so that they end with the server and with the machine.
   virtual bool is_local() const = 0;
 };
 
 std::unique_ptr<Backend> local_backend();
-/// `queue`: the name that tells its jobs from those of another queue in the same Slurm.
+/// `queue`: Queue::name(), which tells its jobs from those of another queue in the same Slurm.
 std::unique_ptr<Backend> slurm_backend(const std::string& queue, const JobsConfig& config);
 
 }  // namespace flappy::server

@@ -1,5 +1,5 @@
-// What clients may ask of the queue, whatever brings it here. Every string is bounded, rates are limited, and every command is answered; a
-// refusal is besides a line in the log.
+// Commands of clients to the queue, independent of the transport that delivers them. Every string is bounded, rates are limited, and every
+// command is answered. A refusal is also logged, at most once a second.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "io/log.hpp"
-#include "server/jobs/kinds.hpp"
+#include "server/jobs/job_types.hpp"
 #include "server/jobs/queue.hpp"
 #include "server/jobs/rate_limit.hpp"
 #include "server/jobs/server_config.hpp"
@@ -16,25 +16,24 @@
 namespace flappy::server {
 
 struct Command {
-  std::string id;            ///< the client's own; submitted twice, it is one job
-  std::string client;        ///< who sends it: whose rate it counts against
+  std::string id;            ///< chosen by the client; the same id submitted twice is one job
+  std::string client;        ///< the sender, whose rate limit applies
   std::string verb;          ///< submit, list, pause, resume, cancel, fetch
-  std::string kind, config;  ///< of submit
-  std::uint64_t job = 0;     ///< of pause, resume, cancel, fetch
+  std::string kind, config;  ///< for submit
+  std::uint64_t job = 0;     ///< for pause, resume, cancel, fetch
   std::vector<std::string> overrides;
 };
 
-/// Where a client came too often: the same command is accepted later.
+/// Begins the message of a refusal by the rate limit; the client may send the same command again later.
 inline constexpr const char* kTooMany = "too many commands at a time";
 
 struct CommandResult {
-  std::string id;  ///< of the command
+  std::string id;  ///< id of the command
   bool accepted = false;
   std::uint64_t job = 0;
-  std::string message;  ///< what was done, or why not, in one line
+  std::string message;  ///< one line: the action taken, or the reason of the refusal
 };
 
-/// A job as clients see it.
 struct JobStatus {
   std::uint64_t id = 0;
   std::string kind, config, state;
@@ -45,29 +44,31 @@ struct JobStatus {
 };
 JobStatus status_of(const Job& job);
 
-/// A file that a job left, by its name below the job's folder.
+/// A file in a job's folder.
 struct JobFile {
   std::string name;
   std::uint64_t bytes = 0;
 };
-inline constexpr std::size_t kMostFiles = 10'000, kMostOfChunk = 65'536, kMostListed = 1000;
-/// The files of a job's folder by name, links left out; at most kMostFiles.
+inline constexpr std::size_t kMaxFiles = 10'000, kMaxOfChunk = 65'536, kMaxListed = 1000;
+/// Lists the regular files below `folder`, sorted by name, without symbolic links; at most kMaxFiles.
 std::vector<JobFile> files_of(const std::filesystem::path& folder);
 
-/// Any thread may call it.
+/// Checks and executes commands. Thread-safe.
 class Commands {
  public:
   Commands(Queue& queue, const ServerConfig& config, std::filesystem::path programs,
-           std::vector<Kind> kinds = server::kinds());
+           std::vector<JobType> kinds = server::job_types());
 
-  /// Never throws for what a client sent. list and fetch are accepted here, and answered by what follows.
+  /// Never throws because of what a client sent. list and fetch are only accepted here; the caller then answers them
+  /// with the functions below.
   CommandResult execute(const Command& command);
 
-  /// The newest kMostListed ones, newest first.
+  /// The newest kMaxListed jobs, newest first.
   std::vector<JobStatus> statuses() const;
-  /// io::InputError where there is no such job.
+  /// Throws io::InputError where there is no such job.
   std::vector<JobFile> files(std::uint64_t job) const;
-  /// At most kMostOfChunk bytes from `offset` on; none at the end. io::InputError for a name that is none of files().
+  /// Reads at most kMaxOfChunk bytes from `offset` on; empty at the end. Throws io::InputError where `file` is not a
+  /// file below the job's folder.
   std::string chunk(std::uint64_t job, const std::string& file, std::uint64_t offset) const;
 
  private:
@@ -78,8 +79,8 @@ class Commands {
   Queue& queue_;
   JobsConfig config_;
   std::filesystem::path programs_;
-  std::vector<Kind> kinds_;
-  std::mutex mutex_;  ///< of what follows
+  std::vector<JobType> kinds_;
+  std::mutex mutex_;  ///< guards limit_ and log_
   RateLimit limit_;
   io::CalmLog log_;
 };

@@ -16,7 +16,7 @@ namespace {
     case SQLITE_NOTADB:
     case SQLITE_CORRUPT:
       throw io::InputError(name + ": is no sound queue: " + what + "; accepted: a queue that flappy-server left");
-    case SQLITE_BUSY:  // somebody else writes to it, and does not end
+    case SQLITE_BUSY:  // another process holds its lock for too long
     case SQLITE_CANTOPEN:
     case SQLITE_FULL:
     case SQLITE_IOERR:
@@ -78,7 +78,7 @@ Database::Database(const std::filesystem::path& file) : name_(file.string()) {
     if (sqlite3_open_v2(name_.c_str(), &database_, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX,
                         nullptr) != SQLITE_OK)
       fail(database_, name_);
-    sqlite3_busy_timeout(database_, 5000);  // somebody may look with sqlite3
+    sqlite3_busy_timeout(database_, 5000);  // wait for a person who looks at it with sqlite3
     run("PRAGMA journal_mode = WAL");
     run("PRAGMA synchronous = FULL");
     run("PRAGMA foreign_keys = ON");
@@ -104,7 +104,7 @@ Transaction::~Transaction() {
   if (!open_) return;
   try {
     database_.run("ROLLBACK");
-  } catch (const std::exception&) {  // a full disk may have rolled back itself
+  } catch (const std::exception&) {  // SQLite may have rolled back already, for example on a full disk
   }
 }
 

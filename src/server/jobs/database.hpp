@@ -1,4 +1,4 @@
-// SQLite behind three small types. What the file or its disk is at fault for is io::InputError, which names the file.
+// SQLite behind three small types. Faults of the file or its disk throw io::InputError, which names the file; others std::runtime_error.
 #pragma once
 
 #include <concepts>
@@ -19,16 +19,16 @@ class Statement {
   Statement(const Statement&) = delete;
   Statement& operator=(const Statement&) = delete;
 
-  /// Values for the places in the text, in their order.
+  /// Binds `values` to the placeholders of the statement, in their order.
   template <class... Values>
   Statement& bind(const Values&... values) {
     int place = 0;
     (bind_one(++place, values), ...);
     return *this;
   }
-  /// Whether there is a row more.
+  /// Advances to the next row; false at the end.
   bool step();
-  /// For a statement without rows.
+  /// Executes a statement whose rows, if any, are of no interest.
   void run();
 
   std::int64_t integer(int column) const;
@@ -52,17 +52,17 @@ class Statement {
   sqlite3_stmt* statement_ = nullptr;
 };
 
-/// One thread at a time.
+/// Only one thread at a time may use it.
 class Database {
  public:
-  /// Makes the file where there is none. What is committed is on the disk: write-ahead log, flushed with every commit.
+  /// Creates `file` where it is missing. A commit is durable: the write-ahead log is flushed with every commit.
   explicit Database(const std::filesystem::path& file);
   ~Database();
   Database(const Database&) = delete;
   Database& operator=(const Database&) = delete;
 
   Statement prepare(std::string_view sql);
-  /// Statements without places and without rows that matter.
+  /// Executes one or more statements without placeholders; ignores their rows.
   void run(const std::string& sql);
   std::uint64_t last_row() const;
 
@@ -71,7 +71,7 @@ class Database {
   sqlite3* database_ = nullptr;
 };
 
-/// All or nothing: taken back unless committed.
+/// Rolls back in its destructor unless it was committed.
 class Transaction {
  public:
   explicit Transaction(Database& database);

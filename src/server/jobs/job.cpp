@@ -21,7 +21,7 @@ State state_named(const std::string& name) {
 bool may_become(State from, State to) {
   switch (from) {
     case State::queued:
-      // failed: what cannot be started
+      // failed: the job cannot be started
       return to == State::running || to == State::paused || to == State::cancelled || to == State::failed;
     case State::running:
       return to != State::running;

@@ -1,4 +1,4 @@
-// A job: what was asked for, where it stands, and what may become of it.
+// A job: what a client asked for, its state, and the states that may follow.
 //
 //   queued --> running --> done
 //     |  ^        |------> failed --> queued       (resume)
@@ -7,7 +7,7 @@
 //     v           v
 //   paused <------'        paused --> queued       (resume)
 //
-// From queued and paused it may be cancelled, too. done and cancelled are for good.
+// A job that is queued or paused may be cancelled, too; a queued job that cannot be started fails. done and cancelled are final.
 #pragma once
 
 #include <cstdint>
@@ -17,34 +17,33 @@
 
 namespace flappy::server {
 
-// Whatever a client sends is no longer than this.
-inline constexpr std::size_t kMostOfId = 64, kMostOfVerb = 16, kMostOfKind = 64, kMostOfConfig = 256;
-inline constexpr std::size_t kMostOverrides = 32, kMostOfOverride = 256, kMostOfMessage = 1024;
+// Limits, in bytes and in number, of what a client sends.
+inline constexpr std::size_t kMaxOfId = 64, kMaxOfVerb = 16, kMaxOfKind = 64, kMaxOfConfig = 256;
+inline constexpr std::size_t kMaxOverrides = 32, kMaxOfOverride = 256, kMaxOfMessage = 1024;
 
 enum class State { queued, running, paused, done, failed, cancelled };
 inline constexpr State kStates[] = {State::queued, State::running, State::paused,
                                     State::done,   State::failed,  State::cancelled};
 const char* name_of(State state);
-/// std::invalid_argument for no name of a state.
+/// Throws std::invalid_argument where `name` names no state.
 State state_named(const std::string& name);
 
-/// The table above.
+/// Whether the table above allows the transition.
 bool may_become(State from, State to);
 
-/// What is to become of a job that runs: it goes on, or its program is asked to stop.
+/// What a running job has to do: go on, or ask its program to stop and become paused, cancelled or queued again.
 enum class Wanted { run, pause, cancel, stop };
 
-/// A process that a number alone does not name, as numbers are given again.
+/// Identifies a process for good: the kernel reuses a pid, but not with the same start time in the same boot.
 struct Process {
   std::int64_t pid = 0;           ///< 0: not known
-  std::uint64_t start_ticks = 0;  ///< since the boot
+  std::uint64_t start_ticks = 0;  ///< start time in clock ticks since boot
   std::string boot_id;
   bool operator==(const Process&) const = default;
 };
 
-/// What a client asks for.
 struct Submission {
-  std::string client_id;  ///< the client's own; the same one twice is the same job
+  std::string client_id;  ///< chosen by the client; submitted twice, it is the same job
   std::string kind, config;
   std::vector<std::string> overrides;
   bool operator==(const Submission&) const = default;
@@ -55,19 +54,19 @@ struct Job {
   Submission asked;
   State state = State::queued;
   Wanted wanted = Wanted::run;
-  int attempts = 0;      ///< how often it was started
-  int crashes = 0;       ///< how often it ended of itself without being done, since it was submitted or resumed
-  Process process;       ///< that minds the last attempt
-  std::string batch_id;  ///< the last attempt's, where another queue runs it
+  int attempts = 0;      ///< how many times it was started
+  int crashes = 0;       ///< attempts that ended on their own without finishing, since the job was submitted or resumed
+  Process process;       ///< supervisor of the last attempt
+  std::string batch_id;  ///< Slurm's id of the last attempt; empty: local
   std::optional<int> exit_code;
   double progress = 0;  ///< 0 to 1
   std::string message;
-  std::string folder;  ///< its name below the output folder
-  // since 1970; 0: not yet
+  std::string folder;  ///< name below the output folder
+  // Unix time; 0: not yet.
   double submitted_s = 0, started_s = 0, ended_s = 0;
 };
 
-/// A state that a job came to, and why.
+/// An item of a job's history: the state, when the job came to it, and why.
 struct Transition {
   double time_s = 0;
   State state = State::queued;
@@ -75,7 +74,7 @@ struct Transition {
   std::string why;
 };
 
-/// At most `most` bytes of a text that a person is shown: control characters are blanks, and no character of UTF-8 is cut.
-std::string shown(const std::string& text, std::size_t most = kMostOfMessage);
+/// Makes a text safe to show: at most `most` bytes, control characters replaced by blanks, no UTF-8 character cut.
+std::string shown(const std::string& text, std::size_t most = kMaxOfMessage);
 
 }  // namespace flappy::server

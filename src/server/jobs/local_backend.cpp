@@ -2,7 +2,7 @@
 #include <map>
 
 #include "server/jobs/backend.hpp"
-#include "server/jobs/minder.hpp"
+#include "server/jobs/supervisor.hpp"
 
 namespace flappy::server {
 namespace {
@@ -11,20 +11,20 @@ namespace fs = std::filesystem;
 
 class LocalBackend : public Backend {
  public:
-  void start(Queue& queue, const Job& job, const fs::path& folder, const std::vector<std::string>& minder,
+  void start(Queue& queue, const Job& job, const fs::path& folder, const std::vector<std::string>& supervisor,
              const JobLock& lock) override {
-    const std::int64_t pid = start_process(minder, &lock, folder / kLogName);
+    const std::int64_t pid = start_process(supervisor, &lock, folder / kLogName);
     children_[job.id] = pid;
-    if (const auto process = process_of(pid)) queue.minded_by(job.id, *process);
+    if (const auto process = process_of(pid)) queue.supervised_by(job.id, *process);
   }
 
-  /// An attempt lives as long as somebody has its folder, be it our child or a stranger's.
+  /// An attempt is alive while any process holds the lock of its folder, whichever server started that process.
   Life look(Queue& queue, const Job& job, const fs::path& folder) override {
     if (const auto child = children_.find(job.id); child != children_.end() && has_ended(child->second))
       children_.erase(child);
     if (JobLock::take(folder)) return Life::gone;
     if (job.process.pid == 0)
-      if (const auto process = began(folder, job.attempts)) queue.minded_by(job.id, *process);
+      if (const auto process = began(folder, job.attempts)) queue.supervised_by(job.id, *process);
     return Life::alive;
   }
 
@@ -32,7 +32,7 @@ class LocalBackend : public Backend {
   bool is_local() const override { return true; }
 
  private:
-  std::map<std::uint64_t, std::int64_t> children_;  ///< by job; each is to be waited for
+  std::map<std::uint64_t, std::int64_t> children_;  ///< [job] pid of its supervisor, which has to be reaped
 };
 
 }  // namespace

@@ -31,9 +31,9 @@ bool is_name(std::string_view name) {
 }  // namespace
 
 fs::path below(const fs::path& folder, const std::string& name, const std::string& what) {
-  if (name.size() > kMostOfConfig)
+  if (name.size() > kMaxOfConfig)
     throw io::InputError(what + ": has " + std::to_string(name.size()) + " characters; accepted: at most " +
-                         std::to_string(kMostOfConfig));
+                         std::to_string(kMaxOfConfig));
   const auto refuse = [&](const std::string& why) -> io::InputError {
     return io::InputError(what + ": \"" + shown(name) + "\" " + why);
   };
@@ -43,7 +43,7 @@ fs::path below(const fs::path& folder, const std::string& name, const std::strin
   if (error) throw io::InputError(folder.string() + ": cannot be read: " + error.message());
   fs::path found = fs::canonical(root / name, error);
   if (error) throw refuse("is not there; accepted: what lies below the allowed folder");
-  // part by part, so that /a/bc is not below /a/b
+  // compare part by part, so that /a/bc is not below /a/b
   const auto differ = std::ranges::mismatch(root, found);
   if (differ.in1 != root.end() || differ.in2 == found.end())
     throw refuse("leads out of the allowed folder; accepted: what lies below it");
@@ -52,11 +52,11 @@ fs::path below(const fs::path& folder, const std::string& name, const std::strin
 
 void check_override(const std::string& override) {
   const auto refuse = [&](const std::string& what) {
-    throw io::InputError("override: \"" + shown(override, kMostOfOverride) + "\" " + what);
+    throw io::InputError("override: \"" + shown(override, kMaxOfOverride) + "\" " + what);
   };
-  if (override.size() > kMostOfOverride)
+  if (override.size() > kMaxOfOverride)
     refuse("... has " + std::to_string(override.size()) + " characters; accepted: at most " +
-           std::to_string(kMostOfOverride));
+           std::to_string(kMaxOfOverride));
   const std::size_t equal = override.find('=');
   const std::string_view key = std::string_view(override).substr(0, equal);
   if (equal == std::string::npos || !is_name(key) || key.find('/') != std::string_view::npos)

@@ -1,5 +1,5 @@
-// Names that come from elsewhere. A name says which file below a folder is meant, and can say nothing else: it is no path, no option, and
-// leaves the folder neither by ".." nor through a link.
+// Checks names that clients send. A name selects a file below a folder and nothing else: it cannot be an absolute path or an option, and cannot
+// leave the folder by ".." or through a symbolic link.
 #pragma once
 
 #include <filesystem>
@@ -7,12 +7,12 @@
 
 namespace flappy::server {
 
-/// The file or folder `name` below `folder`, absolute and without links. `what` names it in an io::InputError: for a name that is
-/// none, and where there is no such thing below the folder.
+/// Returns the file or folder `name` below `folder`, as an absolute path without symbolic links. Throws io::InputError, which begins with
+/// `what`, where `name` is malformed, or nothing of that name lies below the folder.
 std::filesystem::path below(const std::filesystem::path& folder, const std::string& name, const std::string& what);
 
-/// io::InputError unless `override` is KEY=VALUE in the alphabet that configurations need without file names: no slash, backslash, ".." or
-/// control character.
+/// Throws io::InputError unless `override` is KEY=VALUE and its value cannot name a file in another folder: printable ASCII without slash,
+/// backslash and "..".
 void check_override(const std::string& override);
 
 }  // namespace flappy::server

@@ -33,7 +33,7 @@ std::string boot_id() {
 std::optional<Process> process_of(std::int64_t pid) {
   try {
     const std::string stat = io::read_text("/proc/" + std::to_string(pid) + "/stat");
-    // the name in parentheses may hold anything; the 20th field behind it is the start
+    // the program's name in parentheses may contain anything; the start time is the 20th field after it
     std::istringstream fields(stat.substr(stat.rfind(')') + 1));
     std::string skipped;
     for (int i = 0; i < 19; ++i) fields >> skipped;
@@ -47,10 +47,10 @@ std::optional<Process> process_of(std::int64_t pid) {
 
 bool signal_process(const Process& process, int signal) {
   if (process.pid <= 0) return false;
-  // by number: glibc 2.36 declares these calls for C alone
+  // call by number, because glibc 2.36 declares these functions for C only
   const int descriptor = static_cast<int>(syscall(SYS_pidfd_open, static_cast<pid_t>(process.pid), 0));
   if (descriptor < 0) return false;
-  // whoever has the number now keeps it while the descriptor is open
+  // open first, check second: if the check finds the very process, the descriptor refers to it, too
   const bool same = process_of(process.pid) == process;
   const bool sent = same && syscall(SYS_pidfd_send_signal, descriptor, signal, nullptr, 0) == 0;
   close(descriptor);

@@ -1,4 +1,4 @@
-// Processes that outlive the one that started them: who they are, whether they live, and how to signal them and nobody else.
+// Processes that outlive the server that started them: how to identify them, see whether they live, and signal them and no others.
 #pragma once
 
 #include <filesystem>
@@ -10,18 +10,19 @@
 
 namespace flappy::server {
 
-/// This boot of this machine.
+/// Identifies the current boot of this machine.
 std::string boot_id();
-/// Nothing where no process has this number.
+/// Identifies the process that has this pid now; nothing where there is none.
 std::optional<Process> process_of(std::int64_t pid);
-/// False, and nobody is signalled, where that very process is gone.
+/// Signals exactly this process. Returns false where it is gone, even if another process has its pid by now.
 bool signal_process(const Process& process, int signal);
 
-/// A folder that belongs to one attempt of a job. The lock is handed down to whoever is started with its descriptor, and stands
-/// until the last of them is gone, however they end: there is no moment in which a process lives that nobody knows of.
+/// An exclusive lock of a job's folder, held by one attempt. Every process that is started with the descriptor shares the lock, which is
+/// released when the last of them ends, however it ends. So no process of an attempt can live without holding the lock.
 class JobLock {
  public:
-  /// Nothing where somebody has the folder. io::InputError where it cannot be opened.
+  /// Returns nothing where another process holds the lock. Throws io::InputError where the folder cannot be opened or
+  /// locked.
   static std::optional<JobLock> take(const std::filesystem::path& folder);
   ~JobLock();
   JobLock(JobLock&& other) noexcept;
@@ -34,11 +35,11 @@ class JobLock {
   int descriptor_;
 };
 
-/// Starts a program, found along PATH, in a process group of its own, with `lock` as descriptor 3 (where there is one), no input, its
-/// output at the end of `log`, and SIGINT and SIGTERM held back. std::system_error where that fails.
+/// Starts a program, found along PATH, in a process group of its own; returns its pid. It has no input, appends its output to `log`, has
+/// `lock` (if not null) as descriptor 3, and has SIGINT and SIGTERM blocked. Throws std::system_error where the start fails.
 std::int64_t start_process(const std::vector<std::string>& command, const JobLock* lock,
                            const std::filesystem::path& log);
-/// Whether a child of ours has ended; then it is gone for good.
+/// Whether a child process has ended. Reaps it, so call it no more once it returned true.
 bool has_ended(std::int64_t pid);
 
 }  // namespace flappy::server

@@ -36,7 +36,7 @@ using Guard = std::lock_guard<std::mutex>;
 
 double now_s() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
 
-/// A server that was killed while it started a child has the folder until that child is another program.
+/// Retries for half a second: a server that was killed while it started a child leaves the lock to that child until the child's exec.
 std::unique_ptr<io::FolderLock> take(const std::filesystem::path& folder) {
   constexpr int kTries = 50;
   constexpr std::chrono::milliseconds kBetween{10};
@@ -83,7 +83,7 @@ std::vector<Job> read_jobs(Statement rows) {
 
 std::string called(std::uint64_t id) { return "job " + std::to_string(id); }
 
-/// Of a job that cannot come to a state: from which ones it could.
+/// Throws io::InputError, which names the states from which a job can become `to`.
 [[noreturn]] void refuse(const Job& job, State to) {
   std::vector<std::string> accepted;
   for (const State from : kStates)
@@ -126,8 +126,8 @@ std::uint64_t Queue::submit(const Submission& asked) {
   }
   Statement waiting = database_.prepare("SELECT count(*) FROM jobs WHERE state IN ('queued', 'running', 'paused')");
   waiting.step();
-  if (waiting.integer(0) >= static_cast<std::int64_t>(kMostWaiting))
-    throw io::InputError("submit: " + std::to_string(kMostWaiting) +
+  if (waiting.integer(0) >= static_cast<std::int64_t>(kMaxWaiting))
+    throw io::InputError("submit: " + std::to_string(kMaxWaiting) +
                          " jobs are not over, which is the most; accepted: a job once others are over");
   database_
       .prepare(
@@ -217,7 +217,7 @@ Job Queue::start(std::uint64_t id) {
   return existing(id);
 }
 
-void Queue::minded_by(std::uint64_t id, const Process& process) {
+void Queue::supervised_by(std::uint64_t id, const Process& process) {
   const Guard guard(mutex_);
   existing(id, State::running);
   database_.prepare("UPDATE jobs SET pid = ?, start_ticks = ?, boot_id = ? WHERE id = ?")
@@ -292,7 +292,7 @@ Job Queue::existing(std::uint64_t id, State wanted) const {
   throw io::InputError(called(id) + ": is " + name_of(job.state) + "; accepted: a job that is " + name_of(wanted));
 }
 
-/// From the state that it has, unless the table forbids it.
+/// Changes the state of a job; throws io::InputError where may_become() forbids it.
 void Queue::move(const Job& job, State to, const std::string& why) {
   if (!may_become(job.state, to)) refuse(job, to);
   Transaction all(database_);
@@ -304,7 +304,7 @@ void Queue::move(const Job& job, State to, const std::string& why) {
   changed();
 }
 
-/// Of a job that runs. What is to be cancelled cannot be paused any more.
+/// Records what a running job has to do. Throws io::InputError where the job is being cancelled, which nothing else may replace.
 void Queue::want(const Job& job, Wanted wanted, const std::string& why) {
   if (job.wanted == Wanted::cancel && wanted != Wanted::cancel)
     throw io::InputError(called(job.id) + ": is being cancelled; accepted: to wait for its end");

@@ -1,5 +1,5 @@
-// The queue: every job that was ever submitted, and every state that it came to, in one SQLite file. A change is on the disk when the
-// call returns, or it did not happen.
+// The queue: every job that was ever submitted and the history of its states, in one SQLite file. When a call that changes it returns, the
+// change is on the disk; when the call throws, nothing has changed.
 #pragma once
 
 #include <chrono>
@@ -14,7 +14,7 @@
 
 namespace flappy::server {
 
-inline constexpr std::size_t kMostWaiting = 1000;  ///< jobs that are not over
+inline constexpr std::size_t kMaxWaiting = 1000;  ///< most jobs that are queued, running or paused
 
 /// How an attempt ended.
 struct Ending {
@@ -24,41 +24,42 @@ struct Ending {
   bool crashed = false;
 };
 
-/// Any thread may call it. io::InputError for what a job's state forbids, and where the file cannot be written.
+/// Thread-safe. Throws io::InputError for an unknown job, a change that the job's state forbids, and a file that cannot be written.
 class Queue {
  public:
-  /// Takes `folder`/queue.sqlite for this process alone.
+  /// Opens `folder`/queue.sqlite, or creates it, and locks `folder` for this process.
   explicit Queue(const std::filesystem::path& folder);
 
-  /// The new job, or the one that this client_id already is. io::InputError where that one asked for something else, and where
-  /// kMostWaiting jobs are not over.
+  /// Returns the id of the new job, or of the job that already has this client_id. Throws io::InputError where that job
+  /// asked for something else, and where kMaxWaiting jobs are queued, running or paused.
   std::uint64_t submit(const Submission& asked);
   void pause(std::uint64_t id);
-  /// Goes on with a paused or failed job, which may crash as often as before.
+  /// Queues a paused or failed job again and resets its number of crashes.
   void resume(std::uint64_t id);
   void cancel(std::uint64_t id);
 
-  /// io::InputError where there is none.
+  /// Throws io::InputError where there is no such job.
   Job job(std::uint64_t id) const;
-  /// The newest ones, newest first.
+  /// The newest `most` jobs, newest first.
   std::vector<Job> jobs(std::size_t most) const;
-  /// Oldest first.
+  /// All jobs in a state, oldest first.
   std::vector<Job> jobs_in(State state) const;
   std::vector<Transition> history(std::uint64_t id) const;
-  /// Tells this queue from any other: 16 hexadecimal digits.
+  /// 16 random hexadecimal digits, which identify this queue.
   const std::string& name() const { return name_; }
 
-  // What runs the jobs tells.
-  /// queued -> running: one attempt more, and nothing known of its process.
+  // Calls of the runner and its backend.
+  /// Moves a job from queued to running: counts an attempt, and forgets the process of the last one.
   Job start(std::uint64_t id);
-  void minded_by(std::uint64_t id, const Process& process);
+  void supervised_by(std::uint64_t id, const Process& process);
   void batched_as(std::uint64_t id, const std::string& batch_id);
-  /// A job that runs is to stop, for the server goes.
+  /// Asks a running job to stop because the server stops; it is queued again afterwards.
   void want_stop(std::uint64_t id);
   void report(std::uint64_t id, double progress, const std::string& message);
   void end(std::uint64_t id, const Ending& ending);
 
-  /// Counts changes; waits for another count than `seen`, at most so long.
+  /// The number of changes since this object was made. wait_for_change returns it once it differs from `seen`, or after
+  /// `most`.
   std::uint64_t changes() const;
   std::uint64_t wait_for_change(std::uint64_t seen, std::chrono::milliseconds most) const;
 

@@ -27,12 +27,12 @@ bool RateLimit::take(const std::string& client, double now_s) {
 
 TokenBucket& RateLimit::bucket_of(const std::string& client, double now_s) {
   if (const auto known = clients_.find(client); known != clients_.end()) return known->second;
-  if (clients_.size() >= kMostClients) {
-    // a full bucket is as good as a new one; looking through all of them is for once a second
+  if (clients_.size() >= kMaxClients) {
+    // forget clients whose bucket is as full as a new one; only once a second, because this visits all clients
     if (now_s >= forgot_s_ + 1) std::erase_if(clients_, [&](const auto& each) { return each.second.is_full(now_s); });
     else return further_;
     forgot_s_ = now_s;
-    if (clients_.size() >= kMostClients) return further_;
+    if (clients_.size() >= kMaxClients) return further_;
   }
   const double most = std::max(1.0, config_.per_client_hz * config_.burst_s);
   return clients_.emplace(client, TokenBucket(config_.per_client_hz, most)).first->second;

@@ -1,4 +1,4 @@
-// How often somebody may come.
+// Rate limits of commands, as token buckets.
 #pragma once
 
 #include <map>
@@ -8,13 +8,13 @@
 
 namespace flappy::server {
 
-inline constexpr std::size_t kMostClients = 1024;  ///< that are told apart
+inline constexpr std::size_t kMaxClients = 1024;  ///< clients with a bucket of their own
 
-/// So many tokens come in a second, and no more than `most` are kept. One is taken each time.
+/// Gains `rate_hz` tokens a second and keeps at most `most`; every command takes one.
 class TokenBucket {
  public:
   TokenBucket(double rate_hz, double most) : rate_hz_(rate_hz), most_(most), tokens_(most) {}
-  /// False where there is none.
+  /// Takes a token; false where there is none.
   bool take(double now_s);
   bool is_full(double now_s) const;
 
@@ -23,12 +23,13 @@ class TokenBucket {
   double at_s_ = -1;
 };
 
-/// A bucket for each client and one for all of them. Its memory is bounded: who has not come for long is forgotten, and while that is
-/// nobody, further clients share a bucket. One thread at a time.
+/// A token bucket for each client and one for all of them. Memory is bounded: a client whose bucket is full again is forgotten; where none can
+/// be forgotten, further clients share a bucket. Only one thread at a time may use it.
 class RateLimit {
  public:
   explicit RateLimit(const RateConfig& config);
-  /// A client that is refused takes nothing from the others.
+  /// Whether a command of `client` is within both limits. A client over its own limit takes nothing from the common
+  /// bucket.
   bool take(const std::string& client, double now_s);
   std::size_t clients() const { return clients_.size(); }
 

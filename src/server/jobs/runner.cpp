@@ -11,7 +11,7 @@
 #include "io/log.hpp"
 #include "io/parallel.hpp"
 #include "io/progress.hpp"
-#include "server/jobs/minder.hpp"
+#include "server/jobs/supervisor.hpp"
 
 namespace flappy::server {
 namespace {
@@ -57,7 +57,7 @@ void Runner::run(const std::function<bool()>& keep_going) {
       const std::uint64_t seen = queue_.changes();
       step();
       queue_.wait_for_change(seen, kStep);
-    } catch (const io::InputError& e) {  // a full disk, say: jobs go on, and so do we once there is room
+    } catch (const io::InputError& e) {  // for example a full disk: running jobs go on, and so do we once there is room
       if (const double now = io::steady_seconds(); now > complained_s + 60) {
         io::log(io::LogLevel::error, e.what());
         complained_s = now;
@@ -76,7 +76,7 @@ Launch Runner::launch_of(const Job& job) const {
   return {options_.config.folders, options_.programs, folder_of(job), job.asked, options_.config.threads};
 }
 
-/// Whether any runs still.
+/// Updates all running jobs; returns whether any still runs.
 bool Runner::look_after_all() {
   for (const Job& job : queue_.jobs_in(State::running)) look_after(job);
   return !queue_.jobs_in(State::running).empty();
@@ -86,7 +86,7 @@ void Runner::look_after(const Job& job) {
   io::make_folder(folder_of(job));
   const Life life = backend_->look(queue_, job, folder_of(job));
   if (life == Life::alive) {
-    if (job.wanted == Wanted::run) tell_progress(job);
+    if (job.wanted == Wanted::run) record_progress(job);
     else ask_to_stop(queue_.job(job.id));
   }
   if (life != Life::gone) return;
@@ -109,7 +109,7 @@ void Runner::ask_to_stop(const Job& job) {
   }
 }
 
-void Runner::tell_progress(const Job& job) {
+void Runner::record_progress(const Job& job) {
   const double now = io::steady_seconds();
   const auto [reported, first] = reported_s_.emplace(job.id, now);
   if (!first && now < reported->second + kReportEvery_s) return;
@@ -119,7 +119,7 @@ void Runner::tell_progress(const Job& job) {
   queue_.report(job.id, progress.share, progress.message);
 }
 
-/// Once more from its checkpoint, unless it did so too often.
+/// The ending of a crashed attempt: the job is queued again, or fails if this was its config.attempts-th crash.
 Ending Runner::crash(const Job& job, std::optional<int> code, const std::string& what) const {
   const bool last = job.crashes + 1 >= options_.config.attempts;
   return {last ? State::failed : State::queued, code,
@@ -130,7 +130,7 @@ Ending Runner::crash(const Job& job, std::optional<int> code, const std::string&
 
 Ending Runner::ending_of(const Job& job) const {
   const fs::path folder = folder_of(job);
-  const Kind& kind = kind_named(options_.kinds, job.asked.kind);
+  const JobType& kind = job_type_named(options_.kinds, job.asked.kind);
   const std::optional<Exit> exit = exit_of(folder, job.attempts);
   const bool failed = exit && (exit->signal != 0 || exit->code != 0);
   const std::optional<int> code = exit && exit->signal == 0 ? std::optional(exit->code) : std::nullopt;
@@ -140,10 +140,10 @@ Ending Runner::ending_of(const Job& job) const {
   if (job.wanted == Wanted::pause) return {State::paused, code, "paused"};
   if (job.wanted == Wanted::stop) return {State::queued, code, "stopped with the server"};
   if (!exit) {
-    const std::optional<Process> minder = began(folder, job.attempts);
-    if (!minder && !started_here_.contains(job.id))
+    const std::optional<Process> supervisor = began(folder, job.attempts);
+    if (!supervisor && !started_here_.contains(job.id))
       return {State::queued, code, "the server was killed before it began"};
-    if (minder && backend_->is_local() && minder->boot_id != boot_id())
+    if (supervisor && backend_->is_local() && supervisor->boot_id != boot_id())
       return {State::queued, code, "the machine went down; goes on from what it left"};
     return crash(job, code, "its process was killed, or could not start");
   }
@@ -155,7 +155,7 @@ Ending Runner::ending_of(const Job& job) const {
           (exit->message.empty() ? "" : ": ") + exit->message);
 }
 
-/// Of what cannot be started now, for no fault of its own: later, and each time twice as long.
+/// Queues a job again that could not be started through no fault of its own. The delay doubles each time, up to kLongestDelay_s.
 void Runner::put_off(const Job& job, const std::string& why) {
   Delay& delay = delays_[job.id];
   delay.length_s = delay.length_s == 0 ? kFirstDelay_s : std::min(2 * delay.length_s, kLongestDelay_s);
@@ -171,14 +171,14 @@ void Runner::start(const Job& queued) {
   const fs::path folder = folder_of(queued);
   if (!fs::exists(folder)) {
     io::make_folder(folder);
-    io::sync_folder(options_.config.folders.output);  // or a job could be done, and its folder gone with the power
+    io::sync_folder(options_.config.folders.output);  // else a power failure could lose a job that is done
   }
   const std::optional<JobLock> lock = JobLock::take(folder);
-  if (!lock) return;  // what an earlier attempt left is about to end
+  if (!lock) return;  // a process of an earlier attempt still holds the folder; try again later
   std::vector<std::string> command;
   try {
-    command = kind_named(options_.kinds, queued.asked.kind).command(launch_of(queued));
-  } catch (const io::InputError& e) {  // what was there when it was submitted
+    command = job_type_named(options_.kinds, queued.asked.kind).command(launch_of(queued));
+  } catch (const io::InputError& e) {  // a file that was there when the job was submitted is gone
     return queue_.end(queued.id, {State::failed, std::nullopt, e.what()});
   }
   std::error_code none;
@@ -189,12 +189,12 @@ void Runner::start(const Job& queued) {
     job = queue_.start(queued.id);
   } catch (const io::InputError&) {
     if (queue_.job(queued.id).state == State::queued) throw;
-    return;  // paused or cancelled a moment ago
+    return;  // a client paused or cancelled it meanwhile
   }
   note(job, "started: " + io::joined(command, " "));
   started_here_.insert(job.id);
   try {
-    backend_->start(queue_, job, folder, minder_command(options_.server.string(), folder, job.attempts, command),
+    backend_->start(queue_, job, folder, supervisor_command(options_.server.string(), folder, job.attempts, command),
                     *lock);
     delays_.erase(job.id);
   } catch (const std::system_error& e) {

@@ -1,11 +1,11 @@
-// Runs the jobs of a queue, each as a process of its own: a crash costs one job. The queue and the jobs' folders say all there is to know,
-// so that a runner which is killed at any moment is followed by one that goes on:
+// Runs the jobs of a queue, each in a process of its own, so that a crash costs one job. All state is in the queue and in the jobs' folders, so
+// a new runner can take over from one that was killed at any moment:
 //
-//   taken     the job's folder is locked, then the queue has it as running, then the minder starts with the lock
-//   living    somebody has the folder's lock: our child, or what a killed server started, which is adopted
-//   ended     the folder is free, and says by .exit and result.json how it ended; then the queue does
+//   start     the runner locks the job's folder, then marks the job as running in the queue, then starts the supervisor, which inherits the lock
+//   alive     a process holds the lock of the folder: our child, or one that a killed server started and that we adopt
+//   end       the lock is free; attempt_N.exit and result.json in the folder say how the attempt ended; then the queue records it
 //
-// Killed before the minder starts, the job begins again, for nothing has begun; killed later, it is adopted or its end is read.
+// If the runner is killed before the supervisor starts, the next runner starts the job again; if later, it adopts the job or reads its end.
 #pragma once
 
 #include <filesystem>
@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "server/jobs/backend.hpp"
-#include "server/jobs/kinds.hpp"
+#include "server/jobs/job_types.hpp"
 #include "server/jobs/queue.hpp"
 #include "server/jobs/server_config.hpp"
 
@@ -24,19 +24,20 @@ namespace flappy::server {
 
 struct RunnerOptions {
   JobsConfig config;
-  std::filesystem::path server;    ///< flappy-server, which is every job's minder
-  std::filesystem::path programs;  ///< the folder of flappy-train and its like
-  std::vector<Kind> kinds = server::kinds();
+  std::filesystem::path server;    ///< the program flappy-server, which also serves as supervisor
+  std::filesystem::path programs;  ///< folder of flappy-train and the other programs
+  std::vector<JobType> kinds = server::job_types();
 };
 
-/// One thread.
+/// Only one thread may use it.
 class Runner {
  public:
   Runner(Queue& queue, RunnerOptions options);
 
-  /// Looks after all that runs, and starts what may.
+  /// Updates all running jobs and starts as many queued ones as config.at_once allows.
   void step();
-  /// step() for as long as it is told to; then what runs on this machine stops cleanly and is queued again. What Slurm runs goes on.
+  /// Calls step() while keep_going() is true. Then local jobs are stopped cleanly and queued again; jobs in Slurm go
+  /// on.
   void run(const std::function<bool()>& keep_going);
 
  private:
@@ -55,7 +56,7 @@ class Runner {
   bool look_after_all();
   void look_after(const Job& job);
   void ask_to_stop(const Job& job);
-  void tell_progress(const Job& job);
+  void record_progress(const Job& job);
   Ending ending_of(const Job& job) const;
   Ending crash(const Job& job, std::optional<int> code, const std::string& what) const;
   void put_off(const Job& job, const std::string& why);
@@ -65,9 +66,9 @@ class Runner {
   RunnerOptions options_;
   std::unique_ptr<Backend> backend_;
   std::set<std::uint64_t> started_here_;        ///< jobs whose last attempt this runner started
-  std::map<std::uint64_t, Request> requests_;   ///< by job: how it was asked to stop
-  std::map<std::uint64_t, double> reported_s_;  ///< by job
-  std::map<std::uint64_t, Delay> delays_;       ///< by job that could not be started
+  std::map<std::uint64_t, Request> requests_;   ///< [job] request to stop
+  std::map<std::uint64_t, double> reported_s_;  ///< [job] time of the last progress report
+  std::map<std::uint64_t, Delay> delays_;       ///< [job] wait after a failed start
 };
 
 }  // namespace flappy::server

@@ -6,33 +6,33 @@
 
 #include "io/config.hpp"
 #include "io/dds_config.hpp"
-#include "server/jobs/kinds.hpp"
+#include "server/jobs/job_types.hpp"
 
 namespace flappy::server {
 
 enum class BackendKind { local, slurm };
 
 struct JobsConfig {
-  Folders folders;  ///< absolute; `output` is made where it is missing
+  Folders folders;  ///< absolute paths; `output` is created where it is missing
   BackendKind backend = BackendKind::local;
   int at_once = 1;
-  int threads = 0;                  ///< of each job; 0: one for each processor
-  int attempts = 3;                 ///< so many crashes fail a job
-  double grace_s = 30;              ///< between the request to stop and the end of patience
-  std::vector<std::string> sbatch;  ///< further options of sbatch, as the site needs them
+  int threads = 0;                  ///< of each job; 0: processors / at_once, or all that Slurm gives
+  int attempts = 3;                 ///< number of crashes after which a job fails
+  double grace_s = 30;              ///< time from the request to stop until the job is killed
+  std::vector<std::string> sbatch;  ///< additional options of sbatch
 };
 
 struct HttpConfig {
-  std::string listen;              ///< ADDRESS:PORT; empty: nothing listens
-  std::vector<std::string> hosts;  ///< names in the Host header that are ours besides
-  int streams = 4;                 ///< most clients of /events at a time
-  double patience_s = 5;           ///< with a request, and with a client that is to take an answer
+  std::string listen;              ///< ADDRESS:PORT; empty: no dashboard
+  std::vector<std::string> hosts;  ///< additional names accepted in the Host header
+  int streams = 4;                 ///< most simultaneous clients of /events
+  double patience_s = 5;           ///< time limit for a whole request, and for each piece of an answer to be taken
 };
 
-/// What a client may ask per second, and at once after a pause.
+/// Rates of commands that are accepted.
 struct RateConfig {
   double per_client_hz = 5, all_hz = 50;
-  double burst_s = 4;  ///< so many seconds of it
+  double burst_s = 4;  ///< a bucket holds the tokens of this many seconds
 };
 
 struct ServerConfig {

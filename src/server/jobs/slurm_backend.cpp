@@ -1,6 +1,6 @@
-// Jobs go to sbatch, under a name that says whose they are. Should the server be killed before it has noted sbatch's answer, the next one
-// finds the job by its name; should sbatch itself be on its way still, it holds the job's folder; and of one name Slurm runs one job at a
-// time. The exit code comes from the minder, through the folder, which all nodes share.
+// Submits jobs with sbatch, under a name that identifies queue and job. If the server is killed before it has recorded sbatch's answer, the next
+// server finds the job by its name; while sbatch itself still runs, it holds the lock of the job's folder; and Slurm runs at most one job of
+// a name at a time (singleton). The supervisor writes the exit code into the folder, which all nodes share.
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
@@ -14,16 +14,16 @@
 #include "io/progress.hpp"
 #include "io/run_program.hpp"
 #include "server/jobs/backend.hpp"
-#include "server/jobs/minder.hpp"
+#include "server/jobs/supervisor.hpp"
 
 namespace flappy::server {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kLookEvery_s = 2;   ///< squeue is asked for all jobs at once
-constexpr double kMissing_s = 6;     ///< a shared file system may show an exit so late
-constexpr double kPatience_s = 120;  ///< with sbatch
+constexpr double kLookEvery_s = 2;   ///< between calls of squeue, which lists all jobs at once
+constexpr double kMissing_s = 6;     ///< from when on a job missing in squeue is gone: its exit file may arrive late
+constexpr double kPatience_s = 120;  ///< longest wait for sbatch
 
 std::string quoted(const std::string& word) {
   std::string text = "'";
@@ -35,10 +35,10 @@ class SlurmBackend : public Backend {
  public:
   SlurmBackend(const std::string& queue, const JobsConfig& config) : queue_(queue), config_(config) {}
 
-  void start(Queue& queue, const Job& job, const fs::path& folder, const std::vector<std::string>& minder,
+  void start(Queue& queue, const Job& job, const fs::path& folder, const std::vector<std::string>& supervisor,
              const JobLock& lock) override {
     std::string script = "exec";
-    for (const std::string& word : minder) script += " " + quoted(word);
+    for (const std::string& word : supervisor) script += " " + quoted(word);
     std::vector<std::string> command = {
         "sbatch",       "--parsable",         "--job-name=" + name_of(job), "--dependency=singleton",
         "--no-requeue", "--open-mode=append", "--chdir=" + folder.string(), "--output=" + (folder / kLogName).string()};
@@ -52,7 +52,7 @@ class SlurmBackend : public Backend {
     const std::int64_t pid = start_process(command, &lock, answer);
     const double from = io::steady_seconds();
     while (!has_ended(pid)) {
-      // then it is found by its name, or its folder is free again
+      // stop waiting: look() finds the job by its name, or the folder's lock is free again
       if (io::steady_seconds() > from + kPatience_s) return;
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
@@ -67,7 +67,7 @@ class SlurmBackend : public Backend {
 
   Life look(Queue& queue, const Job& job, const fs::path& folder) override {
     if (exit_of(folder, job.attempts)) return Life::gone;
-    if (!JobLock::take(folder)) return Life::alive;  // sbatch is on its way
+    if (!JobLock::take(folder)) return Life::alive;  // sbatch still runs
     if (!look_at_all()) return Life::unknown;
     if (const auto found = listed_.find(name_of(job)); found != listed_.end()) {
       missing_since_s_.erase(job.id);
@@ -85,7 +85,7 @@ class SlurmBackend : public Backend {
     const auto found = listed_.find(name_of(job));
     if (found == listed_.end()) return false;
     std::vector<std::string> command = {"scancel"};
-    // the script is the minder: it has replaced its shell
+    // the batch script is the supervisor, because exec replaced its shell
     if (!kill && found->second.state == "RUNNING") command.insert(command.end(), {"--batch", "--signal=INT"});
     command.push_back(found->second.id);
     return ask(command).has_value();
@@ -100,7 +100,7 @@ class SlurmBackend : public Backend {
 
   std::string name_of(const Job& job) const { return "flappy-" + queue_ + "-" + std::to_string(job.id); }
 
-  /// stdout of one of Slurm's programs; nothing where Slurm does not answer.
+  /// Runs one of Slurm's programs and returns its stdout; nothing where it fails.
   static std::optional<std::string> ask(const std::vector<std::string>& command) {
     try {
       const io::Finished finished = io::run(command);
@@ -126,7 +126,7 @@ class SlurmBackend : public Backend {
       if (second == std::string::npos) continue;
       const Listed found{line.substr(first + 1, second - first - 1), line.substr(second + 1)};
       Listed& kept = listed_[line.substr(0, first)];
-      // an attempt that is about to be gone may stand beside the next one
+      // two attempts may be listed while the earlier one ends; the later one has the larger id
       if (std::pair(found.id.size(), found.id) > std::pair(kept.id.size(), kept.id)) kept = found;
     }
     return true;
@@ -134,7 +134,7 @@ class SlurmBackend : public Backend {
 
   std::string queue_;
   JobsConfig config_;
-  std::map<std::string, Listed> listed_;  ///< by name
+  std::map<std::string, Listed> listed_;  ///< [job name]
   std::map<std::uint64_t, double> missing_since_s_;
   std::optional<double> looked_s_;
   bool answered_ = false;

@@ -19,10 +19,10 @@ namespace {
 namespace fs = std::filesystem;
 using namespace flightlog;
 
-constexpr Quality kAll{false, false, 1000};  // any writer offers best effort; so many samples between two looks
+constexpr Quality kAll{false, false, 1000};  // best effort matches any writer; 1000 samples are kept between two looks
 constexpr std::chrono::milliseconds kBetweenLooks{10};
 
-/// Types that may be recorded.
+/// The descriptor of the type `dds_name` if it is one of M; null otherwise.
 template <class... M>
 const dds_topic_descriptor_t* type_named(const std::string& dds_name) {
   const dds_topic_descriptor_t* found = nullptr;
@@ -74,7 +74,7 @@ class Recording {
     std::uint16_t number;
   };
 
-  /// Reads those that are wanted as soon as somebody writes them.
+  /// Starts to read each wanted topic once a writer of it is discovered.
   void find_topics() {
     detail::take(writers_, [&](const void* sample, const dds_sample_info_t&) {
       const auto& w = *static_cast<const dds_builtintopic_endpoint_t*>(sample);
@@ -100,7 +100,7 @@ class Recording {
     recorded_.messages[name] = 0;
   }
 
-  /// The bytes as they came over the wire.
+  /// Writes the messages that have arrived to the file, as they were on the wire.
   void take(const Topic& topic) {
     constexpr std::size_t kAtOnce = 64;
     std::array<ddsi_serdata*, kAtOnce> samples{};
@@ -114,7 +114,7 @@ class Recording {
 
   void keep(const Topic& topic, ddsi_serdata& sample, std::int64_t sent_ns) {
     const std::size_t size = ddsi_serdata_size(&sample);
-    if (size > kMostBytes) return void(++recorded_.refused);
+    if (size > kMaxBytes) return void(++recorded_.refused);
     std::string bytes(size, '\0');
     ddsi_serdata_to_ser(&sample, 0, size, bytes.data());
     file_.write(topic.number, now_ns(), sent_ns, bytes);
@@ -125,7 +125,7 @@ class Recording {
   Participant participant_;
   WaitSet waiting_;
   Entity writers_;
-  std::set<std::string> wanted_;  // not heard of yet
+  std::set<std::string> wanted_;  // topics that had no writer yet
   std::vector<Topic> topics_;
   ros::McapWriter file_;
   Recorded recorded_;

@@ -1,8 +1,8 @@
-// From a robot's ROS 2 topics to a flight log: the messages as they come go to an MCAP file, and at the end that is imported by the
-// mapping (docs/import.md), which names the topics.
+// Records a robot's ROS 2 topics into a flight log: writes the messages unchanged to an MCAP file, then imports that file by the mapping
+// (docs/reference/import.md), which names the topics.
 //
-// A message is known by the type that its writer announces. The file is readable up to its last second or so, whatever ends us;
-// then `flappy-gap import` makes the log.
+// The type of a topic is the one that its writer announces. If the program is killed, the file stays readable up to about its last second,
+// and `flappy-gap import` makes the log from it.
 #pragma once
 
 #include <cstdint>
@@ -17,23 +17,23 @@
 namespace flappy::server {
 
 struct RecordOptions {
-  std::filesystem::path out;  ///< folder of the log; the messages go beside it, to out.mcap
-  double duration_s = 0;      ///< 0: until it is interrupted
-  /// Asked some ten times a second, with the messages of each topic so far; false ends the recording.
+  std::filesystem::path out;  ///< folder of the flight log; the messages go to out.mcap
+  double duration_s = 0;      ///< 0: until keep_going returns false
+  /// Called about ten times a second with the number of messages of each topic; false ends the recording.
   std::function<bool(const std::map<std::string, std::uint64_t>& messages)> keep_going;
 };
 
 struct Recorded {
   std::filesystem::path mcap;
-  std::map<std::string, std::uint64_t> messages;  ///< of each topic that was heard
-  std::uint64_t refused = 0;                      ///< messages longer than kMostBytes
+  std::map<std::string, std::uint64_t> messages;  ///< number for each topic that was heard
+  std::uint64_t refused = 0;                      ///< messages longer than kMaxBytes
   flightlog::ImportReport report;
 };
 
-/// What a sample of a sensor never has.
-inline constexpr std::size_t kMostBytes = 65'536;
+/// Longer messages are refused: no sensor sample is that long.
+inline constexpr std::size_t kMaxBytes = 65'536;
 
-/// InputError where a topic has a type that is not known here, or the messages make no flight log; the MCAP file stays.
+/// Throws InputError where the type of a topic is not supported or the messages make no flight log; the MCAP file stays.
 Recorded record(const io::DdsConfig& dds, const flightlog::Mapping& mapping, const RecordOptions& options);
 
 }  // namespace flappy::server

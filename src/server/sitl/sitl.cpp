@@ -15,11 +15,11 @@
 namespace flappy::server {
 namespace {
 
-/// An autopilot that comes late finds what it has not heard.
+/// Latched, so that an autopilot that joins late still gets the messages.
 constexpr Quality kFlight{true, true, 64};
 enum Wish : std::uint8_t { kNothing = 0, kHover = 1, kManoeuvre = 2, kOver = 255 };
 
-/// What the sensors say is known only after its latency.
+/// A sample and the time when it arrives, its latency after it was taken.
 template <class Sample>
 struct Late {
   double arrives_s;
@@ -89,7 +89,7 @@ class Flight {
 
   double now_s() const { return static_cast<double>(period_) * fleet_.period_s(); }
 
-  /// At rest in the air where the task begins, if it begins in hover.
+  /// Places the vehicle where the task starts: at rest in the air if the task starts in hover.
   void place() {
     const flight::StartRange& start = config_.fleet.task.start;
     if (!start.settled) return rollout::Rollout<T>::start(fleet_, config_, 0, 0, nullptr);
@@ -112,7 +112,7 @@ class Flight {
     }
   }
 
-  /// What the sensors show before the flight: the pose as the estimator takes it, and gravity.
+  /// Queues the sensor samples before the flight: the estimated pose, and an IMU that shows no rotation and gravity.
   void rest() {
     const flight::Motion x = fleet_.estimate(0);
     PoseSample pose{now_s(), {}, {}};
@@ -127,7 +127,7 @@ class Flight {
     return period_ == std::llround(options_.manoeuvre_s / fleet_.period_s()) ? kManoeuvre : kNothing;
   }
 
-  /// Samples that have arrived by now, then the tick that counts them.
+  /// Publishes the samples that have arrived by now, then the tick with their numbers.
   void tell(Wish wish) {
     const auto arrived = [&](auto& queue, std::uint32_t& count) {
       for (; !queue.empty() && queue.front().arrives_s <= now_s() + 1e-9; queue.pop_front(), ++count)
@@ -146,7 +146,7 @@ class Flight {
     tick_.write(tick);
   }
 
-  /// Takes what has come; whether the input of this period is among it.
+  /// Takes the inputs that have arrived; returns whether the input for this period is among them.
   bool take_inputs() {
     bool answered = false;
     inputs_.take([&](const WingInput& u, const dds_sample_info_t&) {
@@ -170,7 +170,7 @@ class Flight {
     return answered || take_inputs();
   }
 
-  /// What the sensors took in the period that was flown, on its way.
+  /// Queues the samples that the sensors took in the period just flown.
   void sense() {
     const flight::Sensors& sensors = config_.fleet.sensors;
     for (const auto& s : fleet_.imu_samples(0)) {
@@ -189,7 +189,7 @@ class Flight {
     show_recorded();
   }
 
-  /// What the recorder has made of the period: angles, if it has none, are true ones.
+  /// Publishes what the recorder added in the period; the true joint angles where it records none.
   void show_recorded() {
     const flightlog::FlightLog& log = recorder_->so_far();
     const flightlog::CommandStream& c = log.command;
@@ -251,7 +251,7 @@ class Flight {
   std::deque<Late<ImuReading>> imu_;
   std::deque<Late<PoseSample>> poses_;
   std::uint32_t imu_count_ = 0, pose_count_ = 0;
-  std::size_t applied_ = 0, batteries_ = 0, angles_ = 0;  // rows of the recorder that were shown
+  std::size_t applied_ = 0, batteries_ = 0, angles_ = 0;  // rows of the recorder already published
   std::int64_t period_ = 0;
   sim::Input input_{};
   double started_s_ = 0, told_s_ = 0;

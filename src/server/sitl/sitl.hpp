@@ -1,12 +1,12 @@
-// The simulator as the robot of an autopilot: it publishes what the sensors say and flies by the inputs that come back.
+// Software in the loop: the simulator plays the robot of an autopilot. It publishes sensor samples and flies by the inputs that come back.
 //
-//   /flappy/imu, pose, joint_states, battery   flapper_topics.hpp; poses are those of motion capture, stamps when a sample was taken
-//   /flappy/tick                               Tick, after them: so many samples have arrived by this control period
-//   /clock                                     time of the flight
-//   /flappy/wing_input                         WingInput, taken: the inputs of the wing beat for the period of its tick
+//   /flappy/imu, pose, joint_states, battery   see flapper_topics.hpp; poses come from motion capture, stamps are sampling times
+//   /flappy/tick                               Tick, after the samples: the number of samples that have arrived by this control period
+//   /clock                                     flight time
+//   /flappy/wing_input                         WingInput, subscribed: inputs of the wing beat for the period of its tick
 //
-// In lock step a period is flown when its input has come, and the flight is the same bytes whatever the computer does. In real time
-// a period lasts as long as it does on the robot: an input that has not come by its end is missed, and the last one holds.
+// In lock step, a period is flown once its input has arrived, so the flight is reproducible to the byte whatever the computer's speed. In real
+// time, a period lasts as long as on the robot: an input that has not arrived by its end is missed, and the last input holds.
 #pragma once
 
 #include <cstdint>
@@ -19,22 +19,22 @@ namespace flappy::server {
 
 struct SitlOptions {
   bool lock_step = true;
-  double timeout_s = 10;                        ///< without an autopilot, or in lock step without its input
-  double manoeuvre_s = -1;                      ///< when the pilot wishes for the manoeuvre; negative: never
+  double timeout_s = 10;                        ///< limit for an autopilot to appear, and in lock step for each input
+  double manoeuvre_s = -1;                      ///< when the pilot asks for the manoeuvre; negative: never
   std::filesystem::path log_folder;             ///< empty: no log
-  std::function<bool(double done)> keep_going;  ///< asked every period
+  std::function<bool(double done)> keep_going;  ///< called every period with the share flown; false stops the flight
 };
 
 struct SitlResult {
   std::uint64_t periods = 0, missed = 0;
-  std::uint64_t refused = 0;  ///< inputs that are no finite numbers
-  std::uint64_t stray = 0;    ///< inputs for another period than the one that waits
-  double round_trip_median_s = 0, round_trip_p99_s = 0, round_trip_most_s = 0;  ///< from a tick to its input
+  std::uint64_t refused = 0;  ///< inputs that are not finite
+  std::uint64_t stray = 0;    ///< inputs for another period than the current one
+  double round_trip_median_s = 0, round_trip_p99_s = 0, round_trip_most_s = 0;  ///< time from a tick to its input
   bool crashed = false, stopped = false, logged = false;
-  std::uint64_t hash = 0;  ///< of how the vehicle moves at the end
+  std::uint64_t hash = 0;  ///< hash of the simulation's final state
 };
 
-/// io::InputError where no autopilot comes, or in lock step none answers.
+/// Throws io::InputError where no autopilot appears, where an input is missing in lock step, and where the task sets motor voltages.
 SitlResult fly_sitl(const rollout::FlyConfig& config, const SitlOptions& options);
 
 }  // namespace flappy::server

@@ -10,7 +10,7 @@ namespace {
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr char kWorld[] = "world";
 
-/// Messages only point to text while they are written.
+/// Removes const for a message's char*; write() only reads the text.
 char* text(const char* of) { return const_cast<char*>(of); }
 
 Header header(double t_s, const char* frame) { return {time_of(t_s), text(frame)}; }
@@ -75,7 +75,7 @@ void FlapperTopics::write(const ImuReading& imu) const {
   Imu m{};
   m.header = header(imu.t_s, frame_.c_str());
   m.orientation.w = 1;
-  m.orientation_covariance[0] = -1;  // there is none
+  m.orientation_covariance[0] = -1;  // no orientation
   m.angular_velocity = {imu.gyro_rad_s[0], imu.gyro_rad_s[1], imu.gyro_rad_s[2]};
   m.linear_acceleration = {imu.accel_m_s2[0], imu.accel_m_s2[1], imu.accel_m_s2[2]};
   put_diagonal(m.angular_velocity_covariance, imu_covariance_[0]);

@@ -1,15 +1,15 @@
 // The topics of one flapper, under /flappy, /flappy_1 and on:
 //
-//   pose           PoseStamped   torso origin and attitude in "world"          best effort, as sensor data are
-//   imu            Imu           rates and specific force in the torso's frame, covariances as the sensors declare; no attitude
+//   pose           PoseStamped   torso origin and attitude in "world"; best effort, like other sensor data
+//   imu            Imu           angular rates and specific force in the torso's frame, covariances from the declared noise; no attitude
 //   joint_states   JointState    left_stroke, left_rotation, right_stroke, right_rotation: rad, rad/s
-//   wing_input     WingInput     as controller and actor set it; of an actor of voltages, those alone are numbers
-//   battery        BatteryState  where it is known, and
-//   motors         JointState    with it: effort is the current in A of left_motor and right_motor
-//   driver         WingInput     what a simulated driver applied, and its voltages
+//   wing_input     WingInput     inputs set by controller and actor; if the actor sets voltages, the voltages, and NaN for the rest
+//   battery        BatteryState  where it is known
+//   motors         JointState    published with battery: effort is the current in A of left_motor and right_motor
+//   driver         WingInput     inputs that a simulated driver applied, with its voltages and phase
 //   /tf            TFMessage     "world" to the torso's frame: "flappy/torso"
 //
-// World z up, x and y level; torso x forward, y left, z up (REP 103). Stamps are times of the flight.
+// Frames: world z up, x and y level; torso x forward, y left, z up (REP 103). Stamps are flight times.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@
 namespace flappy::server {
 
 struct BatterySample {
-  double t_s, voltage_V, left_current_A, right_current_A;  // of the motors, signed
+  double t_s, voltage_V, left_current_A, right_current_A;  // motor currents, signed
 };
 
 /// One update of the driver.
@@ -42,11 +42,11 @@ struct ImuReading {
 
 class FlapperTopics {
  public:
-  /// `slot`: place in the list of flappers that are shown.
+  /// `slot`: index in the list of watched flappers. `samples`: quality of service of pose, imu and driver.
   FlapperTopics(const Participant& participant, const std::string& name_space, std::size_t slot,
                 const flight::Sensors& sensors, const Quality& samples = kSensorData);
 
-  /// True pose and joints, IMU without noise, inputs.
+  /// Publishes the true pose and joint angles, the IMU without noise, the transform and the inputs.
   void write(const rollout::FlightSample& s) const;
   void write(const PoseSample& pose) const;
   void write(const ImuReading& imu) const;
@@ -58,7 +58,7 @@ class FlapperTopics {
 
  private:
   std::string frame_;
-  double imu_covariance_[2];  // of rate and of specific force, each axis
+  double imu_covariance_[2];  // variance per axis of angular rate and of specific force
   Writer<PoseStamped> pose_;
   Writer<Imu> imu_;
   Writer<JointState> joints_;

@@ -1,4 +1,4 @@
-// From one thread that must not wait to one that may: what does not fit is dropped and counted.
+// A lock-free queue from one producer thread, which must not wait, to one consumer thread. Items that do not fit are dropped and counted.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@ namespace flappy::server {
 template <class T, std::size_t kSize>
 class Ring {
  public:
-  /// Of one thread. False where there was no room.
+  /// For the producer only. Returns false, and counts the item as dropped, where the ring is full.
   bool push(const T& item) {
     const std::uint64_t head = head_.load(std::memory_order_relaxed);
     if (head - seen_tail_ >= kSize) {
@@ -27,7 +27,7 @@ class Ring {
     head_.store(head + 1, std::memory_order_release);
     return true;
   }
-  /// Of one other thread: the oldest, or nothing.
+  /// For the consumer only. Takes the oldest item; false where the ring is empty.
   bool pop(T& to) {
     const std::uint64_t tail = tail_.load(std::memory_order_relaxed);
     if (tail == head_.load(std::memory_order_acquire)) return false;
@@ -40,7 +40,7 @@ class Ring {
  private:
   std::unique_ptr<std::array<T, kSize>> items_ = std::make_unique<std::array<T, kSize>>();
   alignas(64) std::atomic<std::uint64_t> head_ = 0;
-  std::uint64_t seen_tail_ = 0;  // of who pushes
+  std::uint64_t seen_tail_ = 0;  // the producer's copy of tail_, refreshed only when the ring looks full
   std::atomic<std::uint64_t> dropped_ = 0;
   alignas(64) std::atomic<std::uint64_t> tail_ = 0;
 };

@@ -9,8 +9,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr double kServed_s = 0.1, kDiagnosed_s = 1;  // between looks at what comes less often than samples
-constexpr milliseconds kIdle{1};                     // between looks at an empty ring
+constexpr double kServed_s = 0.1, kDiagnosed_s = 1;  // periods of serve() and of the diagnostics
+constexpr milliseconds kIdle{1};                     // sleep while the ring is empty
 
 }  // namespace
 
@@ -46,7 +46,7 @@ void Telemetry::write(const rollout::FlightSample& sample) {
   ++shown_;
 }
 
-/// What comes seldom: progress, commands, diagnostics.
+/// Publishes the training progress and the diagnostics, and takes commands.
 void Telemetry::serve() {
   std::optional<TrainingSample> training;
   {
@@ -85,7 +85,7 @@ void Telemetry::serve() {
 void Telemetry::run() {
   rollout::FlightSample sample;
   for (;;) {
-    const bool last = over_;  // read before the ring: what was pushed until then is written
+    const bool last = over_;  // read before the ring, so that every sample pushed before over_ was set is published
     bool any = false;
     while (ring_.pop(sample)) {
       write(sample);

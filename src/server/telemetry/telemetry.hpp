@@ -1,12 +1,12 @@
-// What a training, an evaluation or flights show of themselves while they run: the flappers that are watched (flapper_topics.hpp),
+// Publishes the watched flappers of a training, an evaluation or flights while they run: the topics of each flapper (flapper_topics.hpp),
 // and
 //
-//   /clock                   rosgraph_msgs/Clock     time of the first one's flight
-//   /flappy/training         TrainingMetrics         how far a training is
-//   /flappy/watch            Watch                   taken, where commands are: shows that flapper in the first place
-//   /diagnostics             DiagnosticArray         once a second: shown and dropped
+//   /clock                   rosgraph_msgs/Clock     flight time of the first watched flapper
+//   /flappy/training         TrainingMetrics         progress of a training
+//   /flappy/watch            Watch                   subscribed where commands are enabled: the flapper to show in the first slot
+//   /diagnostics             DiagnosticArray         once a second: number of samples shown and dropped
 //
-// Flight threads leave samples in a ring and go on; a thread of its own writes them. What does not fit is dropped and counted.
+// The flight thread puts samples into a ring and goes on; a separate thread publishes them. Samples that do not fit are dropped and counted.
 #pragma once
 
 #include <atomic>
@@ -28,11 +28,11 @@ struct TrainingSample {
 class Telemetry : public rollout::Watch {
  public:
   Telemetry(const io::DdsConfig& config, const flight::Sensors& sensors);
-  /// Writes what is in the ring.
+  /// Publishes what is left in the ring.
   ~Telemetry() override;
 
   void see(const rollout::FlightSample& sample) override;
-  /// The newest is shown, within a tenth of a second.
+  /// Publishes the newest sample within a tenth of a second; older ones may be skipped.
   void show(const TrainingSample& sample);
 
   std::uint64_t shown() const { return shown_; }
@@ -49,7 +49,7 @@ class Telemetry : public rollout::Watch {
   Participant participant_;
   std::vector<FlapperTopics> flappers_;
   Writer<Clock> clock_;
-  std::optional<Writer<TrainingMetrics>> training_;  // of what trains
+  std::optional<Writer<TrainingMetrics>> training_;  // created at the first show()
   Writer<DiagnosticArray> diagnostics_;
   std::optional<Reader<server::Watch>> watch_;
   Ring<rollout::FlightSample, kRing> ring_;
@@ -58,10 +58,10 @@ class Telemetry : public rollout::Watch {
   std::atomic<std::uint64_t> shown_ = 0;
   double last_served_s_ = 0, last_diagnosed_s_ = 0;
   std::atomic<bool> over_ = false;
-  std::thread thread_;  // last: it uses the others
+  std::thread thread_;  // last member, because the thread uses the others
 };
 
-/// Telemetry of a program whose configuration asks for it; nothing otherwise.
+/// Returns null where the configuration does not enable telemetry.
 std::shared_ptr<Telemetry> telemetry_of(const io::DdsConfig& config, const flight::Sensors& sensors);
 
 }  // namespace flappy::server

@@ -1,4 +1,4 @@
-// The robot with what is off: one arrow, arc or part for each channel, stronger the more its residual exceeds noise.
+// Draws the robot with its residuals: one arrow, arc or part for each channel, stronger the more its residual exceeds noise.
 import {drawn, element} from "./dom.js";
 import {kHummingbird, wingPoint} from "./geometry.js";
 
@@ -10,7 +10,7 @@ import {kHummingbird, wingPoint} from "./geometry.js";
 const kWidth = 480, kHeight = 350, kScale = 2400, kLetter = 7.5, kBelow = 24;  // px
 
 /**
- * Seen from the front and a little from above: the robot's left is on the right.
+ * Projects a point to the picture, seen from the front and slightly from above: the robot's left is on the right.
  * @param {number[]} p in B, m
  * @returns {number[]} px
  */
@@ -25,7 +25,7 @@ function pathOf(points) {
 }
 
 /**
- * How strongly a residual is drawn: 0 at noise, 1 at ten times that.
+ * The strength with which a residual is drawn: 0 at noise, 1 at ten times noise, logarithmic in between.
  * @param {number} ratio
  * @returns {number}
  */
@@ -39,7 +39,7 @@ function inkOf(strength) {
   return {stroke: strength > 0.02 ? `rgb(${mixed.join(" ")})` : "#c8d0d8", "stroke-width": 2 + 6 * strength};
 }
 
-/** Axes of B with their turning: an arc about the axis. */
+/** Directions of the axes of B. */
 const kAxes = {x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1]};
 
 /** @param {"x" | "y" | "z"} axis @param {number} radius_m @param {number} along_m @returns {number[][]} */
@@ -93,7 +93,7 @@ function bodyElement() {
   return drawn("path", {d: `M${silhouette.join("L")}Z`, fill: "#e7ebef", stroke: "#8c959f"});
 }
 
-/** A body that says nothing of its shape: a circle about the tracked point, the same in the plane of its x and y. @returns {SVGElement[]} */
+/** For a body of unknown form: a circle around the tracked point, and one in the plane of its x and y. @returns {SVGElement[]} */
 function signElements() {
   const radius_m = 0.016, [x, y] = projected([0, 0, 0]);
   const level = Array.from({length: 49}, (_, k) => [radius_m * Math.cos(2 * Math.PI * k / 48), radius_m * Math.sin(2 * Math.PI * k / 48), 0]);

@@ -1,4 +1,4 @@
-// What a section is made of (src/view/page.hpp), as elements.
+// Turns the blocks of a section (src/view/page.hpp) into elements.
 import {anatomyElement} from "./anatomy.js";
 import {casesElement} from "./cases.js";
 import {figureElement} from "./chart.js";
@@ -29,7 +29,7 @@ function tableElement(block) {
 }
 
 /**
- * Black or white, whichever has the larger contrast; of one of them it is at least 4.5 to 1 (WCAG 2.1, relative luminance).
+ * Black or white, whichever has the larger contrast, which is at least 4.5 to 1 (WCAG 2.1, relative luminance).
  * @param {number[]} shade red, green, blue to 255
  * @returns {string}
  */
@@ -39,7 +39,7 @@ export function inkOn(shade) {
 }
 
 /**
- * A grid of counts or sizes, darker where there is more. Ink stays readable on every shade.
+ * A grid of numbers, darker for larger ones. The text stays readable on every shade.
  * @param {Block} block
  * @returns {HTMLElement}
  */
@@ -65,14 +65,14 @@ function matrixElement(block) {
 /**
  * @param {Block} block
  * @param {Uint8Array} bytes
- * @param {(() => void)[]} later what is done once all is in the page
+ * @param {(() => void)[]} later calls to make once all elements are in the page
  * @returns {HTMLElement}
  */
 export function blockElement(block, bytes, later) {
   if (block.kind === "flights") {
     const player = new Player(/** @type {any} */ (block), bytes);
     later.push(() => player.start());
-    window.players = [...window.players ?? [], player];  // for tests and for curious people
+    window.players = [...window.players ?? [], player];  // for tests and for debugging in the browser
     return player.element;
   }
   /** @type {Record<string, (block: any) => HTMLElement>} */

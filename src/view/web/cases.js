@@ -1,4 +1,4 @@
-// The cases of a blind benchmark, each one click from what the diagnosis said of it.
+// The table of cases of a blind benchmark; a click on a case opens what the diagnosis said about it.
 import {element, shortNumber} from "./dom.js";
 
 /**

@@ -1,4 +1,4 @@
-// Figures (src/view/figure.hpp) by Chart.js. Bars and intervals are drawn here, so that paper and page lay them out alike.
+// Draws figures (src/view/figure.hpp) by Chart.js. Bars and intervals are drawn here, so that paper and page have the same layout.
 import {element, shortNumber} from "./dom.js";
 
 /**
@@ -10,8 +10,8 @@ import {element, shortNumber} from "./dom.js";
  */
 
 const kInk = "#24292f", kSoft = "#57606a", kGrid = "#e4e8ec";
-const kLabelled = 0.5;  // bars as wide as that have room for their number
-const kLine = 26;  // letters
+const kLabelled = 0.5;  // bars at least this wide have room for their number
+const kLine = 26;  // letters of a line
 export const kFont = "system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif";
 
 /**
@@ -28,7 +28,7 @@ function scaleOf(axis) {
 }
 
 /**
- * A long name in lines.
+ * Breaks a long name into lines.
  * @param {string} text
  * @returns {string[]}
  */
@@ -43,7 +43,7 @@ export function wrapped(text) {
 }
 
 /**
- * What Chart.js is asked to draw: everything is a function of numbers, categories are names of whole numbers.
+ * The configuration of Chart.js: everything is a function of numbers; categories are names of whole numbers.
  * @param {FigureJson} figure
  * @returns {Record<string, any>}
  */
@@ -62,7 +62,7 @@ export function chartConfig(figure) {
     const points = s.x.map((x, i) => ({x, y: (s.y ?? [])[i]}));
     datasets.push({...common, data: points.filter((p) => line || p.x !== null), showLine: line, spanGaps: false, borderWidth: 2,
       borderDash: s.dashed ? [6, 4] : [], pointRadius: line || s.draw === "bars" ? 0 : 4, pointHoverRadius: 4, pointHitRadius: 12,
-      clip: line ? 0 : 6});  // a point at the end of an axis is a whole one
+      clip: line ? 0 : 6});  // do not cut off a point at the end of an axis
   }
   const y = scaleOf(figure.y);
   if (figure.categories.length > 0) {
@@ -72,7 +72,7 @@ export function chartConfig(figure) {
     y.afterBuildTicks = (/** @type {any} */ axis) => { axis.ticks = figure.categories.map((_, value) => ({value})); };
   }
   const x = scaleOf(figure.x);
-  // what reaches beyond the points
+  // make room for intervals, which reach beyond the points
   const ends = figure.series.filter((s) => s.draw === "interval").flatMap((s) => [...s.low ?? [], ...s.high ?? []]).filter((v) => v !== null).map(Number);
   if (ends.length > 0) Object.assign(x, {suggestedMin: Math.min(...ends), suggestedMax: Math.max(...ends)});
   return {
@@ -91,7 +91,7 @@ export function chartConfig(figure) {
 }
 
 /**
- * The keys of a legend: a line for each name, dashed as its series is, broad as a band is.
+ * The keys of the legend: a line for each name, dashed like its series, and broad for a band.
  * @param {any} chart
  * @returns {Record<string, any>[]}
  */
@@ -102,7 +102,7 @@ function legendKeys(chart) {
   })).filter((/** @type {any} */ key) => key.text !== "");
 }
 
-/** Bars from the axis, and the reach of intervals. */
+/** Plugin of Chart.js that draws bars from the axis, and intervals. */
 const barsAndIntervals = {
   id: "barsAndIntervals",
   beforeDatasetsDraw(/** @type {any} */ chart) {
@@ -142,7 +142,7 @@ const barsAndIntervals = {
 };
 
 /**
- * The numbers of a figure as rows, for those who read rather than look.
+ * The numbers of a figure as rows of a table, for readers who do not see the picture.
  * @param {FigureJson} figure
  * @returns {{head: string[], rows: string[][]}}
  */
@@ -176,7 +176,7 @@ export function figureElement(figure) {
   const made = element("figure", {class: "chart-figure", "data-figure": figure.id}, element("h3", {}, figure.title), frame);
   if (figure.note) made.append(element("figcaption", {}, figure.note));
   made.append(numbers);
-  // a canvas has a size only where it is in the page
+  // a canvas has a size only once it is in the page
   requestAnimationFrame(() => new Chart(/** @type {HTMLCanvasElement} */ (canvas), chartConfig(figure)));
   return made;
 }

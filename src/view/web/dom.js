@@ -1,4 +1,4 @@
-// Elements of the page. Text of others only ever becomes a text node.
+// Makes elements of the page. Foreign text only becomes text nodes.
 
 /**
  * @param {string} name
@@ -27,7 +27,7 @@ export function drawn(name, attributes = {}, ...children) {
 }
 
 /**
- * Three significant digits, a true minus sign, no exponent where none is needed.
+ * A number with three significant digits, a true minus sign, and an exponent only where necessary.
  * @param {number} value
  * @returns {string}
  */
@@ -39,7 +39,7 @@ export function shortNumber(value) {
 }
 
 /**
- * A cell of a table: a text, or a text that says where in the results it stands.
+ * A cell of a table: a text, optionally with its JSON pointer in the results.
  * @param {string | {text: string, at?: string, strong?: boolean}} cell
  * @param {string} name of the element
  * @returns {HTMLElement}

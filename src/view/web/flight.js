@@ -1,4 +1,4 @@
-// One recorded flight: its streams by the instant at which they were, and what is seen of them at a time.
+// One recorded flight: its streams by the instants of their samples, and the robot's state at any time.
 import {unpackedColumn} from "./packing.js";
 import {anglesOf, betweenAttitudes, rotated} from "./geometry.js";
 import {meanBetween, placeOf, runningSums, unwrapped, valueAt} from "./series.js";
@@ -34,7 +34,7 @@ export class Flight {
       for (const [name, packed] of Object.entries(columns)) own[name] = unpackedColumn(bytes, packed);
       this.streams[stream] = own;
     }
-    // the page's time begins at the first pose, and is that of the instant, not of arrival
+    // the page's time starts at the first pose; it is the time of the instant, not of the arrival
     const begin = this.streams.mocap.t_s[0] - (json.latency_s.mocap ?? 0);
     for (const [stream, columns] of Object.entries(this.streams)) {
       const shift = begin + (json.latency_s[stream] ?? 0);
@@ -42,11 +42,11 @@ export class Flight {
     }
     const arrival = begin + (json.latency_s.mocap ?? 0);
     const [from, to] = json.swapped ? [json.swapped.begin_s, json.swapped.end_s].map((packed) => unpackedColumn(bytes, packed)) : [[], []];
-    /** Stretches of time without poses, since their markers were taken for others. */
+    /** Stretches of time without poses, because their markers were swapped. */
     this.swapped = Array.from(from, (t, k) => [t - arrival, to[k] - arrival]);
     const m = this.streams.mocap;
     this.duration_s = m.t_s[m.t_s.length - 1];
-    /** Of the path where there is such, for it has no beat to take the mean of. */
+    /** The force of the path where there is one, because such a flight has no beat to average over. */
     this.forces = this.streams.path ?? this.streams.imu;
     this.sums = !this.forces ? [] : ["x", "y", "z"].map((axis) => runningSums(this.forces[`accel_${axis}_m_s2`]));
   }
@@ -72,12 +72,12 @@ export class Flight {
     return a.map((value, k) => (b[k] - value) / Math.max(1e-9, end - begin));
   }
 
-  /** @returns {number} the length of a beat, or of a step through a flight that has none */
+  /** @returns {number} the length of a beat, or of a step through a flight without beats */
   get beat_s() {
     return this.json.flapping_Hz > 0 ? 1 / this.json.flapping_Hz : kStep_s;
   }
 
-  /** @param {number} t_s @returns {number[] | null} in W, N: mass times specific force, the mean of one beat; null: no stream has it */
+  /** @param {number} t_s @returns {number[] | null} in W, N: mass times specific force, averaged over one beat; null: no stream has it */
   forceAt(t_s) {
     if (!this.forces) return null;
     const half = this.streams.path ? 0 : 0.5 * this.beat_s, times = this.forces.t_s;
@@ -92,7 +92,7 @@ export class Flight {
       : [0, 0, 0, 0];
   }
 
-  /** @returns {Panel[]} what is drawn over time */
+  /** @returns {Panel[]} the plots over time */
   panels() {
     const s = this.streams, m = s.mocap;
     const angles = [new Float64Array(m.t_s.length), new Float64Array(m.t_s.length), new Float64Array(m.t_s.length)];

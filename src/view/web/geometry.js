@@ -1,13 +1,13 @@
-// The robot's shape and turns. World W: z up. Body B: x forward, y left, z up. Quaternions w, x, y, z, body to world.
+// The robot's form and rotations. World W: z up. Body B: x forward, y left, z up. Quaternions are w, x, y, z, body to world.
 
 /**
  * @typedef {{shoulder_m: number[], outline_m: number[][]}} Side outline_m: pairs of span and chord, down the trailing edge from the root
  * @typedef {{name: string, mass_kg: number, profile_m?: number[][], left?: Side, right?: Side, body_m?: number[]}} Vehicle profile_m: pairs of
- *   height and radius; body_m: of one without modelled wings, the semi-axes of its ellipsoid (src/view/shape.hpp)
+ *   height and radius; body_m: semi-axes of the ellipsoid of a beat-averaged vehicle (src/view/shape.hpp)
  */
 
 /**
- * The shipped hummingbird's shape, as src/view/shape.cpp makes it: drawn where nobody says which vehicle it is.
+ * The form of the shipped hummingbird, made by src/view/shape.cpp; drawn where the vehicle is unknown.
  * @type {Vehicle}
  */
 export const kHummingbird = {"name": "hummingbird_nominal", "mass_kg": 0.0124481,
@@ -69,7 +69,7 @@ export function anglesOf(q) {
 }
 
 /**
- * Between two attitudes, the short way.
+ * Interpolates between two attitudes, the short way.
  * @param {number[]} a
  * @param {number[]} b
  * @param {number} share

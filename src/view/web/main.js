@@ -1,4 +1,4 @@
-// Draws the report that stands in the page.
+// Draws the report from the data in the page.
 import {blockElement} from "./blocks.js";
 import {element} from "./dom.js";
 import {inflatedBytes} from "./packing.js";

@@ -1,7 +1,7 @@
-// Columns of numbers as src/view/packing.hpp packs them.
+// Unpacks columns of numbers that src/view/packing.hpp packed.
 
 /**
- * Where a column lies among the packed bytes.
+ * The place of a column among the packed bytes.
  * @typedef {{at: number, count: number, step: number}} Packed
  */
 
@@ -28,7 +28,7 @@ export function unpackedColumn(bytes, packed) {
   for (let i = 0; i < packed.count; i++) {
     let byte = bytes[at++];
     let value = byte & 0x7f;
-    // beyond 31 bits there are no shifts
+    // multiply, because shifts are limited to 32 bits
     for (let scale = 128; byte & 0x80; scale *= 128) {
       byte = bytes[at++];
       value += (byte & 0x7f) * scale;

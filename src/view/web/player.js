@@ -1,4 +1,4 @@
-// A page's flights: the robots in 3D, their streams beside them, and what plays both.
+// The player of a page's flights: the robots in 3D, their streams next to them, and the controls of both.
 import {element, shortNumber} from "./dom.js";
 import {Flight, kBlue, kGreen, kPurple, kVermillion} from "./flight.js";
 import {Scene} from "./scene.js";
@@ -107,7 +107,7 @@ export class Player {
   }
 
   /**
-   * The watched robot at even moments of what the plots show, all at once.
+   * Shows the watched robot at equally spaced times of the visible window, all at once.
    * @param {boolean} on
    * @param {number} count
    */
@@ -133,7 +133,7 @@ export class Player {
     return list;
   }
 
-  /** Once the element is in the page. */
+  /** Call it once the element is in the page. */
   start() {
     const place = this.flights[0].json.ambient;
     const robots = this.flights.map((flight, k) => ({vehicle: flight.json.vehicle, colour: kColours[k % kColours.length], path: this.pathOf(flight)}));
@@ -150,7 +150,7 @@ export class Player {
     }).observe(this.view);
   }
 
-  /** @param {Flight} flight @returns {number[][]} evenly in time */
+  /** @param {Flight} flight @returns {number[][]} positions at equal steps of time */
   pathOf(flight) {
     const count = Math.min(kTrailPoints, Math.max(16, Math.round(flight.duration_s * 150)));
     return Array.from({length: count + 1}, (_, k) => flight.positionAt(flight.duration_s * k / count));
@@ -203,7 +203,7 @@ export class Player {
     requestAnimationFrame(frame);
   }
 
-  /** @param {HTMLElement} view that takes keys and the mouse */
+  /** @param {HTMLElement} view element that takes keys and the mouse */
   steer(view) {
     view.addEventListener("keydown", (event) => {
       if (event.ctrlKey || event.metaKey || event.altKey) return;
@@ -229,7 +229,7 @@ export class Player {
       if (event.buttons !== 0) this.turn(-0.008 * event.movementX, 0.008 * event.movementY);
     });
     view.addEventListener("wheel", (event) => {
-      if (document.activeElement !== view) return;  // else it scrolls the page
+      if (document.activeElement !== view) return;  // otherwise the wheel scrolls the page
       event.preventDefault();
       this.turn(0, 0, Math.exp(0.001 * event.deltaY));
     }, {passive: false});

@@ -1,4 +1,4 @@
-// The flight in 3D, by three.js: robots, their trails, the place, arrows.
+// Draws flights in 3D by three.js: robots, their trails, their surroundings, arrows.
 import {rotated, spanOf} from "./geometry.js";
 
 /**
@@ -11,13 +11,13 @@ import {rotated, spanOf} from "./geometry.js";
 
 const kHalfSpan_m = 0.084;
 const kMomentColour = "#0072b2";
-const kChase_m = 0.55;  // from which a robot is followed
-const kFar_m = 50;  // what lies farther away is not there
-const kVelocityArrow_s = 0.12, kForceArrow_m = 0.09;  // length at 1 m/s, and at the weight
-const kWing_m = 0.07;  // for which the sizes of a beak and a spar are given
+const kChase_m = 0.55;  // distance from which the camera follows a robot
+const kFar_m = 50;  // surfaces farther away are not drawn
+const kVelocityArrow_s = 0.12, kForceArrow_m = 0.09;  // length of the arrows at 1 m/s, and at the weight
+const kWing_m = 0.07;  // wing length for which the sizes of beak and spar are given
 
 /**
- * How much larger a robot is than the one that distances and arrows are made for.
+ * The ratio of a robot's size to that of the robot for which distances and arrows are made.
  * @param {Vehicle} vehicle
  * @returns {number}
  */
@@ -25,11 +25,11 @@ function sizeOf(vehicle) {
   return vehicle.body_m ? Math.max(...vehicle.body_m) / kHalfSpan_m : 1;
 }
 
-/** One robot. Its wings are those of the vehicle's file; where that has none, it is the ellipsoid of its mass and inertia. */
+/** One robot, with the wings of the vehicle's file; for a beat-averaged vehicle, the ellipsoid of its mass and inertia. */
 class Robot {
   /**
    * @param {Vehicle} vehicle
-   * @param {string} colour of its wings, or of all of it
+   * @param {string} colour of its wings, or of the ellipsoid
    */
   constructor(vehicle, colour) {
     this.group = new THREE.Group();
@@ -114,7 +114,7 @@ class Robot {
   }
 }
 
-/** A path through points, evenly in time. */
+/** A path through points at equal steps of time. */
 class Trail {
   /**
    * @param {number[][]} points
@@ -147,7 +147,7 @@ class Trail {
 }
 
 /**
- * A name beside a thing, always of one size.
+ * A text next to an object, always of the same size.
  * @param {string} text
  * @param {string} colour
  * @returns {any}
@@ -167,9 +167,10 @@ function label(text, colour) {
 }
 
 /**
- * Squares in the x-y plane. Each side is a line of its own: software that draws WebGL may leave out a line that begins behind the camera.
+ * A grid of squares in the x-y plane. Each side of a square is a separate line: software renderers of WebGL may drop a line that begins
+ * behind the camera.
  * @param {number} size_m
- * @param {number} count of squares beside each other
+ * @param {number} count number of squares along a side
  * @param {number} colour
  * @returns {any}
  */
@@ -264,7 +265,7 @@ export class Scene {
   }
 
   /**
-   * Ground, ceiling and walls where the log has them near; a grid of decimetres to see distances by.
+   * Adds ground, ceiling and walls of the log that are near, and a grid of decimetres for scale.
    * @param {Place} place
    * @param {number[] | null} goal_m
    */
@@ -320,7 +321,7 @@ export class Scene {
   }
 
   /**
-   * What stands in the room, as the log's [ambient] has it.
+   * Adds the solids in the room, from the log's [ambient].
    * @param {Place} place
    */
   addSolids(place) {
@@ -342,7 +343,7 @@ export class Scene {
   }
 
   /**
-   * Another trail for a robot: of a flight that goes on.
+   * Replaces the trail of a robot whose flight goes on.
    * @param {number} k of the robots
    * @param {number[][]} path
    * @param {string} colour
@@ -355,7 +356,7 @@ export class Scene {
     this.scene.add(this.trails[k].group);
   }
 
-  /** Takes the size of its frame. */
+  /** Adapts the canvas to the size of its frame. */
   resize() {
     const {clientWidth: width, clientHeight: height} = this.frame;
     if (width === 0 || height === 0) return;
@@ -376,7 +377,7 @@ export class Scene {
   }
 
   /**
-   * Turns the camera about what it looks at.
+   * Turns the camera around the point that it looks at.
    * @param {number} azimuth_rad
    * @param {number} elevation_rad
    * @param {number} zoom factor of the distance
@@ -388,8 +389,8 @@ export class Scene {
   }
 
   /**
-   * The watched robot at several moments at once.
-   * @param {Pose[]} poses none: no longer
+   * Shows the watched robot at several moments at once.
+   * @param {Pose[]} poses empty: show none
    */
   showMoments(poses) {
     while (this.moments.length < poses.length) {
@@ -404,8 +405,8 @@ export class Scene {
   }
 
   /**
-   * @param {(Pose | null)[]} poses of all robots; null: not shown
-   * @param {number[]} shares of their flights
+   * @param {(Pose | null)[]} poses one for each robot; null: hide it
+   * @param {number[]} shares share of each flight that was flown
    * @param {{trail: boolean, arrows: boolean}} shown
    */
   draw(poses, shares, shown) {

@@ -1,4 +1,4 @@
-// Sampled functions of time: where a time lies, values between samples, and what a screen can show of many.
+// Sampled functions of time: the sample at a time, interpolation, and thinning to what a screen can show.
 
 /**
  * The last sample at or before `t`; 0 before the first.
@@ -17,7 +17,7 @@ export function placeOf(times, t) {
 }
 
 /**
- * Straight lines between samples, the ends held.
+ * Linear interpolation between samples; the first and last value hold beyond the ends.
  * @param {ArrayLike<number>} times
  * @param {ArrayLike<number>} values
  * @param {number} t
@@ -30,8 +30,8 @@ export function valueAt(times, values, t) {
 }
 
 /**
- * Points between two times, no more than two for each bucket: its smallest and largest value in the order in which they come,
- * so that no peak is lost. One sample beyond each end, so that lines leave the picture.
+ * The points between two times, at most two for each bucket: its smallest and its largest value in their order,
+ * so that no peak is lost. Includes one sample beyond each end, so that lines reach the edges of the picture.
  * @param {ArrayLike<number>} times
  * @param {ArrayLike<number>} values
  * @param {number} begin
@@ -61,9 +61,9 @@ export function visiblePoints(times, values, begin, end, buckets) {
 }
 
 /**
- * Sums of all values before a sample, for means over any stretch.
+ * Cumulative sums: the sum of all values before each sample, for means over any stretch.
  * @param {ArrayLike<number>} values
- * @returns {Float64Array} one longer
+ * @returns {Float64Array} one longer than `values`
  */
 export function runningSums(values) {
   const sums = new Float64Array(values.length + 1);
@@ -72,7 +72,7 @@ export function runningSums(values) {
 }
 
 /**
- * Mean of the samples between two times; of the nearest one where there is none.
+ * Mean of the samples between two times; the last sample before them where there is none between.
  * @param {ArrayLike<number>} times
  * @param {Float64Array} sums
  * @param {number} begin
@@ -85,7 +85,7 @@ export function meanBetween(times, sums, begin, end) {
 }
 
 /**
- * Angles that go on beyond half a turn.
+ * Makes angles continuous beyond half a turn.
  * @param {Float64Array} angles
  * @returns {Float64Array}
  */

@@ -1,4 +1,4 @@
-// Streams over time, one plot below the other, with one cursor through all of them.
+// Plots of streams over time, one below the other, with a common cursor.
 import {kFont} from "./chart.js";
 import {element, shortNumber} from "./dom.js";
 import {valueAt, visiblePoints} from "./series.js";
@@ -10,7 +10,7 @@ import {valueAt, visiblePoints} from "./series.js";
 
 const kLeft_px = 52, kBuckets = 700;
 
-/** One plot: the lines of the watched flight, and dashed those of the one beside it. */
+/** One plot: the lines of the watched flight, and dashed those of a second flight. */
 class Plot {
   /**
    * @param {Panel} panel
@@ -40,7 +40,7 @@ class Plot {
     });
     this.area.addEventListener("pointermove", (event) => { if (event.buttons === 1) seek(time(event)); });
     this.area.addEventListener("wheel", (event) => {
-      if (!event.ctrlKey && !event.shiftKey) return;  // else it scrolls the page
+      if (!event.ctrlKey && !event.shiftKey) return;  // otherwise the wheel scrolls the page
       event.preventDefault();
       zoom(Math.exp(0.002 * (event.deltaY || event.deltaX)), time(event));
     }, {passive: false});
@@ -76,7 +76,7 @@ class Plot {
   }
 
   /**
-   * Grey where there is nothing to be seen.
+   * Shades the stretches without poses.
    * @param {any} chart
    */
   shade(chart) {
@@ -130,13 +130,13 @@ export class Timeline {
     });
   }
 
-  /** @param {number} length_s of what is shown, about the cursor */
+  /** @param {number} length_s length of the visible window around the cursor */
   show(length_s) {
     this.length_s = Math.min(length_s, this.duration_s);
     this.place(this.now_s - this.length_s / 2);
   }
 
-  /** @param {number} factor @param {number} t_s that stays where it is */
+  /** @param {number} factor @param {number} t_s time that keeps its place on the screen */
   zoom(factor, t_s) {
     const length = Math.min(this.duration_s, Math.max(5e-3, (this.end_s - this.begin_s) * factor));
     const share = (t_s - this.begin_s) / (this.end_s - this.begin_s);

@@ -1,4 +1,4 @@
-// Everything that may be wrong with the blind robot: nothing at size 0, something at size 1, and of the size it should be.
+// Everything that may be wrong with the blind robot: nothing at magnitude 0, something at magnitude 1, and of the magnitude it should be.
 #include "blind/a/effects.hpp"
 
 #include <gtest/gtest.h>
@@ -15,13 +15,13 @@ namespace flappy::blind::effects_test {
 namespace {
 
 /// What a short flight near ground, ceiling and wall leaves: motion, currents, battery, and what the sensors saw.
-std::vector<double> trace(const Sizes& sizes, double duration_s = 0.25) {
+std::vector<double> trace(const Magnitudes& magnitudes, double duration_s = 0.25) {
   const Room room{.ceiling_z_m = 0.25, .wall = {0, 0.2, 0, -1}};
   const std::uint64_t seed = 3;
   const SensorSet set = sensors_of(seed, false, false);
-  Robot robot(test::identified(), room, sizes, seed);
-  RobotImu imu(set, sizes, seed, 0, kRobotStep_s);
-  RobotMocap mocap(set, sizes, seed, 0);
+  Robot robot(test::identified(), room, magnitudes, seed);
+  RobotImu imu(set, magnitudes, seed, 0, kRobotStep_s);
+  RobotMocap mocap(set, magnitudes, seed, 0);
   Torso start;
   start.position_m = {0.05, 0, 0.15};
   start.velocity_m_s = {0.3, 0.2, -0.3};
@@ -61,28 +61,28 @@ double distance(const std::vector<double>& a, const std::vector<double>& b) {
   return std::sqrt(sum / static_cast<double>(a.size()));
 }
 
-TEST(BlindEffects, VanishAtSizeZeroAndActAtSizeOne) {
+TEST(BlindEffects, VanishAtMagnitudeZeroAndActAtMagnitudeOne) {
   const std::vector<double> none = trace({});
   for (const std::string& name : effect_names()) {
-    const double small = distance(trace(Sizes({{name, 0.05}})), none),
-                 typical = distance(trace(Sizes({{name, 1}})), none);
+    const double small = distance(trace(Magnitudes({{name, 0.05}})), none),
+                 typical = distance(trace(Magnitudes({{name, 1}})), none);
     EXPECT_GT(small, 0) << name;
-    // It grows with its size; but a gear with the narrowest gap has flanks, which one without has not.
+    // It grows with its magnitude; but a gear with the narrowest gap has flanks, which one without has not.
     EXPECT_GT(typical, (name == "gear_backlash" ? 1 : 5) * small) << name;
     EXPECT_GT(typical, 0.01) << name;
-    if (name != "gear_backlash") EXPECT_LT(distance(trace(Sizes({{name, 1e-6}})), none), 0.05 * typical) << name;
+    if (name != "gear_backlash") EXPECT_LT(distance(trace(Magnitudes({{name, 1e-6}})), none), 0.05 * typical) << name;
   }
 }
 
 TEST(BlindEffects, OfTheSensorsLeaveTheMotionAlone) {
-  const auto motion = [](const Sizes& sizes) {
-    std::vector<double> all = trace(sizes, 0.05);
+  const auto motion = [](const Magnitudes& magnitudes) {
+    std::vector<double> all = trace(magnitudes, 0.05);
     return std::vector<double>(all.end() - 12, all.end());
   };
   const auto none = motion({});
   for (const char* name : {"gyro_bias", "accelerometer_misalignment", "vibration_rectification", "mocap_tilt",
                            "marker_offset", "mocap_delay", "outside_mocap_lens"})
-    EXPECT_EQ(motion(Sizes({{name, 1}})), none) << name;
+    EXPECT_EQ(motion(Magnitudes({{name, 1}})), none) << name;
 }
 
 struct Stand {
@@ -91,7 +91,7 @@ struct Stand {
 };
 /// At 10 V with the torso held at a height.
 Stand stand(const std::vector<BlindEffect>& effects, double z_m = 1, double amplitude_V = 10) {
-  Robot robot(test::nominal(), {}, Sizes(effects), 3);
+  Robot robot(test::nominal(), {}, Magnitudes(effects), 3);
   robot.hold_torso(true);
   Torso torso;
   torso.position_m.z() = z_m;
@@ -113,7 +113,7 @@ Stand stand(const std::vector<BlindEffect>& effects, double z_m = 1, double ampl
   return s;
 }
 
-// Sizes of the catalogue, within a factor of about two: what is typical is not known better.
+// Magnitudes of the catalogue, within a factor of about two: what is typical is not known better.
 TEST(BlindEffects, AreOfTypicalSize) {
   if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const double thrust = stand({}).thrust_N;
@@ -137,15 +137,17 @@ TEST(BlindEffects, AreOfTypicalSize) {
 }
 
 TEST(BlindEffects, RefuseWhatTheyDoNotKnow) {
-  const auto refusal = [](const char* id, double size) { return test::refusal([&] { Sizes({{id, size}}); }); };
+  const auto refusal = [](const char* id, double magnitude) {
+    return test::refusal([&] { Magnitudes({{id, magnitude}}); });
+  };
   EXPECT_EQ(refusal("ground_efect", 1),
             "--effect ground_efect: no such effect; accepted: what `flappy-blind effects` lists; did you mean "
             "\"ground_effect\"?");
   EXPECT_EQ(test::refusal([] {
-              Sizes({{"wind", 1}, {"wind", 2}});
+              Magnitudes({{"wind", 1}, {"wind", 2}});
             }),
             "--effect wind: given twice; accepted: each effect once");
-  EXPECT_EQ(refusal("wind", -1), "--effect wind: size -1 is out of range; accepted: 0 to 4, 1 is typical");
+  EXPECT_EQ(refusal("wind", -1), "--effect wind: magnitude -1 is out of range; accepted: 0 to 4, 1 is typical");
 }
 
 TEST(BlindEffects, HaveNamesOfTheirOwn) {

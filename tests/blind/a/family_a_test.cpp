@@ -38,7 +38,7 @@ TEST(FamilyA, FliesWhatItsOwnProgramsFly) {
 TEST(FamilyA, DrawsFiguresAndSensorsApart) {
   Assignment a = assignment();
   const Case declared = case_of(a);
-  a.own_figures = true;
+  a.own_parameters = true;
   const Case own = case_of(a);
   EXPECT_NE(own.vehicle.left.wing.mass_kg, declared.vehicle.left.wing.mass_kg);
   EXPECT_NE(own.vehicle.left.wing.mass_kg, own.vehicle.right.wing.mass_kg);

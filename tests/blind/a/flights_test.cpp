@@ -47,7 +47,7 @@ TEST(BlindFlights, SameSeedSameBytes) {
                             [](double) { return std::array<double, 4>{}; }};
   Case c = identified(2, Programme::hover);
   c.proposed = &hold;
-  c.sizes = Sizes({{"wind", 1}, {"command_delay", 0.5}, {"gyro_bias", 1}});
+  c.magnitudes = Magnitudes({{"wind", 1}, {"command_delay", 0.5}, {"gyro_bias", 1}});
   const RobotFlight a = fly(c, 0), b = fly(c, 0);
   ASSERT_FALSE(a.crashed) << a.how;
   EXPECT_EQ(flightlog::flight_log_files(a.log), flightlog::flight_log_files(b.log));

@@ -192,7 +192,7 @@ TEST(BlindRobot, FeelsThePointTurn) {
 }
 
 TEST(BlindRobot, CarriedTorsoKeepsWingsAndSlowStates) {
-  Robot robot(test::nominal(), {}, Sizes({{"winding_heating", 1}, {"battery_sag", 1}}), 1);
+  Robot robot(test::nominal(), {}, Magnitudes({{"winding_heating", 1}, {"battery_sag", 1}}), 1);
   run(robot, {}, 0, 0.2);
   const RobotState before = robot.state();
   Torso torso{{0.1, 0.2, 0.3}, turned_by({0.1, 0, 0.2}), {1, 0, 0}, {0, 0, 2}};

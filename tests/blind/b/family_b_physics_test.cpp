@@ -12,7 +12,7 @@ namespace {
 
 /// A robot without motors, friction and air, thrown with everything moving.
 Robot thrown(double gravity) {
-  Figures f = nominal();
+  RobotParameters f = nominal();
   for (Side& s : f.side) s.motor.torque_constant_Nm_A = 0;
   Surroundings room = open_air();
   room.gravity_m_s2 = gravity;
@@ -61,7 +61,7 @@ TEST(FamilyBBodies, FallFreely) {
 }
 
 TEST(FamilyBBodies, FlySymmetricallyWhereTheyAreSymmetric) {
-  Figures f = nominal();
+  RobotParameters f = nominal();
   f.torso.com_m.y() = 0;
   f.torso.inertia_kg_m2(0, 1) = f.torso.inertia_kg_m2(1, 0) = f.torso.inertia_kg_m2(1, 2) =
       f.torso.inertia_kg_m2(2, 1) = 0;
@@ -83,7 +83,7 @@ TEST(FamilyBBodies, FlySymmetricallyWhereTheyAreSymmetric) {
 
 /// Where a robot is after some beats, with so many steps a tick.
 State flown(int steps_per_tick, int ticks, bool driven) {
-  Figures f = nominal();
+  RobotParameters f = nominal();
   if (!driven)
     for (Side& s : f.side) s.motor.torque_constant_Nm_A = 0;
   Robot robot(f, {}, open_air(), 1, 0);
@@ -124,14 +124,14 @@ TEST(FamilyBStep, IsFineEnough) {
 }
 
 TEST(FamilyBThrust, CarriesTheWeightAtTenVolts) {
-  const Figures f = nominal();
+  const RobotParameters f = nominal();
   const double weight = f.mass_kg() * kGravity_m_s2;
   EXPECT_NEAR(held(f, {10, 0, 0, 0}).f.z() / weight, 1, 0.04);
   EXPECT_LT(held(f, {8, 0, 0, 0}).f.z() / weight, 0.8);
 }
 
 TEST(FamilyBThrust, TurnsAsTheDriverMeansTo) {
-  const Figures f = nominal();
+  const RobotParameters f = nominal();
   const Wrench none = held(f, {10, 0, 0, 0});
   EXPECT_GT(held(f, {10, 1, 0, 0}).n.x() - none.n.x(), 0.3e-3) << "roll: the left side goes up";
   EXPECT_GT(held(f, {10, 0, 1, 0}).n.y() - none.n.y(), 0.15e-3) << "pitch: the nose goes down";

@@ -85,7 +85,7 @@ TEST(FamilyBEffects, HaveTheirSigns) {
   EXPECT_EQ(felt_at({{"rotational_lift", 1}}, {0, 0, 1}).acceleration.v, none) << "no rotation, no lift of it";
   EXPECT_NEAR(felt_at({{"clap_and_fling", 1}}, {0, 0, 1}).acceleration.v.z(), none.z(), 1e-6)
       << "the wings are far apart";
-  const std::size_t side = static_cast<std::size_t>(ailments_of({}, 3).damaged_side);
+  const std::size_t side = static_cast<std::size_t>(effect_magnitudes_of({}, 3).damaged_side);
   EXPECT_NEAR(plant({{"wing_damage", 1}}).wing(side).area_m2() / plant().wing(side).area_m2(), 0.95, 1e-6);
   EXPECT_NEAR(plant({{"wing_damage", 1}}).wing(1 - side).area_m2() / plant().wing(1 - side).area_m2(), 1, 1e-12);
   EXPECT_NEAR(plant().wing(0).area_m2(), 0.07 * 0.021212121212121, 1e-12) << "the file's area";
@@ -93,13 +93,13 @@ TEST(FamilyBEffects, HaveTheirSigns) {
   EXPECT_EQ(plant().wing(0).added().norm(), 0);
 
   // less stroke, so less thrust
-  const Figures f = nominal();
+  const RobotParameters f = nominal();
   const double thrust = held(f, {10, 0, 0, 0}).f.z();
   for (const char* effect : {"coulomb_friction", "driver_dead_zone", "outside_common_supply"})
     EXPECT_LT(held(f, {10, 0, 0, 0}, {{effect, 1}}).f.z(), thrust) << effect;
 }
 
-TEST(FamilyBEffects, OfSizeZeroLeaveTheSameBytesAndOthersChangeThem) {
+TEST(FamilyBEffects, OfMagnitudeZeroLeaveTheSameBytesAndOthersChangeThem) {
   const Times brief{0.1, 0.2};
   Assignment a = assignment();
   a.power = a.wings = true;
@@ -143,7 +143,7 @@ TEST(FamilyBEffects, AreInTheCatalogueOrOutside) {
 
 TEST(FamilyBFlight, HoversAndIsALogThatCanBeRead) {
   Assignment a = assignment();
-  a.hover = a.power = a.wings = a.own_figures = a.conventions = true;
+  a.hover = a.power = a.wings = a.own_parameters = a.conventions = true;
   const FamilyFlight flight = fly_programme(a, 1, {1, 1});
   EXPECT_FALSE(flight.crashed) << flight.how;
   const flightlog::FlightLog read = flightlog::parse_flight_log(flightlog::flight_log_files(flight.log), "robot");
@@ -165,7 +165,7 @@ TEST(FamilyBFlight, SaysThatItCrashed) {
 
 TEST(FamilyBFlight, IsTheSameOnAnyThread) {
   Assignment a = assignment({{"wind", 1}, {"gyro_bias", 1}});
-  a.own_figures = a.conventions = true;
+  a.own_parameters = a.conventions = true;
   const Times brief{0.1, 0.15};
   const std::string once = bytes(fly_programme(a, 2, brief).log);
   std::vector<std::string> again(3);
@@ -221,11 +221,11 @@ TEST(FamilyBConventions, AreExactOrWithinBounds) {
 }
 
 TEST(FamilyBFigures, AreDrawnApartWithinThreeStandardDeviations) {
-  const Figures declared = nominal();
+  const RobotParameters declared = nominal();
   double heaviest = 0, left_right = 0;
   for (std::uint64_t seed = 0; seed < 30; ++seed) {
-    Figures f = declared;
-    draw_figures(seed, f);
+    RobotParameters f = declared;
+    draw_parameters(seed, f);
     EXPECT_LE(std::abs(f.torso.mass_kg / declared.torso.mass_kg - 1), 0.09);
     heaviest = std::max(heaviest, std::abs(f.torso.mass_kg / declared.torso.mass_kg - 1));
     EXPECT_LE(std::abs(f.side[0].motor.resistance_ohm / 12.4 - 1), 0.21);
@@ -239,8 +239,8 @@ TEST(FamilyBFigures, AreDrawnApartWithinThreeStandardDeviations) {
 
 TEST(FamilyBContrast, SeesWhatActsAlongTheFlight) {
   const Times brief{0.15, 0.2};
-  const auto largest = [&](const std::string& effect, double size, std::size_t channel) {
-    const Contrast c = contrast_of(assignment(), 0, effect, size, brief);
+  const auto largest = [&](const std::string& effect, double magnitude, std::size_t channel) {
+    const Contrast c = contrast_of(assignment(), 0, effect, magnitude, brief);
     EXPECT_GE(c.beat_s.size(), 5U);
     EXPECT_GE(c.beat_s.front(), 0);
     double most = 0;
@@ -309,8 +309,8 @@ TEST(FamilyB, RefusesWhatItCannotDo) {
   const auto line = [&](const Effects& effects) { return test::refusal([&] { family->fly(assignment(effects), 0); }); };
   EXPECT_TRUE(line({{"ground_efect", 1}}).ends_with("; did you mean \"ground_effect\"?"))
       << line({{"ground_efect", 1}});
-  EXPECT_EQ(line({{"wind", 4.5}}), "effect wind: size 4.5 is out of range; accepted: from 0 to 4");
-  EXPECT_EQ(line({{"wind", -1}}), "effect wind: size -1 is out of range; accepted: from 0 to 4");
+  EXPECT_EQ(line({{"wind", 4.5}}), "effect wind: magnitude 4.5 is out of range; accepted: from 0 to 4");
+  EXPECT_EQ(line({{"wind", -1}}), "effect wind: magnitude -1 is out of range; accepted: from 0 to 4");
   EXPECT_NE(line({{"wind", std::numeric_limits<double>::quiet_NaN()}}), "accepted");
   EXPECT_EQ(line({{"wind", 1}, {"wind", 1}}), "effect wind: named twice; accepted: each once");
   EXPECT_EQ(test::refusal([&] { family->fly(assignment(), 3); }),

@@ -15,9 +15,9 @@ namespace flappy::blind::b {
 inline const std::string kVehicle = std::string(FLAPPY_SOURCE_DIR) + "/configs/vehicles/hummingbird_nominal.toml";
 using Effects = std::vector<std::pair<std::string, double>>;
 
-inline Figures nominal() {
-  static const Figures figures = read_figures(kVehicle);
-  return figures;
+inline RobotParameters nominal() {
+  static const RobotParameters parameters = read_parameters(kVehicle);
+  return parameters;
 }
 
 inline Assignment assignment(const Effects& effects = {}, std::uint64_t seed = 3) {
@@ -28,14 +28,14 @@ inline Assignment assignment(const Effects& effects = {}, std::uint64_t seed = 3
   return a;
 }
 
-inline Plant plant(const Effects& effects = {}) { return {nominal(), ailments_of(effects, 3)}; }
+inline Plant plant(const Effects& effects = {}) { return {nominal(), effect_magnitudes_of(effects, 3)}; }
 
 /// Far from everything.
 inline Surroundings open_air() { return {-1e3, 1e3, 1e3, kGravity_m_s2}; }
 
 /// Mean wrench that the wings of a robot held still put on it: force, then torque about the torso's origin.
-inline Wrench held(const Figures& f, const Beat& beat, const Effects& effects = {}) {
-  Robot robot(f, ailments_of(effects, 3), open_air(), 1, 0);
+inline Wrench held(const RobotParameters& f, const Beat& beat, const Effects& effects = {}) {
+  Robot robot(f, effect_magnitudes_of(effects, 3), open_air(), 1, 0);
   const Twist still{Vector3d::Zero(), Vector3d(0, 0, kGravity_m_s2)};
   const Path path{{2, {0, 0, 0, 1}}, {2, still}};
   robot.put({0, 0, 0}, 0);

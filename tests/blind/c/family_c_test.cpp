@@ -25,9 +25,9 @@ Assignment plain() {
   return a;
 }
 
-Assignment with(const std::string& effect, double size) {
+Assignment with(const std::string& effect, double magnitude) {
   Assignment a = plain();
-  a.effects = {{effect, size}};
+  a.effects = {{effect, magnitude}};
   return a;
 }
 
@@ -35,15 +35,15 @@ flightlog::FlightLog short_log(const Assignment& a, std::size_t flight = 0) {
   return fly_one(a, flight, false, kShort).flight.log;
 }
 
-const Figures& nominal() {
-  static const Figures figures = read_figures(kVehicle);
-  return figures;
+const RobotParameters& nominal() {
+  static const RobotParameters parameters = read_parameters(kVehicle);
+  return parameters;
 }
 
 /// Motors and springs as those of a robot without effects.
 struct Bench {
-  explicit Bench(const Figures& f, double every_s = Mechanism::kStep_s)
-      : figures(f), mechanism(figures, {}, every_s), drive(figures, Sizes({}), 1, 0), step_s(every_s) {}
+  explicit Bench(const RobotParameters& f, double every_s = Mechanism::kStep_s)
+      : parameters(f), mechanism(parameters, {}, every_s), drive(parameters, Magnitudes({}), 1, 0), step_s(every_s) {}
 
   /// Calls `each` after every step.
   template <class Each>
@@ -51,13 +51,14 @@ struct Bench {
     const long steps = std::lround(until_s / step_s), tick = std::lround(1e-3 / step_s);
     for (long i = 0; i < steps; ++i) {
       const double now_s = static_cast<double>(i) * step_s;
-      if (i % tick == 0) drive.command(now_s, beat_voltages(inputs, beat_phase(now_s, figures.flapping_Hz), figures));
+      if (i % tick == 0)
+        drive.command(now_s, beat_voltages(inputs, beat_phase(now_s, parameters.flapping_Hz), parameters));
       const auto torques = drive.torques(now_s, step_s, {mechanism.drive_angle(0), mechanism.drive_angle(1)},
                                          {mechanism.drive_rate(0), mechanism.drive_rate(1)});
       const Motion still;
       mechanism.step(torques,
-                     {-figures.sides[0].spring.positive_Nm_rad * mechanism.stroke(0),
-                      -figures.sides[1].spring.positive_Nm_rad * mechanism.stroke(1)},
+                     {-parameters.sides[0].spring.positive_Nm_rad * mechanism.stroke(0),
+                      -parameters.sides[1].spring.positive_Nm_rad * mechanism.stroke(1)},
                      {}, held ? &still : nullptr);
       each(now_s);
       if (held) mechanism.move_torso(still);
@@ -66,15 +67,15 @@ struct Bench {
   /// Over the robot's weight, with the torso held, over ten beats after ten.
   double thrust(const Inputs& inputs) {
     double sum = 0, count = 0;
-    run(inputs, 20 / figures.flapping_Hz, true, [&](double now_s) {
-      if (now_s < 10 / figures.flapping_Hz) return;
+    run(inputs, 20 / parameters.flapping_Hz, true, [&](double now_s) {
+      if (now_s < 10 / parameters.flapping_Hz) return;
       sum += mechanism.motion().acceleration_W.z();
       ++count;
     });
     return 1 + sum / count / Mechanism::kGravity_m_s2;
   }
 
-  Figures figures;
+  RobotParameters parameters;
   Mechanism mechanism;
   Drive drive;
   double step_s;
@@ -173,7 +174,7 @@ TEST(FamilyC, TenVoltsCarryTheWeightInSteps) {
 }
 
 TEST(FamilyC, SymmetricRobotFliesSymmetrically) {
-  Figures f = nominal();
+  RobotParameters f = nominal();
   const auto mirrored = [](RigidBody body) {
     body.com_m.y() *= -1;
     for (const auto& [i, j] : {std::pair{0, 1}, std::pair{1, 2}})
@@ -214,7 +215,7 @@ TEST(FamilyC, InputsTurnTheRobotAsPublished) {
 TEST(FamilyC, Hovers) {
   Assignment a = plain();
   a.hover = true;
-  a.own_figures = true;
+  a.own_parameters = true;
   const FamilyFlight flight = fly_one(a, 0, false, {1.5, 2}).flight;
   EXPECT_FALSE(flight.crashed) << flight.how;
   EXPECT_EQ(flight.log.command.t_s.size(), 2000U);
@@ -246,9 +247,9 @@ TEST(FamilyC, EffectsOfNoSizeLeaveTheSameBytesAndOthersNot) {
 
 TEST(FamilyC, DriveLosesWhatItsEffectsTake) {
   const auto driven = [](const std::string& effect, double until_s) {
-    const Sizes sizes(effect.empty() ? std::vector<std::pair<std::string, double>>{}
-                                     : std::vector<std::pair<std::string, double>>{{effect, 1}});
-    Drive drive(nominal(), sizes, 3, 0);
+    const Magnitudes magnitudes(effect.empty() ? std::vector<std::pair<std::string, double>>{}
+                                               : std::vector<std::pair<std::string, double>>{{effect, 1}});
+    Drive drive(nominal(), magnitudes, 3, 0);
     drive.command(0, {5, -5});
     for (double t = 0; t < until_s; t += 1e-4) drive.torques(t, 1e-4, {0, 0}, {0, 0});
     return std::pair{drive.currents()[0], drive.battery_V()};
@@ -272,7 +273,7 @@ TEST(FamilyC, AirActsWhereItsEffectsAre) {
   };
   const auto acted = [](const std::string& effect, const Eigen::Vector3d& at) {
     Mechanism mechanism(nominal(), {});
-    Air air(nominal(), Sizes({{effect, 1}}), 3, 0);
+    Air air(nominal(), Magnitudes({{effect, 1}}), 3, 0);
     mechanism.place(at, Eigen::Quaterniond::Identity());
     mj_kinematics(&mechanism.model(), const_cast<mjData*>(&mechanism.data()));
     const Wrench wrench = air.act(mechanism, 1e-4);
@@ -313,8 +314,8 @@ TEST(FamilyC, SensorsErrAsTheirEffectsSay) {
 
 TEST(FamilyC, ContrastIsWhatTheEffectDoes) {
   const Length length = {0.12, 0.2};
-  const auto mean = [&](const std::string& effect, double size) {
-    const Contrast contrast = contrast_of(plain(), 0, effect, size, length);
+  const auto mean = [&](const std::string& effect, double magnitude) {
+    const Contrast contrast = contrast_of(plain(), 0, effect, magnitude, length);
     EXPECT_EQ(contrast.beat_s.size(), 6U);
     Eigen::Matrix<double, 6, 1> sum = Eigen::Matrix<double, 6, 1>::Zero();
     for (const auto& beat : contrast.change)
@@ -408,9 +409,9 @@ TEST(FamilyC, ConventionsChangeDeclarationsWithinTheirBounds) {
     Assignment a = plain();
     a.seed = seed;
     const Robot robot(a, 0);
-    const SensorFigures exact = sensor_figures(a, robot);
+    const SensorParameters exact = sensor_parameters(a, robot);
     a.conventions = true;
-    const SensorFigures loose = sensor_figures(a, robot);
+    const SensorParameters loose = sensor_parameters(a, robot);
     const flightlog::FlightHeader &e = exact.declared, &l = loose.declared;
     EXPECT_EQ(e.imu.latency_s, exact.imu.latency_s);
     EXPECT_EQ(e.imu.position_m[1], exact.imu.position_m.y());
@@ -449,8 +450,8 @@ TEST(FamilyC, DeclaredNoiseIsThatOfTheSamples) {
   // a robot at rest: what varies from pose to pose is noise
   Assignment a = plain();
   const Robot robot(a, 0);
-  const SensorFigures figures = sensor_figures(a, robot);
-  Sensors sensors(a, 0, robot, figures);
+  const SensorParameters parameters = sensor_parameters(a, robot);
+  Sensors sensors(a, 0, robot, parameters);
   for (int i = 0; i < 120000; ++i) sensors.after_step(robot, robot.step_s() * i);
   flightlog::FlightLog log;
   sensors.finish(log, 1e9);
@@ -462,15 +463,15 @@ TEST(FamilyC, DeclaredNoiseIsThatOfTheSamples) {
         4 * (log.mocap.qx[i] * log.mocap.qx[i] + log.mocap.qy[i] * log.mocap.qy[i] + log.mocap.qz[i] * log.mocap.qz[i]);
   }
   const double count = 3 * static_cast<double>(log.mocap.t_s.size());
-  EXPECT_NEAR(std::sqrt(position / count) / figures.declared.mocap.position_noise_m, 1, 0.1);
-  EXPECT_NEAR(std::sqrt(attitude / count) / figures.declared.mocap.attitude_noise_rad, 1, 0.1);
+  EXPECT_NEAR(std::sqrt(position / count) / parameters.declared.mocap.position_noise_m, 1, 0.1);
+  EXPECT_NEAR(std::sqrt(attitude / count) / parameters.declared.mocap.attitude_noise_rad, 1, 0.1);
 }
 
 TEST(FamilyC, FiguresAreDrawnApartAndPhysical) {
   Eigen::Vector3d spread = Eigen::Vector3d::Zero();
   constexpr int count = 200;
   for (std::uint64_t seed = 0; seed < count; ++seed) {
-    const Figures drawn = drawn_figures(nominal(), seed);
+    const RobotParameters drawn = drawn_parameters(nominal(), seed);
     for (const Side& side : drawn.sides) {
       EXPECT_TRUE(is_physical(side.wing.inertia_kg_m2) && is_physical(side.leading_edge.inertia_kg_m2));
       EXPECT_GT(side.rotation.upper_rad, 0.6);
@@ -492,7 +493,7 @@ TEST(FamilyC, SameBytesOnAnyNumberOfThreads) {
     std::vector<flightlog::FlightLog> logs(4);
     io::parallel_for(logs.size(), threads, [&](std::size_t i) {
       Assignment a = with(i % 2 == 0 ? "wind" : "gear_backlash", 1);
-      a.own_figures = a.conventions = true;
+      a.own_parameters = a.conventions = true;
       a.seed = i / 2;
       logs[i] = short_log(a, i % 3);
     });
@@ -516,11 +517,11 @@ TEST(FamilyC, RefusesWhatItDoesNotKnow) {
   EXPECT_EQ(refusal([&] { family->fly(with("wnid", 1), 0); }),
             "effect wnid: family C has no such effect; did you mean \"wind\"?");
   EXPECT_EQ(refusal([&] { family->fly(with("wind", 4.5), 0); }),
-            "effect wind: size 4.5 is out of range; accepted: a number from 0 to 4");
+            "effect wind: magnitude 4.5 is out of range; accepted: a number from 0 to 4");
   EXPECT_EQ(refusal([&] { family->fly(with("wind", std::nan("")), 0); }),
-            "effect wind: size nan is out of range; accepted: a number from 0 to 4");
+            "effect wind: magnitude nan is out of range; accepted: a number from 0 to 4");
   EXPECT_EQ(refusal([&] { family->contrast(plain(), 0, "wind", -1); }),
-            "effect wind: size -1 is out of range; accepted: a number from 0 to 4");
+            "effect wind: magnitude -1 is out of range; accepted: a number from 0 to 4");
   EXPECT_NE(refusal([&] { family->fly(plain(), 3); }).find("flight 3"), std::string::npos);
   EscapeAssignment rules;
   rules.observation = {"velocty"};

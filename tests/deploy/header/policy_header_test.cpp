@@ -337,7 +337,7 @@ TEST(PolicyHeader, SaysWhatARobotThatIsKnownByTheBeatMixes) {
   EXPECT_TRUE(text.find("pitch_servo = 0.5 + -1 bias, within 0 to 1\n") != std::string::npos) << text;
   EXPECT_TRUE(text.find("amplitude              1       0.2 to 1") != std::string::npos) << text;  // it has no unit
   EXPECT_TRUE(contract_macros("P_", config, {}).find("#define P_FLAPPING_HZ 0x1.d66666p+3") != std::string::npos);
-  EXPECT_EQ(no_controller(config), "the vehicle is known by the beat, and has an autopilot of its own");
+  EXPECT_EQ(no_controller(config), "the vehicle is beat-averaged, and has an autopilot of its own");
 }
 
 TEST(PolicyHeader, SaysWhatItCannotExport) {

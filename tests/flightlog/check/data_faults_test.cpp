@@ -221,7 +221,7 @@ FlightLog blind_log(std::uint64_t seed, std::size_t flight, const char* effect =
   c.declared_density_kg_m3 = c.vehicle.air_density_kg_m3;
   c.seed = seed;
   c.power = c.wings = true;
-  if (effect) c.sizes = blind::Sizes({{effect, size}});
+  if (effect) c.magnitudes = blind::Magnitudes({{effect, size}});
   const blind::RobotFlight f = blind::fly(c, flight);
   EXPECT_FALSE(f.crashed) << f.how;
   return f.log;

@@ -77,7 +77,7 @@ TEST(Mapping, RefusesFaults) {
             "m.toml:17:9: command.clock: \"robot\" is not the clock of times of receipt; accepted: \"receiver\", or "
             "time = \"stamp\"");
   EXPECT_EQ(edited("clock = \"robot\"\nsequence", "time_unit = \"s\"\nsequence"),
-            "m.toml:16:13: command.time_unit: is given beside time = \"stamp\"; accepted: time = \"field\"");
+            "m.toml:16:13: command.time_unit: is given with time = \"stamp\"; accepted: time = \"field\"");
   EXPECT_EQ(edited("[command]", "[clocks.robbot]\noffset_s = 1.0\n\n[command]"),
             "m.toml:14:1: clocks.robbot: is no clock of a stream; accepted: names that clock = \"...\" has");
   EXPECT_EQ(edited("[mocap]", "[command.scale]\nphase_radd = 2.0\n\n[mocap]"),

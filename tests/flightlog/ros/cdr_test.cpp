@@ -141,13 +141,13 @@ TEST(Cdr, TellsOfTheFirstElementsAlone) {
   Definitions d;
   d.add("p/msg/M", "uint16[] pixels\nstring[] words\nuint8 after\n");
   Members members = {{"after", std::int64_t{9}}};
-  const std::size_t count = kMostElements + 500;
+  const std::size_t count = kMaxElements + 500;
   for (std::size_t i = 0; i < count; ++i) {
     members["pixels[" + std::to_string(i) + "]"] = std::uint64_t{i};
     members["words[" + std::to_string(i) + "]"] = "w";
   }
   const Members read = decode(*d.layout("p/M"), encode(*d.layout("p/M"), members));
-  EXPECT_EQ(read.size(), 2 * kMostElements + 1);
+  EXPECT_EQ(read.size(), 2 * kMaxElements + 1);
   EXPECT_EQ(read.at("after"), (Members::mapped_type(std::uint64_t{9})));
 }
 

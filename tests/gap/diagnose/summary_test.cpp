@@ -76,7 +76,7 @@ TEST(Summary, SaysWhatToDoInThirtyLines) {
   EXPECT_NE(all().find("mean_bias_V recorded 1, by the vehicle's file 0, by the corrected one 0.9"), std::string::npos);
   for (const auto& [kind, begin] : {std::pair{VerdictKind::none, "No gap beyond noise"},
                                     {VerdictKind::parameters, "Nothing is missing"},
-                                    {VerdictKind::unknown, "Something is missing in the model that no entry"}}) {
+                                    {VerdictKind::unknown, "Something is missing in the model that no effect"}}) {
     r.verdict = {kind, {}, false, 0.9};
     EXPECT_TRUE(all().starts_with(begin)) << all();
   }

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <numbers>
 
-#include "gap/replay/mean_prediction.hpp"
+#include "gap/replay/beat_averaged_prediction.hpp"
 #include "io/csv.hpp"
 #include "refusal.hpp"
 #include "vehicles.hpp"
@@ -114,7 +114,7 @@ std::filesystem::path folder() {
   return path;
 }
 
-MeanPrediction flight(const model::Vehicle& v, const std::string& csv) {
+BeatAveragedPrediction flight(const model::Vehicle& v, const std::string& csv) {
   std::ofstream(folder() / "predicted.csv") << csv;
   return {folder(), log_of(), v};
 }
@@ -142,8 +142,8 @@ std::vector<VehicleHypothesis> candidates(const model::Vehicle& v) {
 }
 
 TEST(PredictedLoads, ShowTheRowsOfTheEquationsTheyWereMadeFrom) {
-  const MeanPrediction equations(folder(), log_of(), by_equations());
-  const MeanPrediction file = flight(by_file(), csv_of(predicted(by_file())));
+  const BeatAveragedPrediction equations(folder(), log_of(), by_equations());
+  const BeatAveragedPrediction file = flight(by_file(), csv_of(predicted(by_file())));
   const std::vector<VehicleHypothesis> a = candidates(by_equations()), b = candidates(by_file());
   const Rows plain = file.predict({&b[0]})[0];
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -162,15 +162,15 @@ TEST(PredictedLoads, MayBeMadeAtOtherCoefficientsThanTheVehiclesFileHasNow) {
   std::ofstream(file) << model::vehicle_text(made);
   const model::Vehicle again = model::read_any_vehicle(file);
   EXPECT_TRUE(again.beat_averaged->predicted);
-  const MeanPrediction equations(folder(), log_of(), by_equations());
+  const BeatAveragedPrediction equations(folder(), log_of(), by_equations());
   const VehicleHypothesis a{by_equations(), 0, {}}, b{again, 0, {}};
   EXPECT_LT(difference(equations.predict({&a})[0], flight(again, csv_of(predicted(made))).predict({&b})[0]), 1e-9);
 }
 
 TEST(PredictedLoads, MayHaveTheirOwnSampling) {
-  const MeanPrediction same = flight(by_file(), csv_of(predicted(by_file())));
-  const MeanPrediction rarer = flight(by_file(), csv_of(predicted(by_file(), 25)));
-  const MeanPrediction finer = flight(by_file(), csv_of(predicted(by_file(), 1000, 0.2)));
+  const BeatAveragedPrediction same = flight(by_file(), csv_of(predicted(by_file())));
+  const BeatAveragedPrediction rarer = flight(by_file(), csv_of(predicted(by_file(), 25)));
+  const BeatAveragedPrediction finer = flight(by_file(), csv_of(predicted(by_file(), 1000, 0.2)));
   const VehicleHypothesis c{by_file(), 0, {}};
   const Rows rows = same.predict({&c})[0];
   EXPECT_LT(difference(rows, rarer.predict({&c})[0]), 0.1);
@@ -182,7 +182,7 @@ TEST(PredictedLoads, LetEffectsActOnlyByWhatIsKnown) {
   bare.beat_averaged->inputs.clear();
   bare.beat_averaged->actuators.clear();
   const std::string csv = csv_of(predicted(bare));
-  const MeanPrediction with = flight(by_file(), csv), without = flight(bare, csv);
+  const BeatAveragedPrediction with = flight(by_file(), csv), without = flight(bare, csv);
   const std::vector<VehicleHypothesis> a = candidates(by_file()), b = candidates(bare);
   const Rows plain = without.predict({&b[0]})[0];
   EXPECT_LT(difference(with.predict({&a[0]})[0], plain), 1e-12);
@@ -262,7 +262,7 @@ TEST(PredictedLoads, AreRefusedByTheirLine) {
             ":1: has no load; accepte");
   std::filesystem::remove(folder() / "predicted.csv");
   EXPECT_EQ(test::refusal([] {
-              MeanPrediction(folder(), log_of(), by_file());
+              BeatAveragedPrediction(folder(), log_of(), by_file());
             }).substr((folder() / "predicted.csv").string().size(), 65),
             ": is missing, but the vehicle's model is \"predicted\"; accepted: a");
 }

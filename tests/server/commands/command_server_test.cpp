@@ -35,7 +35,7 @@ struct Served {
   io::DdsConfig dds;
   Place place;
   Queue queue{place.output()};
-  Watched watched;
+  LiveState watched;
   std::optional<Commands> commands;
   std::optional<CommandServer> server;
 };
@@ -101,7 +101,7 @@ TEST(CommandServer, RefusesAFloodPolitely) {
   place.config.rates = {5, 50, 4};
   Queue queue{place.output()};
   Commands commands(queue, place.config, "/nowhere", test::fake_kinds());
-  Watched watched;
+  LiveState watched;
   const CommandServer server(dds, commands, watched);
   const Participant p(dds);
   const Writer<CommandMessage> writer(p, "/flappy/command", {true, false, kAllOfIt});

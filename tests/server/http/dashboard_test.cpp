@@ -74,7 +74,7 @@ struct Page : ::testing::Test {
 
   io::TemporaryFolder folder;
   Queue queue{folder.path()};
-  Watched watched;
+  LiveState watched;
   Dashboard dashboard{queue, watched, config_of(folder.path())};
   httplib::Client client{"127.0.0.1", port()};
 };
@@ -98,7 +98,7 @@ TEST_F(Page, ShowsWhatThereIs) {
   EXPECT_EQ(files[0], Json({{"name", "job.log"}, {"bytes", 11}}));
   EXPECT_EQ(json("/api/jobs/1/history")[0]["why"], "submitted");
   EXPECT_TRUE(json("/api/watched").is_null());
-  WatchedState state;
+  ShownState state;
   state.source = "job 1";
   state.position_m = {1, 2, 3};
   watched.set(state);
@@ -248,7 +248,7 @@ TEST_F(Page, TakesNoLargeRequest) {
 TEST(Dashboard, ListensWhereItIsToldOrSaysWhyNot) {
   const io::TemporaryFolder folder;
   Queue queue(folder.path());
-  Watched watched;
+  LiveState watched;
   ServerConfig config = config_of(folder.path());
   const Dashboard first(queue, watched, config);
   const auto refused = [&](const std::string& listen) {

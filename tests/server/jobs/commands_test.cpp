@@ -24,7 +24,7 @@ struct CommandsOf : ::testing::Test {
   }
   Place place;
   Queue queue{place.output()};
-  std::vector<Kind> kinds = server::kinds();
+  std::vector<JobType> kinds = server::job_types();
 };
 
 TEST_F(CommandsOf, AreCarriedOut) {
@@ -57,8 +57,8 @@ TEST_F(CommandsOf, AreBounded) {
   const auto refused = [&](Command command) {
     const CommandResult result = commands.execute(command);
     EXPECT_FALSE(result.accepted);
-    EXPECT_LE(result.id.size(), kMostOfId);
-    EXPECT_LE(result.message.size(), kMostOfMessage);
+    EXPECT_LE(result.id.size(), kMaxOfId);
+    EXPECT_LE(result.message.size(), kMaxOfMessage);
     return result.message;
   };
   const std::string much(1'000'000, 'x');
@@ -90,7 +90,7 @@ TEST_F(CommandsOf, NameWhatEachKindNeeds) {
   fs::create_directory_symlink("/etc", place.root / "data/etc");
   const Folders& folders = place.config.jobs.folders;
   const auto command = [&](const Submission& asked) {
-    return io::joined(kind_named(kinds, asked.kind).command({folders, "/bin", "/job", asked, 2}), " ");
+    return io::joined(job_type_named(kinds, asked.kind).command({folders, "/bin", "/job", asked, 2}), " ");
   };
   const std::string a = (folders.configs / "a.toml").string(), output = folders.output.string(),
                     data = folders.data.string();
@@ -126,15 +126,15 @@ TEST_F(CommandsOf, HandOutAJobsFiles) {
   Commands commands = make();
   ASSERT_EQ(commands.execute(submit("a", "fake", "well")).job, 1u);
   fs::create_directories(place.folder(1) / "run");
-  const std::string text(kMostOfChunk + 10, 'y');
+  const std::string text(kMaxOfChunk + 10, 'y');
   io::write_atomically(place.folder(1) / "run" / "best.json", text);
   fs::create_symlink("/etc/passwd", place.folder(1) / "leak");
   const std::vector<JobFile> files = commands.files(1);
   ASSERT_EQ(files.size(), 1u);
   EXPECT_EQ(files[0].name, "run/best.json");
   EXPECT_EQ(files[0].bytes, text.size());
-  EXPECT_EQ(commands.chunk(1, "run/best.json", 0), text.substr(0, kMostOfChunk));
-  EXPECT_EQ(commands.chunk(1, "run/best.json", kMostOfChunk), text.substr(kMostOfChunk));
+  EXPECT_EQ(commands.chunk(1, "run/best.json", 0), text.substr(0, kMaxOfChunk));
+  EXPECT_EQ(commands.chunk(1, "run/best.json", kMaxOfChunk), text.substr(kMaxOfChunk));
   EXPECT_EQ(commands.chunk(1, "run/best.json", 1u << 30), "");
   for (const char* name : {"leak", "../queue.sqlite", "/etc/passwd", "run", "run/none"})
     EXPECT_NE(refusal([&] { commands.chunk(1, name, 0); }), "accepted") << name;
@@ -179,7 +179,7 @@ TEST_F(CommandsOf, ComeNoFasterThanTheyMay) {
 TEST(RateLimit, ForgetsWhoHasNotComeForLong) {
   RateLimit limit({5, 1e9, 4});
   for (int i = 0; i < 5000; ++i) limit.take("client " + std::to_string(i), 0);
-  EXPECT_EQ(limit.clients(), kMostClients);
+  EXPECT_EQ(limit.clients(), kMaxClients);
   EXPECT_FALSE(limit.take("one more", 0));  // what further clients share is used up
   EXPECT_TRUE(limit.take("one more", 100));
   EXPECT_EQ(limit.clients(), 1u);

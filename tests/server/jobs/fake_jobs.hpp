@@ -20,8 +20,8 @@
 #include "io/progress.hpp"
 #include "io/temporary_folder.hpp"
 #include "server/jobs/commands.hpp"
-#include "server/jobs/minder.hpp"
 #include "server/jobs/runner.hpp"
+#include "server/jobs/supervisor.hpp"
 
 namespace flappy::server::test {
 
@@ -52,7 +52,7 @@ echo '{"stopped": false}' > result.json
 )sh";
 
 /// The kind "fake": config is HOW, and the override steps=N.
-inline std::vector<Kind> fake_kinds() {
+inline std::vector<JobType> fake_kinds() {
   return {{"fake",
            [](const Launch& launch) {
              const std::string steps = launch.asked.overrides.empty() ? "5" : launch.asked.overrides[0].substr(6);

@@ -64,10 +64,10 @@ struct Programs : ::testing::Test {
     return count(state) == jobs;
   }
   /// Once more what lives is ended, as by a power cut.
-  void kill_minders() const {
+  void kill_supervisors() const {
     for (const auto& folder : fs::directory_iterator(output))
       for (int attempt = 1; fs::exists(folder.path() / ("attempt_" + std::to_string(attempt) + ".began")); ++attempt)
-        if (const auto minder = began(folder.path(), attempt)) signal_process(*minder, SIGKILL);
+        if (const auto supervisor = began(folder.path(), attempt)) signal_process(*supervisor, SIGKILL);
   }
   std::string digest(const fs::path& run) const {
     std::string all;
@@ -94,7 +94,7 @@ TEST_F(Programs, KilledTwentyTimesLeaveTheSameBytes) {
     const pid_t server = serve();
     usleep(std::uniform_int_distribution<unsigned>(50'000, 1'000'000)(random));
     end(server, SIGKILL);
-    if (k % 2 == 1) kill_minders();
+    if (k % 2 == 1) kill_supervisors();
     unfinished += count("done") < 10;
   }
   EXPECT_GE(unfinished, 10) << "the jobs are too short for this test";

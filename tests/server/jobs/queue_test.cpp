@@ -32,7 +32,7 @@ TEST(Queue, GoesOnWithWhatItHad) {
     EXPECT_EQ(queue.submit(training("a")), 1u);
     EXPECT_EQ(queue.submit(training("b")), 2u);
     queue.start(1);
-    queue.minded_by(1, {123, 456, "boot"});
+    queue.supervised_by(1, {123, 456, "boot"});
     queue.report(1, 0.25, "a quarter");
   }
   Queue queue(folder.path());

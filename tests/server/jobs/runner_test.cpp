@@ -7,7 +7,7 @@
 
 #include "full.hpp"
 #include "server/jobs/fake_jobs.hpp"
-#include "server/jobs/minder.hpp"
+#include "server/jobs/supervisor.hpp"
 
 namespace flappy::server {
 namespace {
@@ -105,7 +105,7 @@ TEST_F(Jobs, StopWithTheServerAndGoOnWithIt) {
 TEST_F(Jobs, FailWhereTheirConfigurationIsGone) {
   const std::uint64_t id = queue.submit({"a", "train", "gone.toml", {}});
   RunnerOptions options = place.options();
-  options.kinds = kinds();
+  options.kinds = job_types();
   Runner runner(queue, options);
   runner.step();
   EXPECT_EQ(state(id), State::failed);
@@ -129,9 +129,9 @@ TEST_F(Jobs, EndWithTheirMinder) {
   Runner runner(queue, options);
   ASSERT_TRUE(run_until(runner, [&] { return began(place.folder(id), 1).has_value(); }));
   usleep(50'000);  // its program is there by now
-  const Process minder = began(place.folder(id), 1).value();
-  EXPECT_EQ(queue.job(id).process, minder);
-  EXPECT_TRUE(signal_process(minder, SIGKILL));
+  const Process supervisor = began(place.folder(id), 1).value();
+  EXPECT_EQ(queue.job(id).process, supervisor);
+  EXPECT_TRUE(signal_process(supervisor, SIGKILL));
   EXPECT_TRUE(comes_to(runner, id, State::failed));
   EXPECT_EQ(queue.job(id).message.substr(0, 43), "its process was killed, or could not start;");
 }
@@ -161,15 +161,15 @@ pid_t serve(const Place& place) {
     }
 }
 
-/// What a power cut does to jobs: their minders are gone, and with them their programs.
-void kill_minders(const Place& place) {
+/// What a power cut does to jobs: their supervisors are gone, and with them their programs.
+void kill_supervisors(const Place& place) {
   for (const auto& folder : fs::directory_iterator(place.output()))
     for (int attempt = 1; fs::exists(folder.path() / ("attempt_" + std::to_string(attempt) + ".began")); ++attempt)
-      if (const auto minder = began(folder.path(), attempt)) signal_process(*minder, SIGKILL);
+      if (const auto supervisor = began(folder.path(), attempt)) signal_process(*supervisor, SIGKILL);
 }
 
 /// Kills the server at random moments while it works on ten jobs, and lets it finish them.
-void kill_often(Place& place, int kills, int steps, bool minders_too) {
+void kill_often(Place& place, int kills, int steps, bool supervisors_too) {
   std::random_device seed;
   std::mt19937 random(seed());
   {
@@ -182,7 +182,7 @@ void kill_often(Place& place, int kills, int steps, bool minders_too) {
     usleep(std::uniform_int_distribution<unsigned>(0, 60'000)(random));
     kill(server, SIGKILL);
     waitpid(server, nullptr, 0);
-    if (minders_too) kill_minders(place);
+    if (supervisors_too) kill_supervisors(place);
     Queue queue(place.output());
     unfinished += queue.jobs_in(State::done).size() < 10;
   }
@@ -195,7 +195,7 @@ void kill_often(Place& place, int kills, int steps, bool minders_too) {
     EXPECT_EQ(text_of(place.folder(id) / "steps"), counted(steps)) << "job " << id;
     EXPECT_EQ(text_of(place.folder(id) / "ends"), "end\n") << "job " << id;
     EXPECT_EQ(text_of(place.folder(id) / "faults"), "") << "job " << id;
-    if (!minders_too) {
+    if (!supervisors_too) {
       EXPECT_EQ(text_of(place.folder(id) / "starts"), "start\n") << "job " << id;
     }
   }

@@ -1,4 +1,4 @@
-// The watched flapper in 3D, where it was and is. Telemetry says nothing of the vehicle: it is drawn as the shipped one.
+// Draws the watched flapper and its recent path in 3D. Telemetry does not describe the vehicle, so the shipped hummingbird is drawn.
 import {kHummingbird} from "./geometry.js";
 import {Scene} from "./scene.js";
 
@@ -34,7 +34,7 @@ export class LiveView {
   }
 
   /**
-   * A new scene about where the flapper is: another one, or it has left the grid.
+   * Makes a new scene around the flapper, because the source changed or the flapper left the grid.
    * @param {State} state
    */
   begin(state) {
@@ -46,7 +46,7 @@ export class LiveView {
     try {
       this.scene = new Scene(this.frame, [{vehicle: kHummingbird, colour: kColour, path: corners}], kPlace, null);
     } catch {
-      this.scene = null;  // no WebGL here: the numbers stay
+      this.scene = null;  // no WebGL: only the numbers are shown
     }
   }
 }

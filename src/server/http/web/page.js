@@ -4,7 +4,7 @@ const at = (id) => document.getElementById(id);
 let jobs = [];
 let chosen = null;
 
-// Text only ever becomes a text node: what a job printed is never markup.
+// Makes an element with a text node, so that a job's output is never interpreted as markup.
 function element(name, text, kind) {
   const made = document.createElement(name);
   made.textContent = text;
@@ -117,11 +117,11 @@ function showWatched(state) {
 }
 
 const live = new LiveView(at("view"));
-window.live = live;  // for tests and for curious people
+window.live = live;  // for tests and for debugging in the browser
 let busy = false;
 let again = false;
 
-// One request at a time, and one more where something changed meanwhile.
+// Refreshes once at a time; a change meanwhile causes one more refresh.
 async function refresh() {
   if (busy) {
     again = true;

@@ -1,0 +1,40 @@
+// The beat-averaged motion of a recorded flight, from motion capture and, where there is one, the gyro: low-passed far below the beat
+// frequency, without delay.
+//
+//   x' = F x      F = |H|^2: a Butterworth filter H of order 4, |H|^2 = 1 / (1 + (f / bandwidth)^8), run forward and backward: no phase [1]
+//   R' = F applied to the quaternions, normalised again
+//   velocity v = R'^T F dp/dt,  specific force f = R'^T (F d2p/dt2 + g),  rate w = F gyro, or w from R' without a gyro,  a = dw/dt
+// Derivatives are central differences on a regular grid. Whoever compares the inputs with this motion must filter them with F as well.
+// [1] Gustafsson, Determining the initial states in forward-backward filtering, IEEE Trans. Signal Processing 44(4), 1996. Here the signal
+//     is continued by odd reflections at both ends, and the samples near the ends are marked as unseen.
+#pragma once
+
+#include <Eigen/Dense>
+#include <filesystem>
+#include <vector>
+
+#include "flightlog/flight_log.hpp"
+
+namespace flappy::flightlog {
+
+/// F of the file head, applied to `x`. `per_sample`: bandwidth divided by sample rate, below 0.5.
+std::vector<double> low_pass(const std::vector<double>& x, double per_sample);
+
+struct BeatAveragedMotion {
+  double begin_s = 0, step_s = 0;
+  std::vector<Eigen::Vector3d> position_m;      ///< torso origin in W; one element per step of the grid, as below
+  std::vector<Eigen::Matrix3d> attitude;        ///< R_WB
+  std::vector<Eigen::Vector3d> velocity_B_m_s;  ///< in B
+  std::vector<Eigen::Vector3d> rate_rad_s;      ///< in B
+  std::vector<Eigen::Vector3d> turning_rad_s2;  ///< angular acceleration, in B
+  std::vector<Eigen::Vector3d> force_m_s2;      ///< specific force, in B
+  std::vector<char> seen;                       ///< whether no long gap and no end of the flight is near
+  std::size_t size() const { return seen.size(); }
+  double t_s(std::size_t i) const { return begin_s + step_s * static_cast<double>(i); }
+};
+
+/// io::InputError, naming the file in `folder`, where the rate of motion capture is below four times the bandwidth or
+/// where the flight is too short for the filter.
+BeatAveragedMotion beat_averaged_motion(const FlightLog& log, double bandwidth_Hz, const std::filesystem::path& folder);
+
+}  // namespace flappy::flightlog

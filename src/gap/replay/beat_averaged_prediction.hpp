@@ -1,0 +1,81 @@
+// A recorded flight, predicted by beat-averaged vehicles (model/beat_averaged.hpp). At each row, the recorded motion and inputs give force F and
+// moment M, and these give the specific force f and the angular acceleration a that motion capture should have measured,
+//   f = F / m + a x d + w x (w x d),  d: from the centre of mass to the torso's origin      I a = M - w x I w,  M: about the centre of mass
+// Inputs pass through the same low-pass filter as the recorded motion (flightlog/beat_averaged_motion.hpp). Nothing is integrated, so no error
+// accumulates. Rows are about half a period of the bandwidth apart: closer rows would not be independent.
+//
+// The loads come from the vehicle file or, if its model is "predicted", from the flight's predicted.csv (gap/replay/predicted_loads.hpp), whose
+// columns pass through the same filter. Effects act on both, except effects of the drive, which predicted loads already contain.
+//
+// Force channels always have rows. Torque channels have rows if the vehicle has moments and compares them, or if the caller selects them. Rows
+// count where the torso origin is at least extent.below_m of the vehicle above the ground.
+#pragma once
+
+#include <map>
+#include <mutex>
+#include <tuple>
+
+#include "flightlog/beat_averaged_motion.hpp"
+#include "gap/replay/predicted_flight.hpp"
+#include "gap/replay/predicted_loads.hpp"
+#include "model/beat_averaged.hpp"
+
+namespace flappy::gap {
+
+class BeatAveragedPrediction final : public PredictedFlight {
+ public:
+  /// `nominal`: the vehicle that is believed to have flown. `channels`: the only channels to have rows; empty: all that the vehicle compares.
+  /// io::InputError naming `folder` if the log lacks an input of the vehicle, or if motion capture saw too little of the flight.
+  BeatAveragedPrediction(const std::filesystem::path& folder, flightlog::FlightLog log, const model::Vehicle& nominal,
+                         const std::vector<int>& channels = {});
+
+  const std::string& name() const override { return name_; }
+  std::size_t beats() const override { return rows_.size(); }
+  double beats_Hz() const override { return 1 / (motion_.step_s * static_cast<double>(stride_)); }
+  bool covers(std::size_t beat, int channel) const override {
+    return has_rows(channel, 0) && motion_.seen[rows_[beat]] != 0;
+  }
+  bool has_rows(int channel, int coefficient) const override {
+    return coefficient == 0 && channel <= kForceZ && shown_[static_cast<std::size_t>(channel)];
+  }
+  const Rows& measured() const override { return measured_; }
+  const Rows& signal() const override { return measured_; }
+  std::vector<Rows> predict(const std::vector<const VehicleHypothesis*>& vehicles) const override;
+  Rows declared_noise(std::uint64_t seed) const override;
+  std::vector<RegimeFunction> functions() const override;
+  std::vector<std::pair<std::string, std::string>> products() const override { return {}; }
+  std::vector<RegimeQuantity> regimes() const override;
+  std::vector<RegimeQuantity> inputs() const override;
+  const DiagnosisPolicy& policy() const override { return kBeatAveragedPolicy; }
+
+ private:
+  /// An input or a column of predicted.csv at each row, after delay, first-order lag and low-pass filter: its value and rate, and both for its
+  /// product with the battery's voltage over the nominal one.
+  struct Driven {
+    std::vector<double> input, rate, times_battery, rate_times_battery;
+  };
+  const Driven& driven(std::size_t input, double delay_s, double lag_s) const;
+  /// The loads as products of actuator values, motion variables and columns of predicted.csv.
+  model::BeatAveragedWrench wrench_of(const model::BeatAveraged& vehicle) const;
+  Rows rows_of(const flightlog::BeatAveragedMotion& motion) const;
+  Rows predict(const VehicleHypothesis& hypothesis) const;
+  template <class Value>
+  std::vector<double> each(const Value& value) const;
+
+  std::string name_;
+  flightlog::FlightLog log_;
+  model::Vehicle nominal_;
+  std::array<bool, kForceZ + 1> shown_{};  ///< [channel]
+  flightlog::BeatAveragedMotion motion_;
+  std::size_t stride_;
+  std::vector<std::size_t> rows_;            ///< [row] index into the grid of the motion
+  std::vector<PredictedColumn> predicted_;   ///< without their values, which are in inputs_
+  std::vector<std::vector<double>> inputs_;  ///< on the grid: inputs of the vehicle, then columns of predicted.csv
+  std::vector<double> battery_;              ///< voltage over the nominal voltage, on the grid; 1 if it is not logged
+  std::vector<double> battery_rows_;         ///< [row] the same, low-passed
+  Rows measured_;
+  mutable std::mutex mutex_;
+  mutable std::map<std::tuple<std::size_t, double, double>, Driven> driven_;
+};
+
+}  // namespace flappy::gap
