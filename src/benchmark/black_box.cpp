@@ -16,7 +16,6 @@ using Eigen::VectorXd;
 
 /// Ridges to choose from, as shares of the mean square of an example.
 constexpr double kRidges[] = {0.01, 0.03, 0.1, 0.3, 1, 3, 10};
-/// Features with a smaller standard deviation are left out.
 constexpr double kMinSd = 1e-6;
 
 }  // namespace
@@ -39,8 +38,7 @@ BlackBox::BlackBox(const std::vector<Example>& examples) {
   x = x * scale.asDiagonal();
   const VectorXd offset = y.colwise().mean();
   y.rowwise() -= offset.transpose();
-  // kernel form, for there are fewer examples than features; the prediction of a left-out example errs by alpha / (K +
-  // ridge)^-1_ii
+  // kernel form: fewer examples than features. A left-out example errs by alpha / (K + ridge)^-1_ii
   const MatrixXd products = x * x.transpose();
   const double size = products.trace() > 0 ? products.trace() / static_cast<double>(n) : 1;
   MatrixXd best;

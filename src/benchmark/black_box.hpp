@@ -1,5 +1,5 @@
-// A black box as a baseline of the diagnosis: ridge regression from features of the residuals to the effect of the robot, learnt only on scored
-// robots of other families. It has no physics and no catalogue, so it names only effects that its examples have.
+// A black box as a baseline: ridge regression from features of residuals to a robot's effect, learnt only on scored
+// robots of other families. No physics, no catalogue: it names only effects of its examples.
 #pragma once
 
 #include <string>
@@ -13,13 +13,13 @@ struct Example {
   std::string effect;
 };
 
-/// Least squares on an indicator column for each effect; features are scaled to unit variance. The ridge is the one that predicts left-out examples
-/// best.
+/// Least squares on an indicator column for each effect; features are scaled to unit variance. The ridge is the one
+/// that predicts left-out examples best.
 class BlackBox {
  public:
   /// `examples`: at least two, all with the same number of features.
   explicit BlackBox(const std::vector<Example>& examples);
-  /// Effects and "" by their predicted indicator, the largest first.
+  /// Effects, and "" for none, by their predicted indicator, the largest first.
   std::vector<std::string> ranked(const std::vector<double>& features) const;
 
  private:

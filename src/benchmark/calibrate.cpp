@@ -22,7 +22,6 @@ using gap::VerdictRule;
 /// Least probability of a right answer in the score, so that no single case decides.
 constexpr double kMinProbability = 1e-3;
 
-/// A constant to learn: its table and key in the file, its range, and whether it is searched on a logarithmic scale.
 struct Constant {
   const char *table, *key;
   std::function<double&(VerdictRule&)> of;
@@ -51,7 +50,6 @@ struct Case {
   std::size_t part = 0;
 };
 
-/// Change of the log prior of a hypothesis from one rule to another.
 double moved_prior(const ScoredHypothesis& a, const VerdictRule& from, const VerdictRule& to) {
   using Kind = gap::HypothesisKind;
   const auto move = [](double before, double now) { return std::log(now / before); };
@@ -153,7 +151,7 @@ class Calibration {
   static std::array<double*, 4> shared(VerdictRule& rule) {
     return {&rule.prior.none, &rule.prior.parameters, &rule.prior.effect, &rule.prior.unknown};
   }
-  /// Scales the other priors so that all of them add up to 1 with the prior `one`.
+  /// Scales the other priors so that all add up to 1 with `one`.
   static void share(VerdictRule& rule, const double& one) {
     double others = 0;
     for (const double* p : shared(rule))
@@ -168,7 +166,7 @@ class Calibration {
 
 std::string rounded(double x) { return io::format("%.4g", x); }
 
-/// Replaces the value of a key in the text of a TOML file; comments and layout stay.
+/// In the text of a TOML file; comments and layout stay.
 void set_number(std::string& text, const std::string& table, const std::string& key, const std::string& value) {
   const std::size_t from = text.find("\n[" + table + "]"), at = text.find("\n" + key + " = ", from);
   if (from == std::string::npos || at == std::string::npos) return;

@@ -1,8 +1,6 @@
-// flappy-blind calibrate: learns the constants of the verdict from robots whose truth is known.
-//
-// A few constants turn log evidences into probabilities (configs/gap/verdict.toml): the gain by chance, the tempering of the evidence, the prior of
-// an unknown cause. They are chosen to maximise the mean logarithm of the probability of the right answers in scored cases, a proper score
-// (Good 1952), in which every part of every family has the same weight.
+// flappy-blind calibrate: learns the constants of the verdict (configs/gap/verdict.toml) from robots whose truth is
+// known. They maximise the mean log probability of the right answers, a proper score (Good 1952), in which every part
+// of every family weighs the same.
 #pragma once
 
 #include <filesystem>
@@ -19,7 +17,7 @@ struct CalibrateCommand {
   std::filesystem::path out;
 };
 
-/// Writes the verdict file with the learnt constants to `out`, and prints them with their old values. InputError if a folder was not scored.
+/// Writes the verdict file to `out`, and prints new and old values. InputError if a folder was not scored.
 nlohmann::ordered_json calibrate(const CalibrateCommand& command);
 
 }  // namespace flappy::benchmark

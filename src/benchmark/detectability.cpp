@@ -22,9 +22,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Largest detectable magnitude: robots fly twice the detectable magnitude, and none has more than 4. Value that stands for "never" in hover.
+/// Robots fly twice the detectable magnitude, at most 4. kMaxHover stands for "never" in hover.
 constexpr double kMaxDetectable = 2, kMaxHover = 1000;
-/// Regimes that only rich flight has. Effects that act in these alone need a contrast of their own in hover; others act in hover, too.
+/// Only rich flight has these. Effects that act in them alone need a contrast of their own in hover.
 constexpr const char* kOfFlight[] = {"height", "ceiling",      "wall",    "place",      "velocity",
                                      "rate",   "acceleration", "heading", "difference", "bias"};
 constexpr const char* kChannels[] = {"force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z"};
@@ -101,8 +101,7 @@ Beats beats_of(const flightlog::FlightLog& log, const std::vector<double>& beat_
     std::array<double, 30>& of = beats.back().emplace();
     for (std::size_t k = 0; k < 6; ++k) {
       const auto c = fit.col(static_cast<Eigen::Index>(k));
-      // the gyro measures rates: their slope and the derivatives of their harmonics are those of the angular
-      // acceleration
+      // gyros measure rates, whose slope and harmonics' derivatives are those of the angular acceleration
       const std::array<double, 5> row =
           k < 3 ? std::array{c[0], c[1], c[2], c[3], c[4]}
                 : std::array{c[5] / beat, turn * c[2], -turn * c[1], 2 * turn * c[4], -2 * turn * c[3]};
@@ -139,8 +138,7 @@ Shown shown(const Changed& d, double magnitude) {
     for (std::size_t order = 0; order < 3; ++order) {
       const double reference = std::sqrt(order == 0 && c < 3 ? weight : waveform[c / 3]);
       if (!(reference > 0)) continue;
-      // least squares with bounds, one column after another: the signal, its derivative, a constant for each
-      // coefficient
+      // bounded least squares, column by column: signal, derivative, a constant for each coefficient
       const std::size_t from = 5 * c + (order == 0 ? 0 : 2 * order - 1), width = order == 0 ? 1 : 2;
       const double turn = 2 * std::numbers::pi * static_cast<double>(order) * d.flapping_Hz;
       const auto column = [&](std::size_t b, std::size_t k, std::size_t i) {

@@ -28,11 +28,10 @@ struct FlownRobot {
   std::vector<blind::FamilyFlight> flights;
 };
 
-/// Assignment::seed of a draw.
 std::uint64_t seed_of_draw(std::uint64_t seed, std::uint64_t draw);
 
-/// Draws robots of `seed` until one flies all its flights, like blind::fly_sampled; `a.seed` is replaced by the seed of each draw. `prepare` may
-/// change the assignment once it has that seed. blind::NeverFlies after 20 draws.
+/// Draws robots until one flies all its flights, like blind::fly_sampled, with the draw's seed in `a`, which `prepare`
+/// may then change. blind::NeverFlies after 20 draws.
 FlownRobot fly_drawn(const blind::Family& family, blind::Assignment a, std::uint64_t seed,
                      const std::function<void(blind::Assignment&)>& prepare = {});
 

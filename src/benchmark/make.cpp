@@ -59,8 +59,7 @@ class Maker {
   fs::path label_file(const PlannedCase& p) const { return sealed_ / (number_text(p.number) + ".json"); }
   fs::path case_folder(const PlannedCase& p) const { return command_.out / "cases" / number_text(p.number); }
 
-  /// Stores the plan's hash, or compares it with that of an unfinished benchmark in the folder; InputError if they
-  /// differ.
+  /// Stores the plan's hash; InputError if it differs from that of an unfinished benchmark in the folder.
   void agree_with_what_is_there() const {
     Json plan = {command_.family};
     for (const PlannedCase& p : plan_) plan.push_back(to_json(p));
@@ -74,8 +73,7 @@ class Maker {
 
   void make(const PlannedCase& p) const {
     const blind::Assignment a = assignment_of(p, command_.vehicle);
-    // the vehicle file of a robot of the published randomisation stays in the sealed folder, and is removed after its
-    // flights
+    // a vehicle file drawn by the published randomisation stays sealed, and is removed after its flights
     const fs::path drawn = sealed_ / ("vehicle_" + number_text(p.number));
     const auto prepare = [&](blind::Assignment& now) {
       if (!p.published) return;

@@ -1,4 +1,3 @@
-// flappy-blind make.
 #pragma once
 
 #include <filesystem>
@@ -22,15 +21,15 @@ struct MakeCommand {
   PlanOptions plan;
   int threads = 0;  ///< 0: one for each processor
   io::Ranks* ranks = nullptr;
-  /// Parameters with which the effects of the catalogue come nearest to those of a case, by "effect.parameter"; null: none comes near. Called for
-  /// cases of part "singles", whose intervals are scored; if unset, no case has true values.
+  /// Returns the catalogue parameters nearest to a case's effects, by "effect.parameter"; null: none comes near. Called
+  /// only for part "singles", whose intervals are scored; unset: no true values.
   std::function<std::map<std::string, std::optional<double>>(const blind::Assignment&,
                                                              const std::vector<blind::BlindEffect>&)>
       true_values;
 };
 
-/// Flies the cases into `out`/cases and seals their labels. Resumes an interrupted run; false if interrupted again. InputError if `out` has a
-/// benchmark with another plan.
+/// Flies the cases into `out`/cases and seals their labels. Resumes an interrupted run; false if interrupted again.
+/// InputError if `out` has a benchmark with another plan.
 bool make_bench(const MakeCommand& command);
 
 }  // namespace flappy::benchmark

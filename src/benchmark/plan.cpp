@@ -10,14 +10,13 @@
 namespace flappy::benchmark {
 namespace {
 
-/// Robots that are flown by hand, and those of the tables of detectable magnitudes, have seeds below kSeedsOfAFamily. Already used are the seeds
-/// 700001 to 799999 and, counted from the first seed of each family, the 120,000 from 5,000,000, 5,500,000, 6,000,000, 6,500,000, 7,000,000,
-/// 7,500,000 and 8,000,000 on.
+/// Below kSeedsOfAFamily: robots flown by hand or for tables of detectable magnitudes. Already used: 700001 to 799999
+/// and, from each family's first seed, the 120,000 from each of 5,000,000, 5,500,000, ..., 8,000,000 on.
 constexpr std::uint64_t kSeedsOfAFamily = 10'000'000, kReported = 8'500'000, kSeedsOfAPart = 10'000;
-/// Least number of cases of most parts; rounded up so that all effects of a part have the same number of cases.
+/// Least number of cases of most parts; rounded up so that all effects of a part have as many.
 constexpr std::size_t kAtLeast = 100;
 constexpr double kOverDetectable = 2, kLargest = 4;
-/// Magnitude of effects outside the catalogue that the table does not list.
+/// For effects outside the catalogue that the table does not list.
 constexpr double kOutsideMagnitude = 2;
 
 using Ids = std::vector<std::string>;
@@ -52,7 +51,7 @@ class Planner {
     if (detectable_.size() < 2)
       throw io::InputError(
           "--detectable: fewer than two effects are detectable; accepted: a table of flappy-blind detectability");
-    // so that the first cases of a part (PlanOptions::at_most) are a fair draw of its effects
+    // the first cases of a part (PlanOptions::at_most) are a fair draw
     for (Ids* ids : {&detectable_, &typical_, &outside_, &hidden_}) shuffle(*ids);
     random_.seed(first_seed_);
   }

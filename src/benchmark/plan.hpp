@@ -1,4 +1,3 @@
-// The cases of a blind benchmark.
 #pragma once
 
 #include <cstdint>
@@ -13,15 +12,14 @@
 
 namespace flappy::benchmark {
 
-/// Detectability of an effect (benchmark/detectability.hpp).
 struct Detectability {
   double detectable = 0;      ///< detectable magnitude, in units of the family
   bool undetectable = false;  ///< twice the detectable magnitude exceeds what a robot may have
   bool hidden = false;        ///< hover alone does not show twice the detectable magnitude
 };
 
-/// Reads the table for every effect of a family that the catalogue has, and for effects outside the catalogue that the table lists. InputError if
-/// an effect of the catalogue is missing.
+/// Reads the table for every effect of a family that the catalogue has, and listed ones outside it. InputError if an
+/// effect of the catalogue is missing.
 std::map<std::string, Detectability> read_detectability(const std::filesystem::path& file, const blind::Family& family);
 
 /// One robot and its flights, as only the maker knows them.
@@ -45,7 +43,7 @@ struct PlanOptions {
   std::size_t at_most = 0;         ///< most cases of each part; 0: all
 };
 
-/// Seeds of family b begin at 20,000,000 for development and at 28,500,000 for reported scores; those of a and c at 10,000,000 and 30,000,000
+/// Seeds of family b begin at 20,000,000 (development) and 28,500,000 (reported); a and c: 10,000,000 and 30,000,000
 /// likewise.
 std::vector<PlannedCase> plan_cases(const blind::Family& family,
                                     const std::map<std::string, Detectability>& detectability,

@@ -5,7 +5,6 @@
 namespace flappy::benchmark {
 namespace {
 
-/// Position and heading on a path whose segments are polynomials of the time since they began.
 std::array<double, 4> on_path(const std::vector<flight::Segment<double>>& path, double tick_s, double t_s) {
   const auto next = std::ranges::find_if(
       path.begin() + 1, path.end(), [&](const auto& s) { return static_cast<double>(s.start_tick) * tick_s > t_s; });
@@ -20,7 +19,6 @@ std::array<double, 4> on_path(const std::vector<flight::Segment<double>>& path, 
 /// A surface that is farther away does not exist.
 constexpr double kNone_m = 500;
 
-/// Displacement of the manoeuvre from its own world to the room.
 std::array<double, 3> moved_by(const sim::World& own, const flightlog::LogAmbient& room) {
   std::array<double, 3> by{0, 0, room.ground_z_m - own.ground_z_m};
   if (own.ceiling_z_m < kNone_m) by[2] = room.ceiling_z_m - own.ceiling_z_m;

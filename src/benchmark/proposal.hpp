@@ -6,9 +6,8 @@
 
 namespace flappy::benchmark {
 
-/// The part of the manoeuvre that is logged, moved into the room that `header` declares: the distance to the ceiling is that of the manoeuvre's own
-/// world if that has a ceiling, otherwise the height above the ground; the distance to the wall likewise if both have a wall. The result refers to
-/// `manoeuvre`.
+/// The logged part of the manoeuvre in the room of `header`: it keeps its distance to its own ceiling, or else its
+/// height, and to its wall if both have one. The result refers to `manoeuvre`.
 blind::ProposedFlight proposed_flight(const gap::Manoeuvre& manoeuvre, const flightlog::FlightHeader& header);
 
 }  // namespace flappy::benchmark

@@ -1,5 +1,5 @@
-// The files of a blind benchmark: DIR/manifest.json, which is public; DIR/sealed/labels.json, which is opened after all predictions are made;
-// DIR/predictions/NNNN.json.
+// Files of a blind benchmark: DIR/manifest.json, which is public; DIR/sealed/labels.json, which is opened after all
+// predictions are made; DIR/predictions/NNNN.json.
 #pragma once
 
 #include <filesystem>
@@ -20,7 +20,7 @@ std::string number_text(std::size_t number);
 /// InputError if the file cannot be read or is not JSON.
 Json read_json(const std::filesystem::path& file);
 
-/// The public part of a case, which the diagnosis may know.
+/// The public part of a case.
 struct PublicCase {
   std::size_t number = 0;
   std::vector<std::string> withheld;
@@ -36,10 +36,9 @@ struct Manifest {
 Json to_json(const Manifest& manifest);
 Manifest read_manifest(const std::filesystem::path& folder);
 
-/// File with the hashes of all predictions, in the format of sha256sum. It seals the predictions, and is written once all of them are made.
+/// Hashes of all predictions, in sha256sum's format: written once all are made, and seals them.
 inline constexpr const char* kSums = "predictions.sha256";
 std::filesystem::path prediction_file(const std::filesystem::path& folder, std::size_t number);
-/// The line of a prediction in kSums.
 std::string sum_line(const std::filesystem::path& folder, std::size_t number);
 /// InputError if the predictions are not sealed, or if one has changed since.
 void check_predictions(const std::filesystem::path& folder, const Manifest& manifest);
@@ -52,7 +51,6 @@ struct Label {
   std::vector<std::string> channels, regimes;  ///< where its effects act (blind::FamilyEffect)
   std::map<std::string, double> true_values;   ///< by "effect.parameter"
   CaseTruth truth() const;
-  /// The robot that flew.
   blind::Assignment robot(const std::filesystem::path& vehicle) const;
 };
 Json to_json(const PlannedCase& planned);

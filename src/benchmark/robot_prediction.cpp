@@ -16,7 +16,7 @@ constexpr int kSubsteps = 10;  // steps of the robot in a step of the record
 static_assert(kSubsteps * blind::kRobotStep_s == gap::kPredictionStep_s);
 /// Number of torque and force channels.
 constexpr std::size_t kSignals = gap::kStrokeLeft;
-/// The voltages before the record are not known; those of so many beats at its start are repeated instead.
+/// Voltages before the record are unknown; so many beats at its start are repeated.
 constexpr double kBeatsBefore = 10;
 
 blind::Torso torso_of(const gap::TorsoAt& t) {
@@ -33,7 +33,7 @@ blind::Room room_of(const sim::World& world) {
   return room;
 }
 
-/// Whether an effect has a state that depends on the time before the record: heat, charge, weather.
+/// Its state depends on time before the record: heat, charge, weather.
 bool remembers(const blind::Magnitudes& magnitudes) {
   for (const blind::Effect e : {blind::Effect::wind, blind::Effect::winding_heating, blind::Effect::battery_sag,
                                 blind::Effect::outside_vortex_shedding, blind::Effect::outside_brush_contact})
@@ -41,7 +41,6 @@ bool remembers(const blind::Magnitudes& magnitudes) {
   return false;
 }
 
-/// A perturbed robot that replays a record.
 class Carrier {
  public:
   Carrier(const gap::Recording& recording, const Perturbation& perturbation, std::uint64_t flight)
@@ -92,8 +91,7 @@ class Carrier {
         std::clamp<std::ptrdiff_t>(step, 0, static_cast<std::ptrdiff_t>(r_.left_V.size()) - 1));
     for (int n = 0; n < kSubsteps; ++n) robot_.step(r_.left_V[i], r_.right_V[i]);
   }
-  /// Runs the robot with a fixed torso from the start of its trimming to the start of the record, so that its clock and
-  /// weather are those of the flight, and its heat and charge nearly so.
+  /// Runs with a fixed torso from trimming to the record: clock and weather are the flight's, heat and charge nearly.
   void live_until_start() {
     robot_.hold_torso(true);
     put(torso_of(r_.torso[0]));

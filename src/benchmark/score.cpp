@@ -68,7 +68,7 @@ const FittedSet* fitted(const Answer& p, const Names& effects) {
   return nullptr;
 }
 
-/// Counts the true values, and those within the intervals of the diagnosis, if the verdict names the true effects or their group.
+/// True values, and those within intervals, if the verdict names the true effects or their group.
 void count_covered(const ScoredCase& c, std::size_t& covered, std::size_t& all) {
   if (!named_alone(c) && !group_holds(c)) return;
   const FittedSet* set = fitted(c.prediction, c.truth.effects);
@@ -81,7 +81,7 @@ void count_covered(const ScoredCase& c, std::size_t& covered, std::size_t& all) 
   }
 }
 
-/// Effects that a verdict names; for a group, its most probable set.
+/// For a group, of its most probable set.
 Names at_work(const Answer& p) {
   if (names_set(p.kind)) return p.effects;
   if (p.kind != "group") return {};
@@ -89,7 +89,7 @@ Names at_work(const Answer& p) {
   return most == p.sets.end() ? Names() : most->effects;
 }
 
-/// F1 of the named effects, over all cases together. `which`: cases that count, a case may come several times.
+/// F1 of the named effects over all cases together. `which`: cases that count, maybe several times.
 std::optional<double> f1(const std::vector<std::pair<Names, Names>>& named_and_true,
                          const std::vector<std::size_t>& which) {
   double hits = 0, sum = 0;
@@ -200,7 +200,7 @@ ScoreLine first_line(const char* key, const char* what, double must, double aim,
   return line(key, what, Bar::at_least, must, aim, share(cases, named_alone), of_baselines(cases, baseline_first));
 }
 
-/// Compares each case with the case of `singles` that has the same robot, if the same draw flew in both.
+/// With the case of `singles` of the same robot, if the same draw flew.
 ScoreLine redeclared_line(const Cases& cases, const Cases& singles) {
   std::map<std::pair<std::uint64_t, std::uint64_t>, const Answer*> by_robot;
   for (const ScoredCase* c : singles) by_robot[{c->truth.seed, c->truth.draw}] = &c->prediction;
@@ -238,7 +238,7 @@ ScoreLine pairs_line(const Cases& cases) {
   return line("pairs_f1", "pairs: F1 of names", Bar::at_least, 0.75, 0.92, f1_score(own), std::move(baselines));
 }
 
-/// Standard error of the difference of two scores, from their intervals as if they were independent; they share cases, so it is rather too large.
+/// Standard error of the difference of two scores as if independent; they share cases, so it is rather too large.
 double standard_error(const ScoreValue& a, const ScoreValue& b) {
   return std::hypot(a.high - a.low, b.high - b.low) / (2 * io::kNormal975);
 }

@@ -1,4 +1,3 @@
-// Scores of the diagnoses of a blind benchmark: predictions compared with the truth.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +11,6 @@
 
 namespace flappy::benchmark {
 
-/// The truth of a case.
 struct CaseTruth {
   std::string part;                            ///< one of kParts
   std::vector<std::string> effects;            ///< effects of the robot
@@ -20,27 +18,24 @@ struct CaseTruth {
   std::vector<std::string> channels, regimes;  ///< where the effects act (blind::FamilyEffect)
   std::uint64_t seed = 0, draw = 0;            ///< identify the robot
 };
-/// Parts of a benchmark, by their robots:
+/// Parts of a benchmark, by their robots. Those with effects have independent parameters and, but for redeclared,
+/// inexact declarations.
 ///   singles, singles_current  one effect at twice its detectable magnitude; singles_current also logs currents
 ///   redeclared                the robots of singles, with exact declarations
 ///   typical                   one effect at magnitude 1, where that is detectable
 ///   none, parameters, own_parameters, conventions
-///                             no effect: exactly as the vehicle file; parameters of the published randomisation; each parameter of each body
-///                             independent; declarations within the habits of laboratories
-///   withheld, outside         an effect whose group is withheld from the catalogue; an effect that the catalogue never has
-///   pairs                     two effects of different groups
-///   hover                     an effect that hover alone does not show, in hover
-/// All robots with effects have independent parameters of their own and, except those of redeclared, inexact declarations.
+///                             no effect: as the vehicle file; parameters of the published randomisation; each
+///                             parameter of each body independent; declarations within the habits of laboratories
+///   withheld, outside         an effect whose group is withheld from the catalogue; one never in the catalogue
+///   pairs, hover              two effects of different groups; an effect that hover alone does not show, in hover
 inline constexpr const char* kParts[] = {"singles",  "singles_current", "redeclared",     "typical",
                                          "none",     "parameters",      "own_parameters", "conventions",
                                          "withheld", "outside",         "pairs",          "hover"};
 
-/// A parameter of an effect with its 90 % interval.
 struct ScoredParameter {
   double value = 0, low = 0, high = 0;
 };
 
-/// A set of effects that a diagnosis weighed, with or without a remainder.
 struct FittedSet {
   std::vector<std::string> effects;
   double probability = 0;
@@ -54,9 +49,9 @@ struct Where {
   std::string channel, regime;
 };
 
-/// The parts of a prediction that are scored.
 struct Answer {
-  /// Kind of the verdict; "remainder": effects and a remainder; "crashed": the robot crashed in the flight to be diagnosed.
+  /// Kind of the verdict; "remainder": effects and a remainder; "crashed": the robot crashed in the flight to be
+  /// diagnosed.
   std::string kind = "data";
   std::vector<std::string> effects;  ///< effects that the verdict names; for a group, its possible effects
   double probability = 0;            ///< probability of the verdict
@@ -80,7 +75,6 @@ struct ScoredCase {
   std::optional<Answer> after_next;
 };
 
-/// One row of the table of scores.
 struct ScoreLine {
   std::string key, what, must, aim;
   ScoreValue score;
@@ -90,8 +84,8 @@ struct ScoreLine {
 
 struct Scores {
   std::vector<ScoreLine> lines;
-  /// By baseline: keys of the rows on which the diagnosis does not beat it by more than a standard error of the difference; empty: beaten on all
-  /// rows. Only baselines whose false alarms are within the bar.
+  /// By baseline: rows on which the diagnosis does not beat it by a standard error. Only baselines with few false
+  /// alarms.
   std::map<std::string, std::vector<std::string>> unbeaten;
 };
 
@@ -100,8 +94,8 @@ Scores score(const std::vector<ScoredCase>& cases);
 /// Whether the verdict is right for a case of its part.
 bool right(const CaseTruth& truth, const Answer& prediction);
 
-/// Share of the closable gap that the verdict closes: (E_refit - E_named) / (E_refit - E_true effect refitted), E: mean loss. 0 for a verdict
-/// without effects; none if the gain of the true effect is less than two of its standard deviations.
+/// Share of the closable gap that the verdict closes: (E_refit - E_named) / (E_refit - E_true effect refitted), E: mean
+/// loss. 0 for a verdict without effects; none if the true effect gains less than two standard deviations.
 std::optional<double> closure(const ScoredCase& c);
 
 /// Whether the closure of a case is scored but its true effect was not fitted, so that true_fit is needed.

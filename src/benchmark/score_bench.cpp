@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
   throw io::InputError(file.string() + ": " + what + "; accepted: what was sealed");
 }
 
-/// Folder that is made when the labels are opened; from then on, no further prediction is accepted.
+/// Made when the labels are opened; from then on, no prediction is accepted.
 fs::path true_fits(const fs::path& folder) { return folder / "true_fits"; }
 
 // ---- phase 1: predictions, which read nothing that is sealed
@@ -96,9 +96,6 @@ class Predictions {
   fs::path vehicle_, sums_;
 };
 
-// ---- phase 2: the labels
-
-/// A benchmark that flappy-blind make has made.
 struct Bench {
   Bench(const ScoreCommand& command, const fs::path& at)
       : folder(at), manifest(read_manifest(at)), predictions(command, folder, manifest) {
@@ -127,8 +124,7 @@ struct Bench {
   std::vector<ScoredCase> cases;  ///< in the order of the manifest
 };
 
-/// Diagnoses cases with only the true effects in the catalogue, if their diagnosis did not fit these: the closure is relative to their fit. False if
-/// interrupted.
+/// With only the true effects in the catalogue, where not fitted: closures are relative to them. False if interrupted.
 bool fit_truths(const ScoreCommand& command, Bench& bench) {
   std::vector<std::size_t> open;
   const auto file_of = [&](std::size_t i) {
@@ -154,7 +150,7 @@ bool fit_truths(const ScoreCommand& command, Bench& bench) {
   return true;
 }
 
-/// Flies the proposed flights of the robots of part "hover", and diagnoses these with the earlier flights. False if interrupted.
+/// Of part "hover", and diagnoses them with the earlier flights. False if interrupted.
 bool fly_proposals(const ScoreCommand& command, Bench& bench) {
   const auto file_of = [&](std::size_t i) {
     return bench.folder / "proposed" / (number_text(bench.manifest.cases[i].number) + ".json");
@@ -198,7 +194,7 @@ bool fly_proposals(const ScoreCommand& command, Bench& bench) {
   return true;
 }
 
-/// Adds the answers of the black box for a family, learnt on the robots of the other scored families; none if there are too few.
+/// Learnt on the robots of the other families; none if there are too few.
 void ask_black_box(const std::vector<std::unique_ptr<Bench>>& benches, const std::string& family) {
   constexpr std::size_t kFewest = 20;
   const std::set<std::string> kTeaching = {"singles",    "singles_current", "typical",    "none",
@@ -219,8 +215,6 @@ void ask_black_box(const std::vector<std::unique_ptr<Bench>>& benches, const std
       std::erase(said.ranking, "");
     }
 }
-
-// ---- output
 
 std::string figure(const std::optional<double>& value) {
   if (!value) return "-";
@@ -273,7 +267,6 @@ Json scores_json(const Scores& scores, std::size_t cases) {
   return json;
 }
 
-/// Rows of score.csv, one for each case.
 std::string case_lines(const Bench& bench) {
   std::string text;
   for (std::size_t i = 0; i < bench.cases.size(); ++i) {

@@ -1,4 +1,3 @@
-// flappy-blind score.
 #pragma once
 
 #include <filesystem>
@@ -24,8 +23,9 @@ struct ScoreCommand {
   Predictor predictor = predict;
 };
 
-/// Makes the missing predictions of every folder and seals them; then opens the labels, and scores the cases of each family and all cases. Resumes
-/// an interrupted run; null if interrupted again. InputError if logs, labels or predictions are not those that were sealed.
+/// Makes and seals the missing predictions, then opens the labels and scores each family and all cases. Resumes an
+/// interrupted run; null if interrupted again. InputError if logs, labels or predictions are not those that were
+/// sealed.
 nlohmann::ordered_json score_bench(const ScoreCommand& command);
 
 }  // namespace flappy::benchmark

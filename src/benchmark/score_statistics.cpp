@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kResamples = 2000, kBins = 10;
 
-/// Draws that are the same in every run and on every platform, unlike the distributions of the standard library.
+/// The same on every platform, unlike the standard library's distributions.
 class Draws {
  public:
   double uniform() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }

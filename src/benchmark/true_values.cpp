@@ -36,25 +36,22 @@ Residuals difference(Residuals a, const Residuals& b) {
   return a;
 }
 
-/// All flights of a case.
 std::vector<blind::RobotFlight> fly_all(const blind::Case& c, int threads) {
   std::vector<blind::RobotFlight> flights(blind::kFlights);
   io::parallel_for(blind::kFlights, threads, [&](std::size_t k) { flights[k] = fly(c, k); });
   return flights;
 }
 
-/// A robot that flew without effects, and changes of the rows of its flights.
 class Subject {
  public:
-  /// `flights`: all flights of case `c`, which has no effects; none crashed.
+  /// All flights of `c`, which has no effects; none crashed.
   Subject(blind::Case c, std::vector<blind::RobotFlight> flights, int threads);
 
-  /// Change that an effect of the robot makes in its rows; empty if the simulation diverges.
+  /// Change of the rows; empty if the simulation diverges.
   BasisCoefficients added(blind::Effect effect, double magnitude) const;
-  /// Changes in the simulator's rows for one standard deviation of each uncertain parameter, and of the IMU's lag.
+  /// Change of the rows for one standard deviation of each uncertain parameter and the IMU's lag.
   std::vector<BasisCoefficients> parameters(const sim::Randomisation& uncertain) const;
-  /// Changes that an effect of the catalogue makes in the simulator's rows, at each of `coordinates`; empty if the
-  /// simulation diverges.
+  /// Change in the simulator's rows, at each of `coordinates`; empty if the simulation diverges.
   std::vector<BasisCoefficients> catalogue(const std::string& effect,
                                            const std::vector<Eigen::VectorXd>& coordinates) const;
 
@@ -96,8 +93,7 @@ BasisCoefficients Subject::added(blind::Effect effect, double magnitude) const {
   return change.empty() ? BasisCoefficients() : evidence_->basis_coefficients(change);
 }
 
-/// Change by an effect of a sensor. The robot's controller uses no sensor of the log, so the same seed gives the same motion and the same noise with
-/// the effect.
+/// The controller uses no sensor of the log, so the same seed gives the same motion and noise with the effect.
 BasisCoefficients Subject::sensed(const blind::Magnitudes& magnitudes) const {
   blind::Case c = case_;
   c.magnitudes = magnitudes;
@@ -107,8 +103,7 @@ BasisCoefficients Subject::sensed(const blind::Magnitudes& magnitudes) const {
   return evidence_->basis_coefficients(difference(gap::residuals(flights, {{case_.vehicle}}, threads_)[0], left_));
 }
 
-/// The robot's vehicle, with its parameters changed by the amount that a draw changes those of the nominal vehicle: a law that replaces values
-/// ignores the vehicle's own values.
+/// Moved by the amount that a draw moves the nominal vehicle: a law that replaces values ignores the vehicle's.
 model::Vehicle Subject::moved(const sim::Randomisation& uncertain, std::size_t draw, double variate) const {
   std::vector<double> variates(uncertain.draws(), 0);
   model::Vehicle middle = uncertain.at(variates);
@@ -168,12 +163,11 @@ MatrixXd Subject::information(const std::vector<BasisCoefficients>& parameters,
 }
 
 constexpr int kIterations = 8;
-/// Half the step of differences, and the step at which the search ends, in coordinates: 90 % of the prior is within 1.645.
+/// Half the step of differences; last step of the search. Coordinates: 90 % of the prior is within 1.645.
 constexpr double kReach = 0.1, kConverged = 0.002;
-/// Start of the search: a magnitude about as large as is typical; shape parameters in the middle of their prior, or one of them near an end of it.
+/// A typical magnitude; shape parameters in mid-prior, or one of them near an end.
 constexpr double kStart = 0.5, kShapeStart = 1.5;
 
-/// Fits the parameters of an effect of the catalogue to the change that an effect of the robot makes in the rows.
 class Likeness {
  public:
   Likeness(const Subject& subject, const std::vector<BasisCoefficients>& parameters, std::string entry,
@@ -184,7 +178,7 @@ class Likeness {
         unknowns_(gap::unknowns_of(entry_)),
         wanted_(std::move(wanted)) {}
 
-  /// The fitted magnitudes, and the share of the change that they leave (a ratio of rms, at most 1).
+  /// And the share of the change that they leave (a ratio of rms, at most 1).
   std::pair<std::map<std::string, double>, double> find() {
     VectorXd at = start();
     double least = cost(left_at({at})[0], at);
@@ -233,8 +227,7 @@ class Likeness {
     return sum;
   }
 
-  /// Shape parameters for which the changes by the magnitudes, one at a time, are most alike; magnitudes that may have
-  /// both signs start at 0.
+  /// Where changes by single magnitudes are most alike; two-sided magnitudes start at 0.
   VectorXd start() const {
     std::vector<VectorXd> shapes = {VectorXd::Zero(size())};
     for (Index i = 0; i < size(); ++i)
@@ -261,7 +254,7 @@ class Likeness {
     return bounded(at);
   }
 
-  /// Coordinates to try: shares of a Gauss-Newton step.
+  /// Shares of a Gauss-Newton step.
   std::vector<VectorXd> steps_from(const VectorXd& at) const {
     std::vector<VectorXd> places = {at};
     for (Index i = 0; i < size(); ++i)

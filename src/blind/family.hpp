@@ -1,5 +1,5 @@
-// Families of blind robots: a family is one independent simulator and its robots. Families share this header and nothing else: no
-// physics, effect law, sensor model, convention or controller. tests/structure checks this.
+// A family of blind robots is one independent simulator and its robots. Families share this header and nothing else: no
+// physics, effect law, sensor model, convention or controller (tests/structure checks this).
 #pragma once
 
 #include <array>
@@ -13,13 +13,12 @@
 
 namespace flappy::blind {
 
-/// An effect that robots of a family may have.
 struct FamilyEffect {
   std::string id;       ///< id of the catalogue's effect with this cause; outside_* if the catalogue has none
   std::string typical;  ///< the effect at magnitude 1, in words and units
-  /// Sealed with a case: the channels in which the effect acts (force_x .. torque_z in B, gyro, accelerometer, mocap,
-  /// current), and the quantities with which it grows ("always", height, ceiling, wall, place, amplitude, difference,
-  /// bias, split_cycle, velocity, rate, acceleration, time, temperature, charge, stroke, heading).
+  /// Sealed with a case: channels in which it acts (force_x .. torque_z in B, gyro, accelerometer, mocap, current), and
+  /// quantities with which it grows ("always", height, ceiling, wall, place, amplitude, difference, bias, split_cycle,
+  /// velocity, rate, acceleration, time, temperature, charge, stroke, heading).
   std::vector<std::string> channels, regimes;
 };
 
@@ -49,16 +48,16 @@ struct FamilyFlight {
   flightlog::FlightLog log;  ///< begins at t = 0, after the trimming
 };
 
-/// Change that an effect makes along a flight that was flown without it. For each wing beat of the log: its start, then mean, cosine
-/// and sine of the first and of the second harmonic of specific force at the IMU (m/s^2; x, y, z of B) and of angular acceleration
-/// (rad/s^2; x, y, z of B). The torso is led along the flown path; all other states evolve by the robot's own dynamics.
+/// Change by an effect along a flight without it. For each beat of the log: start, then mean, cosine and sine of two
+/// harmonics of specific force at the IMU (m/s^2, B) and angular acceleration (rad/s^2, B). The torso is led along the
+/// flown path; all other states evolve freely.
 struct Contrast {
   std::vector<double> beat_s;
   std::vector<std::array<double, 30>> change;  ///< [beat][channel x 5 + coefficient]
 };
 
-/// Maps an observation (SI units, in the order of EscapeAssignment::observation) to inputs that are added to the controller's output:
-/// V, V, V, split cycle.
+/// Maps an observation (SI units, ordered as EscapeAssignment::observation) to V, V, V, split cycle, added to the
+/// controller's.
 using NamedPolicy = std::function<std::array<double, 4>(const std::vector<double>& observation)>;
 
 /// The escape under the conditions of the policy's training; names and values are those of the task file.
@@ -87,9 +86,8 @@ class Family {
   virtual const std::vector<FamilyEffect>& effects() const = 0;
   static constexpr std::size_t kFlights = 3;
   static constexpr double kFlight_s = 10;
-  /// Flies flight 0, 1 or 2 of an assignment, or 3, the proposed flight; the log begins after some seconds in which the
-  /// robot finds its trim. Returns the same bytes for the same arguments, with any number of threads, on all processors
-  /// of one kind.
+  /// Flies flight 0, 1 or 2, or 3, the proposed one; the robot trims for some seconds before the log. Returns the same
+  /// bytes for the same arguments, with any number of threads, on all processors of one kind.
   virtual FamilyFlight fly(const Assignment& a, std::size_t flight) const = 0;
   virtual Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect,
                             double magnitude) const = 0;

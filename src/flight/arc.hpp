@@ -1,6 +1,7 @@
-// Adaptive robust controller (Yao and Tomizuka 1997; for this vehicle the code of Fei et al. 2019). It forms sliding errors down to
-// the derivative on which the wing beat acts, lets them decay by feedback, and adapts parameters within known bounds.
-// Derivatives of position, in the heading frame (f: forward, l: left); b = R z is the direction of thrust, w the body rate:
+// Adaptive robust controller (Yao and Tomizuka 1997; for this vehicle the code of Fei et al. 2019). It forms sliding
+// errors down to the derivative on which the wing beat acts, lets them decay by feedback, and adapts parameters within
+// known bounds. Derivatives of position, in the heading frame (f: forward, l: left); b = R z is the direction of
+// thrust, w the body rate:
 //   acceleration a = g b/b_z + d        jerk j = g R (w x z)       snap = g (w_y', -w_x')
 //   s = (D + lambda)^3 e = j_e + 3 lambda a_e + 3 lambda^2 v_e + lambda^3 e
 //   snap_sp = -3 lambda j_e - 3 lambda^2 a_e - lambda^3 v_e - k s
@@ -21,7 +22,6 @@ struct Sliding {
   T lambda_1_s, k_1_s;
 };
 
-/// Gain gamma and bounds of an adapted parameter.
 template <class T>
 struct Adapted {
   T gain, low, high;
@@ -42,7 +42,6 @@ struct ArcConstants : LoopConstants<T> {
 
 inline namespace FLAPPY_ISA {
 
-/// Memory of the controller, stored as rows.
 template <class T>
 struct Arc {
   T mass_kg;  // 0 before the first update
@@ -59,7 +58,6 @@ FLAPPY_INLINE T adapted(const Adapted<K>& k, const T& value, const T& rate, cons
   return where(rate * blocked_towards > T(0), value, moved);
 }
 
-/// Table of the controller's functions (controllers.hpp).
 struct ArcController {
   static constexpr const char* kName = "arc";
   template <class T>
@@ -208,7 +206,6 @@ FLAPPY_INLINE WingBeat<T> ArcController::update(const ArcConstants<Element<T>>& 
   u.difference_V = drive(m.roll_Nm, k.roll_Nm, T(-T(T(k.inertia_x_kg_m2) * T(left(snap_x, snap_y) * per_g))),
                          k.roll_Nm_V, k.difference_limit_V, T(-left(sx, sy)));
 
-  // heading
   const T turn = within(T(-atan2(T(ref.heading.sin * yaw.cos - ref.heading.cos * yaw.sin),
                                  T(ref.heading.cos * yaw.cos + ref.heading.sin * yaw.sin))),
                         k.yaw_error_limit_rad);
@@ -217,7 +214,6 @@ FLAPPY_INLINE WingBeat<T> ArcController::update(const ArcConstants<Element<T>>& 
   const T spin = -T(T(k.heading.lambda_1_s) * turn_rate + T(k.heading.k_1_s) * s_yaw);
   u.split_cycle = drive(m.yaw_Nm, k.yaw_Nm, T(T(k.inertia_z_kg_m2) * spin), k.yaw_Nm_split, k.split_cycle_limit, s_yaw);
 
-  // height
   const T climb = within(T(m.velocity_m_s.z - ref.velocity_m_s.z), k.velocity_error_limit_m_s);
   const T high = within(T(x.position_m.z - ref.position_m.z), k.position_error_limit_m);
   const T s_z = climb + T(k.height.lambda_1_s) * high;

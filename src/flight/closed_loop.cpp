@@ -1,5 +1,4 @@
-// One control period of a block of flappers, stage by stage. Compiled once for each instruction set (FLAPPY_ISA); all give the
-// same bits.
+// One control period of a block of flappers. Compiled once per instruction set (FLAPPY_ISA), with the same bits.
 #if !defined(__x86_64__)
 #include <chrono>
 #endif
@@ -20,7 +19,6 @@ using sim::view_rows;
 template <class T>
 using L = Lanes<T, kWidth<T>>;
 
-/// Calls `stage(first lane)` for each register of lanes in a block.
 template <class T, class Stage>
 FLAPPY_INLINE void for_lanes(const Stage& stage) {
   for (int first = 0; first < kLanes<T>; first += kWidth<T>) stage(first);
@@ -91,7 +89,6 @@ FLAPPY_INLINE sim::Voltages<L<T>> commanded(const FlightSpace<T>& s, const Episo
   return {clip(episode.adds[0], p.left.voltage_limit_V), clip(episode.adds[1], p.right.voltage_limit_V)};
 }
 
-/// Sets the wing-beat inputs by policy and controller, or the motor voltages by the policy alone.
 template <class T>
 FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int first) {
   FlightBlock<T>& f = s.flight;
@@ -223,7 +220,6 @@ FLAPPY_INLINE void sense(const FlightSpace<T>& s, const FlightPlan<T>& plan, con
   }
 }
 
-/// Updates the estimate to the end of the period with all samples that have arrived.
 template <class T>
 FLAPPY_INLINE void estimate(const FlightSpace<T>& s, const FlightPlan<T>& plan, int first) {
   FlightBlock<T>& f = s.flight;

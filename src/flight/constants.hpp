@@ -5,7 +5,6 @@
 
 namespace flappy::flight {
 
-/// A struct of doubles converted to numbers of type T.
 template <class T, template <class> class S>
 S<T> rounded(const S<double>& from) {
   static_assert(sizeof(S<T>) / sizeof(T) == sizeof(from) / sizeof(double));

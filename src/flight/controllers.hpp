@@ -1,6 +1,5 @@
-// List of all controllers. A new controller is a file with a table of functions, added to the list here; no other code names it.
-//
-// A table C has
+// List of all controllers. A new one is a file with a table of functions, and a place in the list; no other code names
+// it. A table C has
 //   kName                        its name in configurations
 //   Constants<T>, Memory<T>      its constants, beginning with LoopConstants<T>, and its memory; all members are T
 //   fields(constants, add)       add(key, number, range) for each parameter of its configuration
@@ -9,8 +8,8 @@
 //   trim(constants, memory)      the inputs that it has learnt to hold; in a settled vehicle, those of hover
 //   unlearn(held, before, now)   restores the learnt part of the memory in the lanes `held`
 //   rotate(sin, cos, memory)     rotates the memory about z of W
-//   kSource, exported(constants, add)    only if it can be exported: its C code (kSource.h and kSource_types.h in src/deploy/c),
-//                                        and add(member, number or struct of numbers) for each of its constants there
+//   kSource, exported(constants, add)    only if exported: C code (kSource.h, kSource_types.h in src/deploy/c),
+//                                and add(member, number or struct of numbers) for each of its constants there
 #pragma once
 
 #include <algorithm>
@@ -50,7 +49,6 @@ struct ConstantsOf<T, std::tuple<C...>> : C::template Constants<T>... {
   static constexpr int kRows = std::max({model::kRows<C::template Memory>...});
 };
 
-/// Constants of all controllers.
 template <class T>
 struct ControllerConstants : ConstantsOf<T, Controllers> {
   template <class C>

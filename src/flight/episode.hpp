@@ -27,8 +27,7 @@ struct Episode {
   T lost_s;              // time at which the goal was first not kept; 0: never
 };
 
-/// Maps action element `i` from [-1, 1] to the task's range: an offset to wing-beat input `i`, or the voltage of motor
-/// `i`.
+/// Maps [-1, 1] to the task's range: offset to wing-beat input `i`, or voltage of motor `i`.
 template <class T>
 FLAPPY_INLINE T scaled_action(const TaskConstants<Element<T>>& k, int i, const T& action) {
   const T middle(0.5 * (k.action_low[i] + k.action_high[i])), half(0.5 * (k.action_high[i] - k.action_low[i]));
@@ -104,9 +103,8 @@ FLAPPY_INLINE T closeness(const Reward<Element<T>>& k, const Score<T>& s, const 
   return T(1) / product;
 }
 
-/// Reward of the control period that ends at `time_s` (Reward, task.hpp). `done`: lanes that meet the hand-back
-/// condition at `time_s`. Call after note_success() and before e.handed_back is updated, so that the arrival is paid
-/// once.
+/// Reward of the control period that ends at `time_s`. `done`: lanes that meet the hand-back condition then. Call after
+/// note_success() and before e.handed_back changes, so that the arrival is paid once.
 template <class T>
 FLAPPY_INLINE T reward_of(const Reward<Element<T>>& k, const Score<T>& s, const Truth<T>& t, const T& time_s,
                           const T& tick_s, auto done, const Episode<T>& e) {
@@ -170,7 +168,6 @@ FLAPPY_INLINE void check_termination(const Limits<Element<T>>& k, const Score<T>
   mark(time_s >= T(k.time_s), kTimeOut);
 }
 
-/// Stroke angles and rates.
 template <class T>
 struct Wings {
   T left_rad, right_rad, left_rad_s, right_rad_s;
@@ -181,8 +178,7 @@ FLAPPY_INLINE Wings<T> wings_of(const State<T>& x) {
   return {x.left.stroke_rad, x.right.stroke_rad, x.left.stroke_rate_rad_s, x.right.stroke_rate_rad_s};
 }
 
-/// Writes the observed parts to `row` and returns the number of rows. `parts`: bits of Part. `actions`: elements of an
-/// action.
+/// Writes the parts; returns the number of rows. `parts`: bits of Part. `actions`: elements of an action.
 template <class T>
 FLAPPY_INLINE int observe(std::uint32_t parts, int actions, const Estimate<T>& x, const Setpoint<T>& ref,
                           const Episode<T>& e, const T& beat_fraction, const T& time_s, const WingBeat<T>& trim,

@@ -1,15 +1,12 @@
-// Estimator: error-state Kalman filter with delayed motion capture (Lefferts, Markley and Shuster 1982; Sola 2017).
-//
-// A pose arrives late, so it describes the past. The filter keeps its state at the time of the last pose that arrived (the
-// horizon) and the IMU increments since then. A new pose moves the horizon through those increments to the pose's own time
-// and corrects it there. The remaining increments are then replayed from the horizon to the present. Between poses only the
-// present moves.
-//
-// Errors, true = estimate + error, angle in B:
+// Error-state Kalman filter with delayed motion capture (Lefferts, Markley and Shuster 1982; Sola 2017). A pose
+// describes the past: the filter keeps its state at the time of the last pose that arrived (the horizon) and the IMU
+// increments since then. A new pose moves the horizon through those to its own time and corrects it there; the
+// remaining increments are replayed to the present. Between poses only the present moves. Errors, true = estimate +
+// error, angle in B:
 //   angle'  = -bias_g - noise_g        (the rotation of B between poses is neglected)  bias_g' = drift
 //   position' = velocity      velocity' = -R bias_a - R noise_a                        bias_a' = drift
 // Pose and noise are isotropic, so all axes share one covariance: 3 numbers for angle and gyro bias, 6 for position,
-// velocity and accelerometer bias. A tilt error makes gravity act as an acceleration error; the filter treats it as velocity drift.
+// velocity and accelerometer bias. The acceleration error of gravity under a tilt error is treated as velocity drift.
 #pragma once
 
 #include "flight/sensors.hpp"
@@ -35,8 +32,7 @@ struct Pose {
   Vec3<T> position_m, velocity_m_s;
 };
 
-/// Measured rotation and gain of velocity over an interval, in the frame B at the middle of the interval; biases
-/// included.
+/// Measured rotation and gain of velocity, in the frame B at the middle of the interval; biases included.
 template <class T>
 struct Increment {
   Vec3<T> rotation_rad, velocity_m_s;
@@ -48,8 +44,7 @@ struct Covariance {
   T position, position_velocity, position_bias, velocity, velocity_bias, accel_bias;
 };
 
-/// State of the filter, stored as rows. Its poses are those of the IMU's position, so that IMU increments need no lever
-/// arm.
+/// State of the filter, as rows. Its poses are the IMU's, so that increments need no lever arm.
 template <class T>
 struct Estimator {
   Pose<T> horizon, now;
@@ -88,7 +83,6 @@ FLAPPY_INLINE void advance(Pose<T>& x, const Increment<T>& increment, const Vec3
   x.attitude = rotated(middle, quarter);
 }
 
-/// Propagates the covariance over `time` seconds.
 template <class T>
 FLAPPY_INLINE void spread(Covariance<T>& c, const EstimatorConstants<Element<T>>& k, const T& time) {
   c.angle = c.angle + time * T(T(k.angle_noise_rad2_s) + (time * c.gyro_bias - T(2) * c.angle_bias));
@@ -107,7 +101,6 @@ FLAPPY_INLINE Vec3<T> imu_position(const EstimatorConstants<Element<T>>& k) {
   return {T(k.imu_position_m[0]), T(k.imu_position_m[1]), T(k.imu_position_m[2])};
 }
 
-/// Motion of the torso origin, from the pose of the IMU.
 template <class T>
 FLAPPY_INLINE Estimate<T> torso(const EstimatorConstants<Element<T>>& k, const Pose<T>& imu, const Vec3<T>& body_rate) {
   const Matrix3<T> R = rotation_matrix(imu.attitude);
@@ -115,7 +108,6 @@ FLAPPY_INLINE Estimate<T> torso(const EstimatorConstants<Element<T>>& k, const P
   return {imu.position_m - R * arm, imu.attitude, imu.velocity_m_s - R * cross(body_rate, arm), body_rate};
 }
 
-/// Pose of the IMU, from the motion of the torso origin.
 template <class T>
 FLAPPY_INLINE Pose<T> imu_pose(const EstimatorConstants<Element<T>>& k, const Estimate<T>& torso) {
   const Matrix3<T> R = rotation_matrix(torso.attitude);

@@ -16,7 +16,6 @@ const std::vector<std::string> kNames = {"amplitude_V", "difference_V", "bias_V"
 constexpr double kSame_s = 1e-9;  // times closer than this count as equal
 constexpr io::Range kTime{0, 1e5}, kSize{-18, 18};
 
-/// cos(2 pi x).
 double cos_turns(double x) { return model::cos_pi(2 * (x - std::floor(x + 0.5))); }
 
 double value(const Wave& w, double t_s) {

@@ -1,13 +1,12 @@
-// Excitation: offsets to the controller's output that make a flight more informative about its vehicle. [[excitation]] tables:
-//
+// Excitation: offsets to the controller's output that make a flight more informative about its vehicle. [[excitation]]
+// tables:
 //   kind = "step"       input, start_s, duration_s, height
 //   kind = "sweep"      input, start_s, duration_s, from_hz, to_hz, amplitude: a sine whose frequency grows linearly
 //   kind = "multisine"  input, from_hz, to_hz, count, rms, period_s; start_s and duration_s if not the whole flight:
 //                         sum of rms sqrt(2/count) cos(2 pi h_k t/period_s - pi k (k-1)/count)      k = 1 .. count
-//                       (Schroeder 1970); its root mean square over a period is `rms`. Of the M multisines of a flight, the
-//                       m-th has only harmonics with h mod M = m, evenly spread from from_hz to to_hz. So over a period no two
-//                       multisines correlate, and no two responses of a linear system either.
 //   kind = "script"     file: t_s, amplitude_V, difference_V, bias_V, split_cycle; each row holds until the next
+// Multisine (Schroeder 1970): rms over a period. The m-th of M in a flight has only harmonics with h mod M = m, evenly
+// spread from from_hz to to_hz, so over a period no two multisines correlate, and no two responses of a linear system.
 #pragma once
 
 #include <vector>

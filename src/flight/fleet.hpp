@@ -1,5 +1,5 @@
-// Many flappers in closed loop: bodies, sensors, estimators, controllers and tasks, one control period at a time. As in a
-// Batch, every bit of a flapper's flight depends only on its vehicle, its task and its number in the random streams.
+// Many flappers in closed loop: bodies, sensors, estimators, controllers and tasks, one control period at a time. As in
+// a Batch, every bit of a flapper's flight depends only on its vehicle, its task and its number in the random streams.
 #pragma once
 
 #include <array>
@@ -15,7 +15,6 @@ namespace flappy::flight {
 template <class T>
 struct Tap;
 
-/// Options shared by all flappers of a fleet.
 struct FleetOptions {
   Sensors sensors;
   Controller controller;
@@ -33,20 +32,18 @@ struct Exploration {
   double kept = 0;  ///< correlation from one action to the next
 };
 
-/// Motion of a flapper's torso origin, true or estimated. Position and velocity in W, attitude w, x, y, z (B to W),
-/// body rate in B.
+/// Motion of the torso origin, true or estimated: position, velocity in W, attitude w, x, y, z (B to W), body rate in
+/// B.
 struct Motion {
   double position_m[3], attitude[4], velocity_m_s[3], body_rate_rad_s[3];
 };
 
-/// Set point of a flapper, in W.
 struct Target {
   double position_m[3], velocity_m_s[3], acceleration_m_s2[3];
   double heading_cos, heading_sin, heading_rate_rad_s;
 };
 
-/// Views of a block's flappers after a control period. Each list has one number per lane; `observation` is
-/// [element][lanes] and holds the present observation without its history.
+/// Views of a block after a control period, one number per lane; `observation`: [element][lanes], without history.
 template <class T>
 struct Shown {
   std::size_t lanes;
@@ -103,7 +100,6 @@ class Fleet {
   /// std::invalid_argument for an offset other than 0 if the task's actions are motor voltages.
   void set_added(std::size_t i, const sim::Input& input);
 
-  /// Sets the noise on the actor's actions from now on.
   void set_exploration(const Exploration& exploration);
 
   /// Flies all flappers through one control period.
@@ -121,8 +117,7 @@ class Fleet {
   Motion truth(std::size_t i) const;
   Motion estimate(std::size_t i) const;
   Target target(std::size_t i) const;
-  /// Wing-beat input as controller and actor last set it, before the driver clips it. Without meaning if the task's
-  /// actions are voltages.
+  /// Wing-beat input as controller and actor last set it, before clipping. Without meaning if actions are voltages.
   sim::Input input(std::size_t i) const;
   double reward(std::size_t i) const;
   std::uint32_t ended(std::size_t i) const;  ///< bits of Ended, since the start
@@ -154,9 +149,8 @@ class Fleet {
   /// Adds the processor cycles of each Stage (flight_block.hpp) to cycles[Stage] from now on; for fleets on one thread.
   void count_cycles(std::uint64_t* cycles);
 
-  /// Samples of the last control period, for recorders; empty unless record(true) was called before it. For a flapper
-  /// with mocap_delay, mocap_samples() gives the poses that arrived in the period, because a pose with a negative delay
-  /// is known only then.
+  /// Samples of the last control period; empty without record(true) before it. With mocap_delay, the poses that arrived
+  /// in it, because a negative delay is known only then.
   struct ImuRecord {
     double arrival_s, gyro_rad_s[3], accel_m_s2[3];
   };
@@ -168,8 +162,7 @@ class Fleet {
   std::vector<ImuRecord> imu_samples(std::size_t i) const;
   std::vector<MocapRecord> mocap_samples(std::size_t i) const;
 
-  /// All memory that changes in flight, for checkpoints. Call restored() after writing to it, with the number of
-  /// control periods flown.
+  /// All memory that changes in flight. After writing to it, call restored() with the control periods flown.
   std::vector<std::span<std::byte>> memory();
   void restored(std::int64_t periods);
   std::int64_t periods() const;  ///< control periods flown so far

@@ -1,4 +1,3 @@
-// Storage of a Fleet, and the start of a flight in it.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +20,6 @@ inline constexpr int kBodyRows = sim::kParameterRows + sim::kStateRows + sim::kD
 template <class T>
 inline constexpr int kFlightRows = offsetof(FlightBlock<T>, flapper) / sizeof(T[kLanes<T>]);
 
-/// A block as its rows of lanes.
 template <class T, class B>
 auto rows_of(B& block) {
   return reinterpret_cast<std::conditional_t<std::is_const_v<B>, const T, T>(*)[kLanes<T>]>(&block);
@@ -97,8 +95,7 @@ struct Fleet<T>::Storage {
     plan.path = {path.data(), static_cast<std::uint32_t>(path.size()), static_cast<T>(k.period_s)};
   }
 
-  /// Throws std::invalid_argument if the vehicle's mocap_delay would make a pose precede its motion or outlast the
-  /// motion memory.
+  /// Throws std::invalid_argument if mocap_delay would make a pose precede its motion or outlast the motion memory.
   void check_delay(const model::Vehicle& v) const {
     const auto own = v.effects.find(model::MocapDelay::kInfo.id);
     if (own == v.effects.end()) return;
@@ -158,8 +155,7 @@ struct Fleet<T>::Storage {
     return L(scaled_action(plan.task, k, L(action))).raw[0];
   }
 
-  /// Calls `change(controller type, memory)` for the controller of flapper `i` and stores the memory. Does nothing
-  /// without a controller.
+  /// Calls `change(controller type, memory)` and stores the memory. Does nothing without a controller.
   void change_controller(std::size_t i, const auto& change) {
     const auto [f, lane] = at(i);
     with_controller(options.controller.kind, [&, &f = f, lane = lane]<class C>(C table) {

@@ -40,7 +40,6 @@ struct Tap {
   T* mocap = nullptr;  // rows of MocapSample
 };
 
-/// All memory of one block.
 template <class T>
 struct FlightSpace {
   sim::Block<T>& body;
@@ -91,7 +90,6 @@ struct FlightPlan {
   std::uint64_t* cycles = nullptr;  // processor cycles of each Stage, for a benchmark on one thread
 };
 
-/// Flies a block through one control period.
 template <class T>
 using FlyBlock = void (*)(const FlightSpace<T>&, const FlightPlan<T>&);
 

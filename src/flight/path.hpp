@@ -1,4 +1,4 @@
-// The reference path of a flapper: quintic segments in x, y, z (in W) and heading. Segments start at whole control ticks.
+// The reference path of a flapper: quintic segments in x, y, z (in W) and heading, starting at whole control ticks.
 #pragma once
 
 #include <cstdint>
@@ -31,8 +31,7 @@ struct Setpoint {
   T heading_rate_rad_s;
 };
 
-/// The set point of each lane at its own tick. `segment`: each lane's current segment, advanced here; ticks must not go
-/// back.
+/// Set point at each lane's own tick, which must not go back. `segment`: current, advanced here.
 template <class L, class T>
 FLAPPY_INLINE Setpoint<L> setpoint_at(const PathView<T>& path, const std::uint32_t* tick, std::uint32_t* segment) {
   constexpr int kN = sizeof(L) / sizeof(T);

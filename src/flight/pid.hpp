@@ -4,9 +4,9 @@
 //   pitch_sp = atan(a_f / g)                 roll_sp = -atan(a_l cos(pitch_sp) / g)
 //   V_d = PID(roll_sp - roll)                V_0 = PID(pitch_sp - pitch)      d_sigma = PID(yaw_ref - yaw)
 //   V_amp = V_hover + V_z / (cos roll cos pitch)
-// The derivative of a roll or pitch error is the negative low-passed body rate (yaw: relative to the set point's rate); the
-// derivative of a velocity error comes from the low-passed velocity. Integrators are clamped. They do not move further out while
-// the output that they drive is at its limit (anti-windup).
+// The derivative of a roll or pitch error is the negative low-passed body rate (yaw: relative to the set point's rate);
+// the derivative of a velocity error comes from the low-passed velocity. Integrators are clamped. They do not move
+// further out while the output that they drive is at its limit (anti-windup).
 #pragma once
 
 #include <string>
@@ -36,7 +36,6 @@ struct PidConstants : LoopConstants<T> {
 
 inline namespace FLAPPY_ISA {
 
-/// Memory of the controller, stored as rows.
 template <class T>
 struct Pid {
   T integral_x, integral_y;               // m/s^2, in W
@@ -46,7 +45,6 @@ struct Pid {
   Vec3<T> velocity_m_s, body_rate_rad_s;  // low-passed
 };
 
-/// Sine and cosine of the yaw angle.
 template <class T>
 FLAPPY_INLINE SinCos<T> heading_of(const Matrix3<T>& R) {
   const T c = R.row_x.x, s = R.row_y.x;
@@ -80,8 +78,7 @@ struct PidController {
 
   static void fields(PidConstants<double>& k, const auto& add);
 
-  /// C code of the controller for the robot: src/deploy/c/controller_pid.h. exported() lists the members of its struct
-  /// of constants, in their order.
+  /// C code for the robot: src/deploy/c/controller_pid.h. exported() lists the members of its constants in order.
   static constexpr const char* kSource = "controller_pid";
   static void exported(const PidConstants<float>& k, const auto& add) {
     add("position_xy_1_s", k.position_xy_1_s);
@@ -112,7 +109,6 @@ struct PidController {
     m.body_rate_rad_s = x.body_rate_rad_s;
   }
 
-  /// Hover voltage plus the integrators, as wing-beat inputs.
   template <class T>
   static FLAPPY_INLINE WingBeat<T> trim(const PidConstants<Element<T>>& k, const Pid<T>& m) {
     return {T(k.hover_V) + m.integral_z, m.integral_roll, m.integral_pitch, m.integral_yaw};
@@ -175,7 +171,6 @@ FLAPPY_INLINE WingBeat<T> PidController::update(const PidConstants<Element<T>>& 
   const Matrix3<T> R = rotation_matrix(x.attitude);
   const SinCos<T> yaw = heading_of(R);
 
-  // position -> velocity -> acceleration
   const auto toward = [](const T& want, const T& have, auto gain, const T& feed_forward, auto limit) {
     return clamp(T(feed_forward + T(gain) * T(want - have)), T(-T(limit)), T(limit));
   };
@@ -196,7 +191,6 @@ FLAPPY_INLINE WingBeat<T> PidController::update(const PidConstants<Element<T>>& 
   const T a_l = T(k.left.p) * error_l + (T(k.left.d) * left(slope.x, slope.y) +
                                          (sum_l + left(ref.acceleration_m_s2.x, ref.acceleration_m_s2.y)));
 
-  // acceleration -> lean
   const T g(k.gravity_m_s2), limit(k.acceleration_limit_m_s2), most_pitch(k.pitch_limit_rad),
       most_roll(k.roll_limit_rad);
   const T pitch_for_a = atan2(clamp(a_f, T(-limit), limit), g);
@@ -213,7 +207,6 @@ FLAPPY_INLINE WingBeat<T> PidController::update(const PidConstants<Element<T>>& 
   const T yaw_error = atan2(T(ref.heading.sin * yaw.cos - ref.heading.cos * yaw.sin),
                             T(ref.heading.cos * yaw.cos + ref.heading.sin * yaw.sin));
 
-  // lean -> wing beat
   m.body_rate_rad_s = add_scaled(m.body_rate_rad_s, T(k.rate_share), x.body_rate_rad_s - m.body_rate_rad_s);
   const auto attitude = [&](const PidGains<Element<T>>& gain, T& integral, const T& angle_error, const T& rate_error,
                             auto most) {
@@ -231,7 +224,6 @@ FLAPPY_INLINE WingBeat<T> PidController::update(const PidConstants<Element<T>>& 
   u.split_cycle = attitude(k.yaw, m.integral_yaw, clamp(yaw_error, T(-yaw_reach), yaw_reach),
                            T(ref.heading_rate_rad_s - w.z), k.split_cycle_limit);
 
-  // climb
   const T climb = T(k.up.p) * error.z + (T(k.up.d) * slope.z + m.integral_z);
   const T lift = climb / max(R.row_z.z, T(0.5));  // cos roll cos pitch
   m.integral_z = integrated(m.integral_z, T(T(k.up.i) * dt), error.z, T(k.up.integral_limit),

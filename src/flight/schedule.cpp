@@ -19,8 +19,7 @@ Schedule::Schedule(const Sensors& sensors, double step_s, int period_steps)
   if (sensors.imu.rate_hz * step_s > 1 + 1e-9 || sensors.mocap.rate_hz * step_s > 1 + 1e-9)
     throw std::invalid_argument("a sensor's rate is above that of the physics steps");
   const double period_s = step_s * period_steps;
-  // a pose is fused at the end of the first control period in which both it and the IMU samples up to its time have
-  // arrived; the ring holds the IMU increments since the pose before
+  // a pose is fused at the end of the first control period in which it and the IMU samples up to its time have arrived
   wait_s_ =
       period_s + std::max(sensors.mocap.latency_s, sensors.imu.latency_s + lag_s_ + 1 / sensors.imu.rate_hz + period_s);
   ring_slots_ = static_cast<int>(std::ceil((wait_s_ + 1 / sensors.mocap.rate_hz) / period_s)) + 2;

@@ -1,6 +1,6 @@
-// When sensors sample, when samples arrive, and what the estimator does with them. This is the same for every flapper of a batch, so
-// it is computed once for each control period. Sensor rates need not divide each other or the control rate: a sample is taken at the
-// first physics step at or after its time.
+// When sensors sample, when samples arrive, and what the estimator does with them. This is the same for every flapper
+// of a batch, so it is computed once for each control period. Sensor rates need not divide each other or the control
+// rate: a sample is taken at the first physics step at or after its time.
 #pragma once
 
 #include <cstdint>
@@ -26,15 +26,13 @@ struct Advance {
   double share = 0, duration_s = 0;
 };
 
-/// Moves the horizon to the time of the mocap pose in `slot`, by `count` advances of Period::advance from `first` on,
-/// then corrects.
+/// Moves the horizon to the mocap pose in `slot`, by `count` of Period::advance from `first` on, then corrects.
 struct Correction {
   int slot = 0, first = 0, count = 0;
   std::uint32_t index = 0;       // number of the mocap sample
   double time_s = 0, age_s = 0;  // time at which the pose was sampled; time from then to the end of the period
 };
 
-/// Events of one control period.
 struct Period {
   std::int64_t first_step = 0;
   std::vector<Slice> slices;
@@ -48,8 +46,7 @@ struct Period {
 
 class Schedule {
  public:
-  /// A control period has `period_steps` physics steps of `step_s`. Throws std::invalid_argument if a sensor samples
-  /// more than once in a physics step.
+  /// Throws std::invalid_argument if a sensor samples more than once in a physics step.
   Schedule(const Sensors& sensors, double step_s, int period_steps);
 
   const Period& next();

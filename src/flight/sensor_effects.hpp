@@ -1,14 +1,11 @@
-// Effects of sensors (src/model/effects), applied to simulated samples. src/gap/replay/sensor_correction.hpp inverts them.
-//
+// Effects of sensors (src/model/effects) on simulated samples. src/gap/replay/sensor_correction.hpp inverts them.
 //   accelerometer_misalignment  specific force turned by the rotation vector e
-//   vibration_rectification     force + gain (variance of the force over the beat before), on every axis; the force is the turned one
+//   vibration_rectification     turned force + gain (variance of noiseless force over the beat before), every axis
 //   gyro_bias                   rate + drift (1 - exp(-t / warm_up)), t since the flight's start
 //   marker_offset               position p + R_WB d, R_WB the true attitude: attitude noise does not move the marker
 //   mocap_tilt                  position R(e) p, attitude R(e) q, after marker_offset
 //   mocap_delay                 pose and the two effects above at t - delay, from the true motion
-//
-// They act on noisy samples, in the lanes in which a magnitude is not 0. The variance for vibration_rectification is that of the force
-// without sensor noise.
+// They act on noisy samples, in the lanes in which a magnitude is not 0.
 #pragma once
 
 #include "flight/sensors.hpp"
@@ -47,7 +44,6 @@ FLAPPY_INLINE StateRows<Lanes<T, sim::kWidth<T>>> memory_of(const sim::BlockEffe
   return {effects.states + row * sim::kLanes<T> + first, sim::kLanes<T>, on};
 }
 
-/// Lanes in which the magnitude vector of an effect is not 0.
 template <class T>
 FLAPPY_INLINE auto is_nonzero(const Vec3<T>& v) {
   return dot(v, v) > T(0);
@@ -155,8 +151,7 @@ FLAPPY_INLINE void disturb(const sim::BlockEffects<T>& effects, const Quaternion
   }
 }
 
-/// Stores the true motion at the start of a control period, for past_truth(). `tick`: control periods since each lane's
-/// start.
+/// Stores the true motion at the start of a control period, for past_truth(). `tick`: periods since each lane's start.
 template <class T, class L>
 FLAPPY_INLINE void keep_past(const sim::BlockEffects<T>& effects, const std::uint32_t* tick, const Truth<L>& truth,
                              int first) {
@@ -169,9 +164,8 @@ FLAPPY_INLINE void keep_past(const sim::BlockEffects<T>& effects, const std::uin
       past.rows[(tick[i] % MocapDelay::kSlots * MocapDelay::kRows + r) * past.stride + i] = rows[r].raw[i];
 }
 
-/// The true pose `age` control periods before the end of period `tick` of each lane's flight, where the motion is
-/// `now`. Cubic Hermite interpolation in position and quaternion; velocity and body rate are those of the newer of the
-/// two support points. Ages below 0 give `now`; ages beyond the memory give the oldest motion stored.
+/// True pose `age` control periods before the end of period `tick`, where the motion is `now`: cubic Hermite; velocity
+/// and body rate of the newer support point. Ages below 0 give `now`, ages beyond the memory the oldest motion.
 template <class T, class L>
 FLAPPY_INLINE Truth<L> past_truth(const sim::BlockEffects<T>& effects, const std::uint32_t* tick, const Truth<L>& now,
                                   const L& age, const T& period_s, int first) {

@@ -1,11 +1,8 @@
-// Models of a flapper's sensors.
-//
-// IMU: every sample is the mean over the interval since the last sample, as an integrating IMU or a decimating filter
-// delivers it, then passes a first-order low-pass:
+// Sensor models. IMU: every sample is the mean over the interval since the last, as an integrating IMU or a decimating
+// filter delivers it, which keeps the wing beat from aliasing, then passes a first-order low-pass:
 //   gyro   rotation between the two attitudes / interval + constant bias + noise
 //   accel  specific force R^T (dv/dt + g z) at the position of the IMU, R half-way between the two attitudes, + noise
-// The mean keeps the wing beat from aliasing. The specific force includes gravity: an IMU at rest reads +g upward.
-// Motion capture: pose of the torso origin, with white noise; it arrives late, and bursts of samples are lost
+// An IMU at rest reads +g upward. Motion capture: pose of the torso origin, with white noise, late, lost in bursts
 // (Gilbert 1960: a loss begins with one probability and ends with another).
 #pragma once
 
@@ -56,7 +53,6 @@ struct ImuSample {
   Vec3<T> gyro_rad_s, accel_m_s2;
 };
 
-/// State of the IMU model, stored as rows.
 template <class T>
 struct Imu {
   Quaternion<T> attitude;  // at the last sample
@@ -72,8 +68,7 @@ FLAPPY_INLINE Quaternion<T> from_to(const Quaternion<T>& a, const Quaternion<T>&
           a.w * b.y - (a.y * b.w + (a.z * b.x - a.x * b.z)), a.w * b.z - (a.z * b.w + (a.x * b.y - a.y * b.x))};
 }
 
-/// Rotation vector of a small rotation: 2 asin(n)/n e for the vector part e of length n, exact to n^4. q and -q give
-/// the same.
+/// Rotation vector of a small rotation: 2 asin(n)/n e for the vector part e of length n, exact to n^4; q and -q agree.
 template <class T>
 FLAPPY_INLINE Vec3<T> rotation_vector(const Quaternion<T>& q) {
   const Vec3<T> e{q.x, q.y, q.z};

@@ -1,4 +1,4 @@
-// Sensors, estimator and controller of a flapper as the configuration states them; constants.hpp derives the working numbers.
+// Sensors, estimator and controller as the configuration states them; constants.hpp derives the working numbers.
 #pragma once
 
 #include <string>
@@ -41,7 +41,6 @@ struct Sensors {
 
 /// Share of a new value in a first-order low-pass: 1 - exp(-2 pi f dt).
 double low_pass_share(double cutoff_hz, double interval_s);
-/// Delay of the IMU's samples by its low-pass.
 double low_pass_lag_s(const ImuSensor& imu);
 
 struct Controller {
@@ -50,7 +49,6 @@ struct Controller {
   double velocity_low_pass_hz = 0, body_rate_low_pass_hz = 0;  ///< 0: none
 };
 
-/// A parameter of a controller and its path in the configuration.
 struct ControllerField {
   std::string path;
   double* value;

@@ -16,8 +16,7 @@ struct PartInfo {
   std::vector<Signal> signals;
 };
 
-/// Signals of each Part, in the order of their bits; those of previous_action are added from the task's action. Ranges
-/// are those of a flying vehicle.
+/// Signals of each Part, in bit order; previous_action's are added from the task's action. Ranges of a flying vehicle.
 const std::vector<PartInfo>& part_infos() {
   static const std::vector<PartInfo> infos = [] {
     std::vector<PartInfo> list = {
@@ -82,8 +81,7 @@ struct Knot {
   double at[4];
 };
 
-/// Knot velocities of coordinate `c` of the cubic spline that passes through the knots and starts and ends at rest. Its
-/// acceleration is continuous.
+/// Knot velocities of coordinate `c` of the cubic spline through the knots, at rest at its ends.
 std::vector<double> spline_velocities(const std::vector<Knot>& knots, int c, double tick_s) {
   const std::size_t n = knots.size();
   std::vector<double> v(n, 0), upper(n, 0);
@@ -259,7 +257,6 @@ void read_success(const io::Table& table, Success<double>& s) {
        t->boolean_or("capture.touching", false) ? 1.0 : 0.0};
 }
 
-/// Reads the kind of action and the range that -1 and 1 stand for.
 void read_action(const io::Table& table, Task& task) {
   const bool voltages = table.choice_or("action.kind", "wing_beat", {"wing_beat", "voltages"}) == "voltages";
   task.action_kind = voltages ? ActionKind::voltages : ActionKind::wing_beat;
@@ -277,8 +274,7 @@ void read_action(const io::Table& table, Task& task) {
   }
 }
 
-/// Throws io::InputError if a task whose actions are voltages needs a controller or a wing beat, which it does not
-/// have.
+/// Throws io::InputError if a task with voltages needs a controller or a wing beat.
 void refuse_control(const io::Table& table, const Task& task) {
   const std::string alone = ", but an action of kind \"voltages\" has no controller";
   if (task.constants.holds_trim > 0) table.fail("base", "is \"trim\"" + alone, "no base, or \"controller\"");

@@ -1,5 +1,5 @@
-// Task of a flapper: start, path, observation, action of the policy (offset to the controller's output, or motor voltages),
-// reward and end. Read from configs/tasks/*.toml.
+// Task of a flapper: start, path, observation, action of the policy (offset to the controller's output, or motor
+// voltages), reward and end. Read from configs/tasks/*.toml.
 #pragma once
 
 #include <filesystem>
@@ -60,15 +60,15 @@ enum Ended : std::uint32_t {
 };
 
 /// Weights of the reward. Each control period is scored on the true state:
-///   C = |a|^2 action + |a - a_prev|^2 action_change + |p| position + |(roll, pitch, yaw)| angles + |v| velocity + |w| rate
-///   r = inverse_square / (C^2 + 1e-6) - cost C + facing R'_00 + upright min(0, R'_22) + behind min(0, x + behind_m) + alive
-///       + level R'_22 + near s(|p| / near_m) + goal G
-/// In addition it earns arrival G once, at the hand-back, and `kept` once, at until_s, if the goal was captured and is
-/// not lost by then. If until_s > 0, a flapper that has not captured the goal earns 0 after the hand-back; rewards
-/// after it, up to until_s, count for the policy. p, x and R' are relative to the set point, and
+///   C = |a|^2 action + |a - a_prev|^2 action_change + |p| position + |(roll, pitch, yaw)| angles + |v| velocity
+///       + |w| rate
+///   r = inverse_square / (C^2 + 1e-6) - cost C + facing R'_00 + upright min(0, R'_22) + behind min(0, x + behind_m)
+///       + alive + level R'_22 + near s(|p| / near_m) + goal G
+/// It also earns arrival G once, at the hand-back, and `kept` once, at until_s, if the goal was captured and not lost.
+/// If until_s > 0, a flapper without capture earns 0 after the hand-back; later rewards, up to until_s, count for the
+/// policy. p, x and R' are relative to the set point, and
 ///   G = s(|p| / goal_m) s(|v| / goal_m_s) s(|w| / goal_rad_s) s(tilt / goal_tilt) s(heading error / goal_heading)
-///   s(x) = 1 / (1 + x^2)
-/// Members near_1_m and goal_1_.., goal_s_.. are the reciprocals of near_m, goal_m and so on.
+///   s(x) = 1 / (1 + x^2)      near_1_m, goal_1_.., goal_s_..: reciprocals of near_m, goal_m and so on
 template <class T>
 struct Reward {
   T action, action_change, position, angles, velocity, body_rate;
@@ -87,8 +87,7 @@ struct Limits {
   T arrived_by_s, arrived_x_m;  // x < arrived_x_m after arrived_by_s ends the episode
 };
 
-/// When the policy hands back for good, and the controller flies alone or the robot rests: when all bounds hold at
-/// once, or at at_s.
+/// When the policy hands back for good, to the controller or to rest: when all bounds hold at once, or at at_s.
 template <class T>
 struct HandBack {
   T enabled, on_estimate;  // 0 or 1; on_estimate: judged on the estimated state, else on the true one
@@ -98,9 +97,8 @@ struct HandBack {
   T rests;     // 0 or 1: the inputs are 0 after the hand-back
 };
 
-/// Bounds of a success, judged on the true state at each control tick. A flight captures the goal when all bounds of
-/// capture hold at once, at the latest at by_s. It keeps the goal if the bounds of keeping hold at all ticks from
-/// keep_from_s to keep_until_s.
+/// Bounds of a success, judged on the true state at each tick. Captured: all its bounds hold at once, by by_s. Kept:
+/// the bounds of keeping hold at all ticks from keep_from_s to keep_until_s.
 template <class T>
 struct Success {
   T by_s, distance_m, speed_m_s, body_rate_rad_s, tilt_cos, heading_cos;          // capture
@@ -125,7 +123,6 @@ struct Spread {
   double centre = 0, half = 0;
 };
 
-/// Distribution of start states.
 struct StartRange {
   sim::Start kind = sim::Start::flying;
   bool settled = false;  ///< starts from the snapshot of a hover; only position and heading are sampled

@@ -12,8 +12,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// In periods of the bandwidth: longest gap that is filled by a straight line; time around a longer gap that counts as
-/// unseen; time at both ends of the flight that counts as unseen.
+/// In periods of the bandwidth: longest gap filled by a line; unseen time around a longer gap, and at both ends.
 constexpr double kFilled = 0.3, kAround = 2.5, kEnds = 3;
 /// Length of the reflected ends, in periods of the bandwidth.
 constexpr double kReflected = 5;
@@ -34,8 +33,7 @@ struct Biquad {
   }
 };
 
-/// Section of pole pair 0 or 1 of the Butterworth filter of order 4, by the bilinear transform with pre-warped
-/// frequency.
+/// Section of pole pair 0 or 1 of the Butterworth filter of order 4: bilinear transform, pre-warped frequency.
 Biquad pair_of(double per_sample, int pair) {
   const double k = std::tan(std::numbers::pi * per_sample);
   const double q = 2 * std::sin(std::numbers::pi * (2 * pair + 1) / 8);
@@ -59,7 +57,6 @@ std::vector<Vector3d> filtered(const std::vector<Vector3d>& v, double per_sample
   return all;
 }
 
-/// Central differences, one-sided at the ends.
 std::vector<Vector3d> gradient(const std::vector<Vector3d>& v, double step_s) {
   std::vector<Vector3d> d(v.size());
   for (std::size_t i = 0; i < v.size(); ++i) {
@@ -73,8 +70,7 @@ std::vector<Vector3d> gradient(const std::vector<Vector3d>& v, double step_s) {
 constexpr double kOtherPlace_m = 0.25;
 constexpr std::size_t kHalfWindow = 7;
 
-/// Poses without swapped and distant ones. The neighbours of such poses are left out too, because they may be wrong in
-/// part.
+/// Poses without swapped and distant ones, and without their neighbours, which may be wrong in part.
 std::vector<PoseReading> own_poses(const FlightLog& log) {
   const std::vector<PoseReading> poses = pose_readings(log);
   const std::vector<char> swapped = swapped_poses(log);

@@ -1,12 +1,11 @@
-// The beat-averaged motion of a recorded flight, from motion capture and, where there is one, the gyro: low-passed far below the beat
-// frequency, without delay.
+// The beat-averaged motion of a flight, from mocap and the gyro, if any: low-passed far below the beat, without delay.
 //
-//   x' = F x      F = |H|^2: a Butterworth filter H of order 4, |H|^2 = 1 / (1 + (f / bandwidth)^8), run forward and backward: no phase [1]
+//   x' = F x    F = |H|^2, H of order 4, Butterworth: |H|^2 = 1 / (1 + (f / bandwidth)^8), forward and backward [1]
 //   R' = F applied to the quaternions, normalised again
-//   velocity v = R'^T F dp/dt,  specific force f = R'^T (F d2p/dt2 + g),  rate w = F gyro, or w from R' without a gyro,  a = dw/dt
-// Derivatives are central differences on a regular grid. Whoever compares the inputs with this motion must filter them with F as well.
-// [1] Gustafsson, Determining the initial states in forward-backward filtering, IEEE Trans. Signal Processing 44(4), 1996. Here the signal
-//     is continued by odd reflections at both ends, and the samples near the ends are marked as unseen.
+//   velocity v = R'^T F dp/dt,  specific force f = R'^T (F d2p/dt2 + g),  rate w = F gyro, or from R',  a = dw/dt
+// Derivatives are central differences on a regular grid. Inputs compared with this motion must be filtered with F, too.
+// [1] Gustafsson, IEEE Trans. Signal Processing 44(4), 1996, on initial states. Here odd reflections continue the
+//     signal, and samples near the ends are unseen.
 #pragma once
 
 #include <Eigen/Dense>
@@ -33,8 +32,7 @@ struct BeatAveragedMotion {
   double t_s(std::size_t i) const { return begin_s + step_s * static_cast<double>(i); }
 };
 
-/// io::InputError, naming the file in `folder`, where the rate of motion capture is below four times the bandwidth or
-/// where the flight is too short for the filter.
+/// io::InputError, naming `folder`, for mocap slower than four times the bandwidth and for too short a flight.
 BeatAveragedMotion beat_averaged_motion(const FlightLog& log, double bandwidth_Hz, const std::filesystem::path& folder);
 
 }  // namespace flappy::flightlog

@@ -8,8 +8,7 @@ using Eigen::Vector3d;
 
 BeatAveragedSpline::BeatAveragedSpline(const std::vector<double>& bounds_s, std::vector<Vector3d> means)
     : means_(std::move(means)), knots_(means_.size() + 1) {
-  // The values at the bounds make the derivative continuous: tridiagonal system of a natural cubic spline through the
-  // integral.
+  // The values at the bounds make the derivative continuous: the tridiagonal system of the natural cubic spline.
   const std::size_t n = means_.size();
   std::vector<double> upper(n + 1);
   upper[0] = 0.5;

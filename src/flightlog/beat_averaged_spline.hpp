@@ -6,8 +6,7 @@
 
 namespace flappy::flightlog {
 
-/// The signal is the derivative of a natural cubic spline through the integral of the means. It is continuous,
-/// quadratic in each interval, and has the given mean there.
+/// Derivative of the natural cubic spline through the integral of the means: continuous, quadratic in each interval.
 class BeatAveragedSpline {
  public:
   BeatAveragedSpline() = default;

@@ -21,8 +21,7 @@ using io::shortest_digits;
 
 constexpr double kUnitTolerance = 1e-3;
 
-/// A column of a stream and the largest absolute value that is accepted. Values that are merely improbable are left to
-/// the checks.
+/// A column and the largest absolute value accepted; improbable values are left to the checks.
 template <class Stream>
 struct Field {
   const char* name;
@@ -80,8 +79,7 @@ std::optional<double> limit_in(const std::vector<Field<Stream>>& fields, const s
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-/// Reads the boolean `key`, by default true, that says whether a stream has a part. Only logs with declared inputs may
-/// lack it.
+/// The boolean `key`, by default true: whether a stream has a part. Only logs with declared inputs may lack it.
 bool has_part(const io::Table& stream, const char* key, bool declared_inputs) {
   const bool has = stream.boolean_or(key, true);
   if (!has && !declared_inputs) stream.fail(key, "is false in a log with voltages", "true, or [command] inputs");
@@ -238,8 +236,7 @@ std::string header_text(const FlightHeader& h) {
 
 // ---- a stream
 
-/// Reads columns from a table. InputError where a required column is missing or a column is neither required nor
-/// optional.
+/// InputError where a required column is missing or a column is neither required nor optional.
 class StreamReader {
  public:
   StreamReader(std::string_view text, const fs::path& path, const std::vector<std::string>& required,
@@ -350,7 +347,6 @@ CommandStream parse_command(const std::string& text, const fs::path& path) {
   return command;
 }
 
-/// Parses a stream with a quaternion; checks its length and normalises it.
 template <class Stream>
 Stream parse_turned(const std::string& text, const fs::path& path, const std::vector<Field<Stream>>& fields) {
   Stream m = parse_stream(text, path, fields);

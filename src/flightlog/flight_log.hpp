@@ -1,18 +1,18 @@
-// The log of a flight, in a format that any laboratory can write: a folder with one header and one table for each stream.
+// The log of a flight, in a format that any laboratory can write: a folder with a header and one table for each stream.
 //
 //   flight.toml   the header: FlightHeader, `schema = 1`
-//   command.csv   t_s,left_voltage_V,right_voltage_V; optional: amplitude_V,difference_V,bias_V,split_cycle and phase_rad.
-//                 Where [command] declares inputs instead of voltages: t_s and these inputs, no other column
+//   command.csv   t_s,left_voltage_V,right_voltage_V; optional: amplitude_V,difference_V,bias_V,split_cycle,
+//                 phase_rad. Where [command] declares inputs instead of voltages: t_s and these inputs only
 //   mocap.csv     t_s,x_m,y_m,z_m,qw,qx,qy,qz
 //   imu.csv       t_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2
 //   power.csv     optional, declared in [power]: t_s,battery_V,left_current_A,right_current_A
 //   attitude.csv  optional, declared in [attitude]: t_s,qw,qx,qy,qz, from a second estimator
-//   wings.csv     optional, declared in [wings]: t_s,left_stroke_rad,left_rotation_rad,right_stroke_rad,right_rotation_rad
+//   wings.csv     optional, [wings]: t_s,left_stroke_rad,left_rotation_rad,right_stroke_rad,right_rotation_rad
 //   truth.csv     only from a simulator: the full state; read_flight_log() never opens it
-//   joints.csv    only from a simulator, for articulated wings: angles, rates and torques of all joints, power and work of their muscles
+//   joints.csv    only from a simulator, articulated wings: angles, rates, torques, power and work of all joints
 //
-// Where inputs are declared, imu.csv is optional too, and it may lack a gyro ([imu] gyro = false) and power.csv may lack the
-// currents ([power] currents = false).
+// With declared inputs, imu.csv is optional, may lack a gyro ([imu] gyro = false), and power.csv may lack the currents
+// ([power] currents = false).
 //
 // All streams share one clock; each has its own rate and may have gaps; time increases. World W: z up. Body B: x
 // forward, y left, z up. Quaternion w, x, y, z, body to world, of length 1.
@@ -33,8 +33,7 @@ class Table;
 
 namespace flappy::flightlog {
 
-/// Longest gap and lowest mean rate that a stream may have. They bound the duration of a log, and so the work of every
-/// program that steps through it.
+/// Longest gap and lowest mean rate of a stream. They bound a log's duration, and so the work of all programs.
 inline constexpr double kLongestGap_s = 600, kSlowest_Hz = 0.1;
 
 /// The largest absolute value that a log may have in a column; a name that no stream has is taken for a declared input.
@@ -50,16 +49,14 @@ struct LogWall {
 struct LogAmbient {
   double air_density_kg_m3 = 1.18, ground_z_m = -1e3, ceiling_z_m = 1e3;
   std::vector<LogWall> walls;
-  // Optional solids in W. Sphere: centre, radius. Box: centre, edge lengths, attitude (w, x, y, z). Cylinder: both ends
-  // of the axis, radius.
+  // Solids in W. Sphere: centre, radius. Box: centre, edges, attitude (w, x, y, z). Cylinder: ends of the axis, radius.
   std::vector<std::array<double, 4>> spheres;
   std::vector<std::array<double, 10>> boxes;
   std::vector<std::array<double, 7>> cylinders;
   bool operator==(const LogAmbient&) const = default;
 };
 
-/// In all headers, noise is the standard deviation of one sample, and latency is the mean time from the measured
-/// instant to t_s.
+/// In all headers: noise is the sd of one sample, latency the mean time from the measured instant to t_s.
 struct MocapHeader {
   double rate_hz = 0, latency_s = 0, position_noise_m = 0, attitude_noise_rad = 0;
   bool operator==(const MocapHeader&) const = default;
@@ -95,8 +92,8 @@ struct AttitudeHeader {
 
 /// All of flight.toml.
 struct FlightHeader {
-  std::string vehicle;              ///< name of the vehicle's file as declared, without folder
-  std::string vehicle_sha256;       ///< SHA-256 of the vehicle's file, lower-case hex; empty where not declared
+  std::string vehicle;              ///< name of the vehicle's file, without folder
+  std::string vehicle_sha256;       ///< lower-case hex; empty where not declared
   std::vector<std::string> inputs;  ///< columns of command.csv in place of voltages; empty: it has voltages
   double flapping_Hz = 0;           ///< 0 where inputs are declared and nothing flaps
   double gravity_m_s2 = 9.81;
@@ -132,8 +129,7 @@ struct MocapStream {
   bool operator==(const MocapStream&) const = default;
 };
 
-/// Rate and specific force in B; t_s is the time at which the sample arrived. The rate is empty without a gyro, all
-/// columns are empty without an IMU.
+/// Rate and specific force in B; t_s is the time of arrival. The rate is empty without a gyro, all without an IMU.
 struct ImuStream {
   Column t_s, gyro_x_rad_s, gyro_y_rad_s, gyro_z_rad_s, accel_x_m_s2, accel_y_m_s2, accel_z_m_s2;
   bool operator==(const ImuStream&) const = default;
@@ -205,11 +201,9 @@ inline const std::vector<std::string> kMotionNames = {"t_s",
                                                       "gyro_bias_y_rad_s",
                                                       "gyro_bias_z_rad_s"};
 
-/// Reads the keys of [ambient].
 LogAmbient read_ambient(const io::Table& ambient);
 
-/// Keys that flight.toml and the mapping of an import have in common: `inputs` of [command], `flapping_Hz`, `gyro` of
-/// [imu] and `currents` of [power].
+/// Keys of flight.toml and of mappings: [command] inputs, flapping_Hz, [imu] gyro, [power] currents.
 std::vector<std::string> read_inputs(const io::Table& command);
 double read_flapping(const io::Table& root, const std::vector<std::string>& inputs);
 bool read_gyro(const io::Table& imu, bool declared_inputs);
@@ -218,10 +212,9 @@ bool read_currents(const io::Table& power, bool declared_inputs);
 /// Texts of the files of a log by name, without truth.csv.
 using LogFiles = std::map<std::string, std::string>;
 
-/// Reads a log. InputError "folder/file:line: column: what is wrong; what is accepted" for a file or column that is
-/// missing, unknown or faulty, for time that does not increase, for a quaternion whose length differs from 1 by more
-/// than 1e-3 (others are normalised), and for streams that never overlap. Logs a warning where an optional stream is
-/// declared but its file is missing. Never opens truth.csv.
+/// InputError "folder/file:line: column: what is wrong; what is accepted" for a missing, unknown or faulty file or
+/// column, for time that does not increase, for a quaternion whose length differs from 1 by more than 1e-3 (others are
+/// normalised), and for streams that never overlap. Warns where the file of a declared optional stream is missing.
 FlightLog read_flight_log(const std::filesystem::path& folder);
 
 /// Reads a log from texts; `folder` is the place that error messages name.
@@ -236,17 +229,15 @@ void check_each_once(const std::vector<std::string>& folders);
 /// Texts that parse_flight_log() reads back exactly; quaternions only where their length is 1 to the last digits.
 LogFiles flight_log_files(const FlightLog& log);
 
-/// Writes a log as a whole or not at all. Creates the folder; a flight log that is already there is replaced with all
-/// its files, truth.csv and vehicle included. InputError if the folder holds other files, if it cannot be written, or
-/// if read_flight_log() would refuse the log.
+/// Writes a log whole or not at all, replacing a flight log with all its files, truth.csv and vehicle included.
+/// InputError if the folder holds other files or cannot be written, or if read_flight_log() would refuse the log.
 void write_flight_log(const std::filesystem::path& folder, const FlightLog& log);
 
 /// Adds truth.csv to a log; all `columns` have one length. InputError if the folder holds no flight log.
 void write_truth(const std::filesystem::path& folder, const std::vector<std::string>& names,
                  const std::vector<Column>& columns);
 
-/// Adds the vehicle file to a log under the `name` that the header declares, so that the folder is complete by itself.
-/// InputError if the folder holds no flight log.
+/// Adds the vehicle file under the `name` that the header declares. InputError if the folder holds no flight log.
 void write_vehicle(const std::filesystem::path& folder, const std::string& name, std::string_view text);
 
 }  // namespace flappy::flightlog

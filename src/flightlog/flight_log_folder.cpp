@@ -1,4 +1,3 @@
-// Reads and writes flight logs as folders.
 #include <unistd.h>
 
 #include <algorithm>

@@ -9,15 +9,13 @@
 namespace flappy::flightlog {
 namespace {
 
-/// A pose leaps if it turns or moves by more than these offset and rate allow; no flapper does, so its markers were
-/// swapped. Swaps last kMaxSwapped poses at most.
+/// A pose that turns or moves by more than this leaps: its markers were swapped. Swaps last kMaxSwapped poses at most.
 constexpr double kLeap_rad = 0.5, kLeap_rad_s = 40, kLeap_m = 0.05, kLeap_m_s = 10;
 constexpr std::size_t kMaxSwapped = 10;
-/// Markers were also swapped where mocap differs from the second estimator by more than kTurned_rad and more than
-/// kTurnedUsual times the median difference.
+/// Also swapped: mocap and second estimator differ by over kTurned_rad and kTurnedUsual times the median.
 constexpr double kTurned_rad = 0.35, kTurnedUsual = 6;
-/// The yaw offset between the estimators is constant over kBlock_s and is taken from about kTried poses. attitude.csv
-/// is interpolated over gaps of up to kLongestBridged intervals.
+/// Yaw between the estimators is constant over kBlock_s, taken from about kTried poses; attitude.csv is interpolated
+/// over gaps of up to kLongestBridged intervals.
 constexpr double kBlock_s = 10, kLongestBridged = 3.5;
 constexpr std::size_t kTried = 100;
 
@@ -27,7 +25,6 @@ bool leaps(const PoseReading& from, const PoseReading& to) {
          (to.position_m - from.position_m).norm() > kLeap_m + kLeap_m_s * dt_s;
 }
 
-/// All poses except lost ones, which repeat the pose before although noise is declared.
 std::vector<PoseReading> fresh_poses(const FlightLog& log) {
   const MocapStream& m = log.mocap;
   std::vector<PoseReading> poses;
@@ -56,9 +53,8 @@ std::vector<PoseReading> without_swaps(const std::vector<PoseReading>& poses) {
   return kept;
 }
 
-/// Least number of samples for a clock, and of samples in a block. Limits, as a share of the period: kMaxJitter for one
-/// sample's deviation from the clock, kMaxWander for the mean deviation of a block, which is large where the clock is
-/// not regular.
+/// Least number of samples for a clock, and of a block. Limits, as shares of the period: kMaxJitter for one sample's
+/// deviation, kMaxWander for a block's mean deviation, which is large where the clock is irregular.
 constexpr std::size_t kMinSamples = 200, kBlock = 100;
 constexpr double kMaxJitter = 0.6, kMaxWander = 0.08;
 constexpr int kRounds = 3;
@@ -152,7 +148,6 @@ std::vector<char> swapped_poses(const FlightLog& log) {
   }
   const double most = known.empty() ? 0 : std::max(kTurned_rad, kTurnedUsual * io::median(known));
   for (std::size_t i = 0; i < n && !known.empty(); ++i) swapped[i] = angles[i] > most ? 1 : 0;
-  // Among the remaining poses, mark those that leap.
   std::vector<PoseReading> rest;
   for (const PoseReading& pose : fresh_poses(log))
     if (!swapped[pose.row]) rest.push_back(pose);

@@ -1,4 +1,4 @@
-// Samples of motion capture and IMU as vectors. All code that needs motion takes it from here instead of from the log's columns.
+// Samples of motion capture and IMU as vectors, for all code that needs motion.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -18,20 +18,19 @@ struct PoseReading {
   std::size_t row;                   ///< in mocap.csv, from 0
   Eigen::Quaterniond attitude() const { return {quaternion[0], quaternion[1], quaternion[2], quaternion[3]}; }
 };
-/// The poses of the log without lost ones and without those that leap away and back within a few frames, as swapped
-/// markers make them. A pose is lost if it repeats the pose before although noise is declared.
+/// The poses without lost ones, which repeat the pose before despite declared noise, and without those of swapped
+/// markers, which leap away and back within a few frames.
 std::vector<PoseReading> pose_readings(const FlightLog& log);
 
-/// For each row of mocap.csv, the attitude from attitude.csv at the same instant; nothing outside its time and in its
-/// gaps.
+/// For each row of mocap.csv, the attitude from attitude.csv at that instant; nothing outside its time and in its gaps.
 std::vector<std::optional<Eigen::Quaterniond>> second_attitudes(const FlightLog& log);
 
-/// For each row of mocap.csv, whether its markers were swapped: the pose leaps away and back within a few frames, or is
-/// turned against attitude.csv by far more than the poses around it.
+/// For each row of mocap.csv, whether its markers were swapped: the pose leaps away and back, or is turned against
+/// attitude.csv far more than the poses around it.
 std::vector<char> swapped_poses(const FlightLog& log);
 
-/// Replaces times of arrival by sampling instants: fits a regular clock (first instant and period, gaps counted) to the
-/// times of motion capture, IMU and power. A stream whose times fit no regular clock keeps them.
+/// Replaces times of arrival by sampling instants of a regular clock fitted to mocap, IMU and power (first instant,
+/// period, gaps counted). A stream that fits no regular clock keeps its times.
 FlightLog on_its_clocks(FlightLog log);
 
 /// A sample of the IMU, in B; the rate is 0 where there is no gyro.

@@ -1,4 +1,4 @@
-// Rotation vectors to quaternions and back, for single values; src/flight/sensors.hpp has the same for lanes.
+// Rotation vectors, rad, to quaternions and back, for single values; src/flight/sensors.hpp has the same for lanes.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -6,7 +6,6 @@
 
 namespace flappy::flightlog {
 
-/// The quaternion of a rotation vector, rad.
 inline Eigen::Quaterniond exponential(const Eigen::Vector3d& turn) {
   const double angle = turn.norm();
   const double scale = angle < 1e-6 ? 0.5 : std::sin(angle / 2) / angle;

@@ -17,13 +17,11 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kPi = std::numbers::pi;
-/// Standard deviations that no header declares: the bias of a consumer accelerometer (BMI088 data sheet: 20 mg), slow
-/// drifts of both biases, and the initial velocity of a small flapper.
+/// Standard deviations in no header: bias of a consumer accelerometer (BMI088: 20 mg), drifts, initial velocity.
 constexpr double kAccelBiasSd_m_s2 = 0.2;
 constexpr double kGyroBiasDrift_rad_s_sqrt_s = 1e-4, kAccelBiasDrift_m_s2_sqrt_s = 0.01;
 constexpr double kVelocitySd_m_s = 3;
-/// In a gap of the IMU the motion within the beat is not measured. It is modelled as random, with about these rates and
-/// accelerations, each for about this long in one direction.
+/// In a gap of the IMU, motion is random with about these rates and accelerations, each for about this long.
 constexpr double kUnseenRate_rad_s = 5, kUnseenAcceleration_m_s2 = 30, kUnseenFor_s = 0.01;
 /// Least noise of the filter, for headers that declare less: below it, rounding errors in double precision dominate.
 constexpr double kMinAngle_rad = 1e-6, kMinPosition_m = 1e-7, kMinRate_rad_s = 1e-5, kMinForce_m_s2 = 1e-4;
@@ -37,8 +35,8 @@ Matrix3d cross_matrix(const Vector3d& v) {
   return m;
 }
 
-/// Weight of a new value in the first-order low-pass that, together with the mean over an interval, passes 1/sqrt(2) at
-/// the bandwidth; 1 (no low-pass) where the mean alone already does.
+/// Weight of a new value in the low-pass that, with the mean over an interval, passes 1/sqrt(2) at the bandwidth; 1 (no
+/// low-pass) where the mean alone does.
 double low_pass_share(const ImuHeader& h) {
   const double x = kPi * h.bandwidth_hz / h.rate_hz;
   if (x >= kPi) return 1;
@@ -75,8 +73,8 @@ struct Smoother::Noise {
   }
 };
 
-/// Integrals of the IMU's signals over a part of one of its intervals. Changes of velocity and position are in B at the
-/// middle of the whole interval, because the frame of a mean is known no better.
+/// Integrals of the IMU's signals over part of an interval. Changes of velocity and position are in B at the middle of
+/// the whole interval: the frame of a mean is known no better.
 struct Smoother::Reading {
   double duration_s, to_middle_s;
   Vector3d rotation_rad, turn_to_middle_rad, gained_m_s, moved_m;
@@ -89,14 +87,13 @@ struct Smoother::Pose {
   Quaterniond attitude;
 };
 
-/// The transition matrix F of the error state over a time dt: 1 except for blocks of 3 x 3. Offsets of the errors:
-/// angle 0, position 3, velocity 6, gyro bias 9, accelerometer bias 12.
+/// Transition matrix F of the error state over dt: 1 except for 3 x 3 blocks. Offsets: angle 0, position 3, velocity 6,
+/// gyro bias 9, accelerometer bias 12.
 struct Smoother::Transition {
   double dt;
   Matrix3d turn, half;
   Matrix3d leans;  ///< d velocity error / d angle error
 
-  /// F times a matrix.
   template <class M>
   M of(M m) const {
     const auto gained = (leans * m.template topRows<3>() - dt * half * m.template bottomRows<3>()).eval();
@@ -117,8 +114,7 @@ struct Smoother::Transition {
   }
 };
 
-/// The update by one pose: observation matrix h, Kalman gain, inverse S^-1 of the innovation's covariance, innovation
-/// `off`.
+/// The update by one pose: observation matrix h, gain, inverse S^-1 of the innovation's covariance, innovation `off`.
 struct Smoother::Correction {
   Eigen::Matrix<double, 6, 15> h;
   Eigen::Matrix<double, 15, 6> gain;
@@ -126,8 +122,7 @@ struct Smoother::Correction {
   Eigen::Matrix<double, 6, 1> off;
 };
 
-/// Results of the forward filter for the backward pass: covariance of every node, transition from every node to the
-/// next, correction by every pose except the first.
+/// For the backward pass: covariance of every node, transition to the next, correction by every pose except the first.
 struct Smoother::Filtered {
   std::vector<Covariance> covariance;
   std::vector<Transition> transition;
@@ -224,8 +219,7 @@ auto Smoother::moved(const State& x, const Reading& r) const -> State {
   const Quaterniond middle = to_middle(x, r);
   const Vector3d down(0, 0, -gravity_m_s2_);
   State y = x;
-  // Position uses the second integral, not half of the gained velocity: with an acceleration A of the beat this would
-  // leave A dt^2/12, some 0.01 mm.
+  // Uses the second integral; half of the gained velocity would leave A dt^2/12 of an acceleration A: some 0.01 mm.
   y.position_m += dt * x.velocity_m_s + middle * (r.moved_m - dt * dt / 2 * x.accel_bias) + dt * dt / 2 * down;
   y.velocity_m_s += middle * (r.gained_m_s - dt * x.accel_bias) + dt * down;
   y.attitude = (x.attitude * exponential(turn)).normalized();
@@ -320,8 +314,7 @@ auto Smoother::filter(const std::vector<Pose>& poses, const Noise& noise) -> Fil
   return list;
 }
 
-/// Goes backward with the adjoint lambda of the errors and its covariance Lambda: smoothed state = filtered state + P
-/// lambda, with covariance P - P Lambda P.
+/// Goes backward with the adjoint lambda and its covariance Lambda: state + P lambda, covariance P - P Lambda P.
 void Smoother::smooth(const Filtered& filtered, const Noise& noise) {
   Eigen::Matrix<double, 15, 1> lambda = Eigen::Matrix<double, 15, 1>::Zero();
   Covariance of_lambda = Covariance::Zero();

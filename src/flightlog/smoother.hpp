@@ -1,18 +1,16 @@
 // The motion of a recorded flight, estimated from motion capture and IMU by a fixed-interval smoother.
 //
-// Forward, an error-state Kalman filter predicts the pose of the IMU from its own samples and corrects it at each pose of motion
-// capture. Backward, the modified Bryson-Frazier smoother (Bierman, Factorization Methods for Discrete Sequential Estimation, 1977)
-// adds the information of later samples; it inverts no matrix of the size of the state. The error state has 15 elements,
-// true = estimate + error, 3 each in this order:
+// Forward, an error-state Kalman filter predicts the IMU's pose from its samples and corrects it at each mocap pose.
+// Backward, the modified Bryson-Frazier smoother (Bierman, Factorization Methods for Discrete Sequential Estimation,
+// 1977) adds later samples; it inverts no matrix of the state's size. 15 errors, true = estimate + error, 3 each:
 //   angle (in B: R_true = R exp(angle)), position, velocity (both of the IMU, in W), gyro bias, accelerometer bias
 //
-// Model of the IMU, from flight.toml: a sample is the mean over its interval, centred latency + 1/(2 pi bandwidth) before its t_s.
-// Where the declared bandwidth is below that of such a mean, the model adds a first-order low-pass, and the smoother undoes it. Inside
-// an interval the signal is the quadratic of BeatAveragedSpline: a sine of w rad/s is off by about (w interval)^4/180 of its amplitude,
-// the noise of the gyro remains at about its standard deviation (the body rate is that of the gyro, not smoothed), and a jump, as
-// where a wing meets its stop, is spread over two intervals. In simulated hovering (500 Hz, noise 0.052 rad/s, rates of 10 rad/s that
-// jump by 2 at the stops) the body rate is off by 0.065 rad/s in the median and by 0.3 in one case of ten; its mean over an interval
-// is as good as the gyro.
+// Model of the IMU, from flight.toml: a sample is the mean over its interval, centred latency + 1/(2 pi bandwidth)
+// before t_s, with a first-order low-pass, which the smoother undoes, where the bandwidth is below that of such a mean.
+// Inside an interval the signal is the quadratic of BeatAveragedSpline: a sine of w rad/s is off by about (w
+// interval)^4/180 of its amplitude; the gyro's noise stays (the body rate is not smoothed); a jump, as at a stop,
+// spreads over two intervals. In simulated hovering (500 Hz, noise 0.052 rad/s, rates of 10 rad/s, jumps of 2) the body
+// rate is off by 0.065 rad/s in the median, by 0.3 in one case of ten; its interval mean is as good as the gyro.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -38,8 +36,8 @@ class Smoother {
  public:
   using Covariance = Eigen::Matrix<double, 15, 15>;
 
-  /// io::InputError, naming `folder`, where the flight has declared inputs instead of voltages (then it may lack a
-  /// gyro), and where fewer than two poses lie within the time of the IMU, latencies taken off.
+  /// io::InputError, naming `folder`, for declared inputs in place of voltages (then a gyro may be missing), and where
+  /// fewer than two poses lie within the time of the IMU, latencies taken off.
   Smoother(const FlightLog& log, const std::filesystem::path& folder);
 
   /// Time of the first and of the last pose that the IMU covers.
@@ -48,8 +46,7 @@ class Smoother {
   /// Measured instants of the poses that the smoother uses (pose_readings()).
   const std::vector<double>& pose_s() const { return pose_s_; }
 
-  /// The bound between two intervals of the IMU that is nearest to a time. The motion is known best there, because the
-  /// mean over an interval says nothing about the motion within it.
+  /// The bound between two IMU intervals nearest to a time. A mean says nothing about the motion within its interval.
   double imu_bound_s(double t_s) const;
 
   /// Bounds of the IMU's intervals, gaps included.
@@ -68,12 +65,10 @@ class Smoother {
 
   /// Whether the IMU has no gap in this time and motion capture none longer than four of its intervals.
   bool covers(double from_s, double to_s) const;
-  /// Mean normalised innovation squared of the forward filter, angle and position: mean of nu^T S^-1 nu / dim(nu),
-  /// which is 1 where the declared noise is right, and large where the two streams contradict each other.
+  /// Mean of nu^T S^-1 nu / dim(nu) of the forward filter: 1 for correct noise, large where the streams disagree.
   double angle_normalised_innovation() const { return normalised_innovation_[0]; }
   double position_normalised_innovation() const { return normalised_innovation_[1]; }
-  /// Mean square of the estimated biases at the start over their prior variance, for gyro or accelerometer, whichever
-  /// is larger.
+  /// Mean square of the initial biases over their prior variance, gyro or accelerometer, whichever is larger.
   double bias_normalised_innovation() const { return normalised_innovation_[2]; }
 
  private:
@@ -122,8 +117,7 @@ class Smoother {
   double normalised_innovation_[3] = {0, 0, 0};
 };
 
-/// The voltages at the motors: the commands, scaled by battery_V / battery_nominal_V where there is a power.csv. The
-/// battery's voltage is interpolated linearly to the time of each command.
+/// The voltages at the motors: the commands, times battery_V (interpolated) / battery_nominal_V with a power.csv.
 sim::VoltageScript motor_voltages(const FlightLog& log);
 
 /// Left and right stroke, rad, at a time, by a cubic through the four samples around it; NaN where these have a gap.

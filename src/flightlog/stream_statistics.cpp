@@ -22,8 +22,7 @@ StreamStatistics stream_statistics(const std::string& name, const Column& t_s, s
   for (std::size_t i = 0; i < intervals.size(); ++i) {
     const double dt = intervals[i];
     s.longest_gap_s = std::max(s.longest_gap_s, dt);
-    // Count together with the shorter neighbour: a late sample makes one long and one short interval, but none is
-    // missing.
+    // Count with the shorter neighbour: a late sample makes one long and one short interval, but none is missing.
     const double before = i > 0 ? intervals[i - 1] : usual, after = i + 1 < intervals.size() ? intervals[i + 1] : usual;
     const long missing = dt > 1.5 * usual ? std::lround((dt + std::min(before, after)) / usual) - 2 : 0;
     if (missing > 0) {

@@ -1,4 +1,3 @@
-// Rate, gaps and regularity of the samples of a stream.
 #pragma once
 
 #include <optional>
@@ -16,8 +15,8 @@ struct StreamStatistics {
   std::optional<double> declared_hz;
 };
 
-/// `t_s`: at least two times, which increase. The usual interval is half the median span of two intervals, so that
-/// samples that arrive in pairs count as regular; a longer interval counts its missing samples by it.
+/// `t_s`: at least two increasing times. The usual interval is half the median span of two, so samples that arrive in
+/// pairs are regular; missing samples are counted by it.
 StreamStatistics stream_statistics(const std::string& name, const Column& t_s, std::optional<double> declared_hz);
 
 }  // namespace flappy::flightlog

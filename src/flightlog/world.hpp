@@ -8,7 +8,6 @@ namespace flappy::flightlog {
 
 sim::World world_of(const FlightHeader& header);
 
-/// Adds a solid of a world to the surroundings of a log.
 void add_solid(const sim::Shape& shape, LogAmbient& ambient);
 
 }  // namespace flappy::flightlog

@@ -26,13 +26,12 @@ struct FitConfig {
   double unseen_share = 0;
 };
 
-/// Reads the parameters whose paths are in `chosen`, or all if it is empty. InputError "file:line:column: key: ..." for
-/// a parameter that the vehicle lacks, that comes twice, or whose bounds are empty, exceed the range that a vehicle
-/// file accepts or exclude the vehicle's own value.
+/// Reads the parameters in `chosen`, or all if it is empty. InputError "file:line:column: key: ..." where the vehicle
+/// lacks one, where one comes twice, and where bounds are empty, exceed a vehicle file's range or exclude the vehicle's
+/// value.
 FitConfig read_fit_config(const std::filesystem::path& path, const model::Vehicle& vehicle,
                           const std::vector<std::string>& chosen = {});
 
-/// Pointers to the parameters of `config` in `vehicle`.
 std::vector<double*> fitted_values(const FitConfig& config, model::Vehicle& vehicle);
 
 }  // namespace flappy::identify

@@ -1,5 +1,5 @@
-// The cost function of a fit: a vehicle is a point of the unit cube, each axis one parameter from its lower to its upper bound. Its
-// residuals are simulated less measured forces and torques, over their standard deviations.
+// The cost of a fit: a vehicle is a point of the unit cube, each axis a parameter from lower to upper bound. Residuals
+// are simulated less measured forces and torques, over their standard deviations.
 #pragma once
 
 #include <algorithm>
@@ -83,13 +83,12 @@ class Problem {
   MapOptions map_;
 };
 
-/// Estimates the standard deviation of each measured value as the rms residual of all forces or of all torques,
-/// corrected for the number of fitted `parameters`.
+/// The sd of each value: the rms residual of all forces or of all torques, corrected for the number of `parameters`.
 std::vector<Wrench> estimated_sd(const MeasuredMap& measured, const std::vector<Wrench>& simulated,
                                  std::size_t parameters);
 
-/// Inputs at which the simulated map jumps about `point`: the second difference of a residual over a small step of a
-/// parameter exceeds 1 standard deviation. Where the map is smooth it stays below 0.2.
+/// Inputs at which the simulated map jumps about `point`: a residual's second difference over a small step of a
+/// parameter exceeds 1 standard deviation. Where the map is smooth, it stays below 0.2.
 std::vector<std::size_t> jumping_inputs(const Problem& problem, const Eigen::VectorXd& point);
 
 }  // namespace flappy::identify

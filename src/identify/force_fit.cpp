@@ -26,7 +26,6 @@ class Fit {
   Fit(const Problem& problem, const FitOptions& options, ForceFit& result)
       : problem_(problem), options_(options), result_(result) {}
 
-  /// Minimises from `start` as a separate stage; returns the point.
   VectorXd polish(const std::string& name, const VectorXd& start) {
     const auto began = std::chrono::steady_clock::now();
     const LeastSquares found = minimise(problem_, start, [&](const LeastSquares& s) {
@@ -37,7 +36,6 @@ class Fit {
     return found.point;
   }
 
-  /// Returns the optimum of the chosen method.
   VectorXd optimum(const VectorXd& nominal) {
     if (options_.method == Method::gauss_newton) return from_several(nominal);
     const bool genetic = options_.method == Method::genetic;
@@ -95,8 +93,7 @@ class Fit {
   double cost_ = 0;
 };
 
-/// Puts unseen parameters back to `nominal`, one at a time, and fits the rest again, as long as noise explains the
-/// increase of the cost. Returns the parameters put back.
+/// Puts unseen parameters back to `nominal`, one at a time, and refits the rest, while noise explains the higher cost.
 std::vector<Eigen::Index> put_back(const Problem& problem, const FitOptions& options, ForceFit& result, VectorXd& point,
                                    const VectorXd& nominal) {
   const auto began = std::chrono::steady_clock::now();

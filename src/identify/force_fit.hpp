@@ -1,15 +1,14 @@
 // Fits parameters of a vehicle to a measured force map, with an interval for each.
 //
 //   cost = sum of ((measured - simulated) / sd)^2 over all inputs and channels
-//   total error = 100 norm(D (measured - simulated)) / norm(D measured), D = 1/rms of the measured forces, of the torques
+//   total error = 100 norm(D (measured - simulated)) / norm(D measured), D = 1/rms of measured forces, of torques
 //
-// Where no sd is declared, the first fit uses the weights D; the rms residual that it leaves in forces and in torques is the sd of the
-// second fit. Inputs at which the simulated map jumps about the optimum (wings that hardly flip, strokes that meet their stops) have no
-// useful slopes: the fit leaves them out, the errors include them.
-// A parameter is unseen if its interval is wider than a share of its bounds. Unseen parameters return to their nominal value one at a
-// time, the widest interval first, and the rest are fitted again; if the map determines only a combination of two parameters, fixing one
-// determines the other. A parameter whose nominal value contradicts the map stays as fitted. The intervals include the uncertainty of
-// the unseen parameters.
+// Where no sd is declared, the first fit uses the weights D; its rms residuals in forces and torques are the sd of the
+// second fit. Inputs at which the simulated map jumps about the optimum (wings that hardly flip, strokes that meet
+// their stops) have no useful slopes: the fit leaves them out, the errors include them. A parameter is unseen if its
+// interval is wider than a share of its bounds. Unseen ones return to nominal one at a time, widest interval first, and
+// the rest are refitted: if the map determines only a combination of two, fixing one determines the other. A parameter
+// whose nominal value contradicts the map stays as fitted. Intervals include the uncertainty of the unseen parameters.
 #pragma once
 
 #include <functional>
@@ -54,8 +53,8 @@ struct ForceFit {
 /// A line for each side with both spring stiffnesses fitted: whether the map tells them apart.
 std::vector<std::string> spring_verdicts(const ForceFit& fit);
 
-/// InputError where there are fewer different inputs than parameters, where all forces or all torques are zero, where
-/// the vehicle cannot be simulated at an input, or where check_signs() finds a wrong sign.
+/// InputError for fewer different inputs than parameters, for all forces or all torques zero, for a vehicle that cannot
+/// be simulated at an input, and for a wrong sign (check_signs()).
 ForceFit fit_forces(const model::Vehicle& nominal, const MeasuredMap& measured, const FitConfig& config,
                     const FitOptions& options = {});
 

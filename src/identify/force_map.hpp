@@ -1,13 +1,11 @@
-// The force map of a vehicle: the mean aerodynamic wrench of its wings over whole beats, torso welded, for each input.
-// One batch simulates all vehicles with all inputs, a lane for each pair.
+// The force map: the mean aerodynamic wrench over whole beats, torso welded, for each input. One batch simulates all, a
+// lane for each vehicle and input.
 //
-// Wings start from rest and settle for kSettle_s. The mean over beats is exact only if the window holds a whole number of beats and a
-// whole number of the driver's holds, because the driver refreshes its voltage every hold_s (tests/identify/force_map_test.cpp
-// measures the errors):
-//   - at 34 Hz and 1 ms, 17 beats are 500 holds, 0.5 s, exactly: the paper's average;
-//   - for other drivers the window is the number of beats, 10 to 20, that comes nearest to a whole number of holds, rounded to a
-//     whole number of steps. The rounding, at most half a step, changes the mean by at most 1/2 step / window: 1.7e-4 of the
-//     swing of the wrench about its mean.
+// Wings start from rest and settle for kSettle_s. The mean is exact only over a whole number of beats and of the
+// driver's holds, because the driver refreshes its voltage every hold_s (errors: tests/identify/force_map_test.cpp). At
+// 34 Hz and 1 ms, 17 beats are exactly 500 holds, 0.5 s: the paper's average. Other drivers use the 10 to 20 beats
+// nearest to a whole number of holds, rounded to whole steps, which changes the mean by at most 1/2 step / window:
+// 1.7e-4 of the wrench's swing.
 #pragma once
 
 #include <array>
@@ -33,7 +31,6 @@ struct MapOptions {
   std::string instruction_set;
 };
 
-/// A window of whole beats and its number of physics steps.
 struct Window {
   int beats, steps;
 };
@@ -42,8 +39,8 @@ Window whole_beats(const model::Driver& driver);
 /// Number of steps for the wings to settle from rest: a whole number of holds, at least `settle_s`.
 int settle_steps(const model::Driver& driver, double settle_s);
 
-/// Force maps, [vehicle][input]. All vehicles must have the same driver. The wrench is NaN where a simulation leaves
-/// the plausible range. The result is bit-identical for all numbers of threads and instruction sets.
+/// Force maps, [vehicle][input]; all vehicles need the same driver. NaN where a simulation leaves the plausible range.
+/// Bit-identical for all numbers of threads and instruction sets.
 template <class T>
 std::vector<Wrench> force_map(std::span<const model::Vehicle> vehicles, std::span<const sim::Input> inputs,
                               const MapOptions& options = {});

@@ -24,7 +24,6 @@ std::string digits(double x) { return io::format("%.3g", x); }
   throw io::InputError(table.name + ": " + column + ": " + what + "; accepted: " + accepted);
 }
 
-/// Times of the samples in beats.
 std::vector<double> beats_of(const io::CsvTable& table, const GaitOptions& options) {
   const bool by_time = std::ranges::count(table.names, "t_s") > 0;
   if (!by_time && std::ranges::count(table.names, "beat") == 0)

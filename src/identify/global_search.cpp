@@ -55,8 +55,7 @@ pagmo::algorithm algorithm_of(Search method, unsigned seed) {
     constexpr double kFirstStep = 0.2;  // initial step, as a share of the range
     return pagmo::algorithm(pagmo::cmaes(1, -1, -1, -1, -1, kFirstStep, 0, 0, true, true, seed));
   }
-  // Crossover probability 0.9, offspring near their parents (distribution index 10); mutation probability 0.08 per
-  // gene: about one mutation in twelve genes.
+  // Crossover 0.9, offspring near their parents (index 10); mutation 0.08 per gene: about one in twelve genes.
   return pagmo::algorithm(pagmo::sga(1, 0.9, 10, 0.08, 20, 2, "sbx", "polynomial", "tournament", seed));
 }
 

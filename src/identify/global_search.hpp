@@ -1,6 +1,6 @@
-// pagmo's genetic algorithm and CMA-ES with one batch of evaluations for each generation. pagmo 2.18 evaluates one point at a time in
-// these two, although the points of a generation do not depend on its own fitness. So each generation is evolved twice from the same
-// state: first to collect its points, then, after they were evaluated as one batch, again with their costs.
+// pagmo's genetic algorithm and CMA-ES with one batch of evaluations per generation. pagmo 2.18 evaluates one point at
+// a time, although a generation's points do not depend on its own fitness. So each generation is evolved twice from the
+// same state: first to collect its points, then with their costs.
 #pragma once
 
 #include <cstdint>
@@ -27,8 +27,7 @@ struct SearchResult {
   unsigned generations = 0;
 };
 
-/// Searches the unit cube of `start`'s dimension; `start` is a member of the first generation. `more`: called after
-/// each generation; returning false ends the search.
+/// Searches the unit cube; `start` is in the first generation. `more`: called after each one; false ends the search.
 SearchResult search(Search method, const BatchCost& cost, const Point& start, const SearchOptions& options,
                     const std::function<bool(const SearchResult&)>& more = {});
 

@@ -1,9 +1,7 @@
-// Uncertainty of fitted parameters.
-//
-// The intervals come from the map linearised at the optimum: in units of the bounds, with the Jacobian J of the residuals, the
-// covariance is C = (J'J + 12 I)^-1. 12 is the precision of the prior, a uniform distribution over the bounds. Where the misfit is far
-// above the noise (no parameters reproduce the map), it multiplies the noise variance. Where several starts end at different points
-// whose costs differ by no more than noise explains, the intervals contain all of them.
+// Uncertainty of fitted parameters, from the map linearised at the optimum: in units of the bounds, with the Jacobian J
+// of the residuals, the covariance is C = (J'J + 12 I)^-1; 12 is the precision of the prior, uniform over the bounds. A
+// misfit far above the noise (no parameters reproduce the map) multiplies the noise variance. Where starts end at
+// points whose costs differ by no more than noise explains, the intervals contain all of them.
 #pragma once
 
 #include <string>
@@ -44,17 +42,15 @@ struct End {
 /// Cost per degree of freedom: the variance of a residual after the fit, 1 where only the declared noise is left.
 double variance_left(double cost, Eigen::Index residuals, Eigen::Index parameters);
 
-/// Cost above the lowest one that noise alone explains in 19 of 20 maps (95 % quantile of chi squared with `parameters`
-/// degrees of freedom). `noise`: variance of a residual.
+/// Cost above the lowest that noise of variance `noise` explains in 19 of 20 maps (95 % quantile of chi squared with
+/// `parameters` degrees of freedom).
 double explained_by_noise(std::size_t parameters, double noise);
 
-/// Number of starts that ended as low as the lowest. `residuals`, `parameters`: their numbers. `declared`: whether
-/// residuals are in declared standard deviations; else they are relative to the map, and their variance is estimated
-/// from the lowest cost.
+/// Number of starts that ended as low as the lowest. `declared`: residuals are in declared sd; else they are relative
+/// to the map, and the lowest cost gives their variance.
 int count_agreed(const std::vector<double>& costs, Eigen::Index residuals, Eigen::Index parameters, bool declared);
 
-/// The `ends` whose cost in `problem` exceeds the lowest cost, `point` included, by no more than noise explains.
-/// Updates their costs.
+/// The `ends`, costs updated, whose cost exceeds the lowest, `point` included, by no more than noise explains.
 std::vector<End> likely_ends(const Problem& problem, std::vector<End> ends, const Eigen::VectorXd& point);
 
 struct Intervals {
@@ -68,8 +64,7 @@ struct Intervals {
 Intervals describe(const Problem& problem, const Eigen::VectorXd& point, const Eigen::VectorXd& nominal,
                    const std::vector<End>& ends);
 
-/// The parameter of `candidates` with the widest interval among the unseen ones, if only the `free` parameters are
-/// uncertain; -1 where all candidates are seen.
+/// The unseen parameter of `candidates` with the widest interval if only the `free` ones are uncertain; -1: none.
 Eigen::Index widest_unseen(const Problem& problem, const Eigen::VectorXd& point, const std::vector<Eigen::Index>& free,
                            const std::vector<Eigen::Index>& candidates);
 

@@ -1,8 +1,6 @@
-// Compares measured wing angles with simulated ones over one wing beat.
-//
-// Both become Fourier series in the phase of the beat, by least squares, so samples may be at any times. The phase at which a recording
-// began is unknown, so the measured beat is shifted as a whole until the first harmonics of both strokes agree best; then each angle
-// has a phase of its own left.
+// Compares measured wing angles with simulated ones over a beat, as Fourier series in its phase by least squares, so
+// samples may be at any times. A recording begins at an unknown phase: the measured beat is shifted as a whole until
+// the first harmonics of both strokes agree best; then each angle has a phase of its own left.
 #pragma once
 
 #include <array>
@@ -25,9 +23,8 @@ struct WingSamples {
   std::optional<sim::Input> input;  ///< from the columns of inputs, where the file has them
 };
 
-/// Reads the columns t_s and kAngleNames, as in a flight log's wings.csv; optional
-/// amplitude_V,difference_V,bias_V,split_cycle, constant. InputError "file:line: column: ..." for other columns or
-/// units, times that do not increase and inputs that change.
+/// Reads t_s and kAngleNames, as in wings.csv; optionally constant amplitude_V,difference_V,bias_V,split_cycle.
+/// InputError "file:line: column: ..." for other columns or units, times that do not increase and inputs that change.
 WingSamples read_wing_samples(const std::filesystem::path& path);
 
 /// Keeps the samples from `from_s` to `to_s`.
@@ -57,7 +54,7 @@ struct WingComparison {
 };
 
 /// Compares `samples` with the wings of `vehicle`, torso welded, settled at `input`. InputError for less than one beat
-/// and for times that leave a part of the beat without samples.
+/// and for a part of it without samples.
 WingComparison compare_wings(const model::Vehicle& vehicle, const sim::Input& input, const WingSamples& samples,
                              const MapOptions& options = {});
 

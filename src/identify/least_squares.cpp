@@ -16,8 +16,7 @@ double cost_of(const Eigen::VectorXd& residuals) {
   return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
 }
 
-/// The point after a damped step of the parameters that the gradient does not push against a bound; clamped to the
-/// bounds.
+/// A damped step of the parameters that the gradient does not push against a bound, clamped to the bounds.
 Eigen::VectorXd stepped(const Eigen::MatrixXd& normal, const Eigen::VectorXd& gradient, const Eigen::VectorXd& point,
                         double damping) {
   std::vector<Eigen::Index> free;

@@ -1,11 +1,9 @@
-// Bounded nonlinear least squares (Levenberg-Marquardt) with evaluations in batches: one call for the Jacobian, one for the steps of all
-// damping factors.
+// Bounded nonlinear least squares (Levenberg-Marquardt), one batch for the Jacobian, one for all damping factors.
 //
-// A force map is smooth where the beat is periodic: second differences over 1e-3 of a parameter's range are below 0.1 standard
-// deviations of a good sensor. It jumps where wings hardly flip or the stroke meets its stops. Small kinks remain. In a direction in
-// which the residuals hardly change, kinks look like slope, and the direction would seem ten times better known than it is. So the
-// Jacobian uses central differences along the singular directions of the previous Jacobian, each so long that the residuals change by
-// about their noise.
+// A force map is smooth where the beat is periodic (second differences over 1e-3 of a range below 0.1 sd of a good
+// sensor) and jumps where wings hardly flip or strokes meet stops. Small kinks remain. Where residuals hardly change,
+// kinks look like slope, and the direction would seem ten times better known. So central differences go along the
+// singular directions of the previous Jacobian, each so far that the residuals change by about their noise.
 #pragma once
 
 #include <Eigen/Dense>
@@ -22,8 +20,8 @@ inline constexpr double kFarthest = 0.05;    // longest
 
 /// Steps of kDifference along each parameter, as columns.
 Eigen::MatrixXd first_steps(Eigen::Index size);
-/// Steps along the singular directions of `slopes`, as columns: so long that the norm of the residuals' change is about
-/// `noise`, within kDifference and kFarthest and inside the unit cube.
+/// Columns along the singular directions of `slopes`, so long that the residuals' change has a norm of about `noise`,
+/// within kDifference and kFarthest and inside the unit cube.
 Eigen::MatrixXd steps_along(const Eigen::MatrixXd& slopes, const Eigen::VectorXd& point, double noise);
 
 /// d residuals / d point from central differences over the columns of `steps`, one-sided at a bound.
@@ -36,8 +34,8 @@ struct LeastSquares {
   std::size_t evaluations = 0;
 };
 
-/// The local minimum of the cost reached from `start`, inside the unit cube; the cost is infinite where `start` cannot
-/// be evaluated. `more`: called before each iteration; returning false ends the search.
+/// The local minimum reached from `start`; its cost is infinite where `start` cannot be evaluated. `more`: called
+/// before each iteration; returning false ends the search.
 LeastSquares minimise(const Residuals& residuals, const Eigen::VectorXd& start,
                       const std::function<bool(const LeastSquares&)>& more = {});
 

@@ -1,5 +1,5 @@
-// The force map as four straight lines, the form published for the real robot: thrust against amplitude, roll against difference,
-// pitch against bias, yaw against split cycle.
+// The force map as the four straight lines published for the real robot: thrust against amplitude, roll against
+// difference, pitch against bias, yaw against split cycle.
 #pragma once
 
 #include <array>
@@ -20,8 +20,7 @@ using LinearMap = std::array<Line, 4>;
 /// Reads a published map. InputError "file:line:column: ..." for a faulty file.
 LinearMap read_published_map(const std::filesystem::path& path);
 
-/// Least squares over the sweeps of default_inputs(): amplitude from 5 to 14 V, the other inputs at an amplitude of 10
-/// V.
+/// Least squares over the sweeps of default_inputs(): amplitude from 5 to 14 V, other inputs at 10 V.
 LinearMap linear_map(const model::Vehicle& vehicle, const MapOptions& options = {});
 
 }  // namespace flappy::identify

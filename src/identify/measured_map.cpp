@@ -68,8 +68,7 @@ MeasuredMap map_of(const io::CsvTable& table, const model::Driver& driver) {
 }  // namespace
 
 void check_columns(const io::CsvTable& table, const Names& required, const Names& optional) {
-  // Report unknown columns first: a column in a wrong unit is both unknown and missing, and the message must name the
-  // unit.
+  // Unknown columns first: one in a wrong unit is both unknown and missing, and the message must name the unit.
   Names known = required;
   known.insert(known.end(), optional.begin(), optional.end());
   for (const std::string& name : table.names) {

@@ -29,15 +29,13 @@ struct MeasuredMap {
 std::array<double, 4> numbers_of(const sim::Input& input);
 /// "10 V, 0 V, 0 V, 0.03"
 std::string text_of(const sim::Input& input);
-/// Throws InputError "where: the vehicle comes apart at (...); ..." for a vehicle whose wings leave the plausible range
-/// at an input.
+/// InputError "where: the vehicle comes apart at (...); ...": at an input, wings leave the plausible range.
 [[noreturn]] void refuse_apart(const std::string& where, const sim::Input& input);
 /// The force map of one vehicle; refuse_apart() with the vehicle's name where a wrench is NaN.
 std::vector<Wrench> whole_map(const model::Vehicle& vehicle, const std::vector<sim::Input>& inputs,
                               const MapOptions& options);
-/// The columns of an input.
 inline const std::array<std::string, 4> kInputNames = {"amplitude_V", "difference_V", "bias_V", "split_cycle"};
-/// InputError "file:1: column: what is wrong; what is accepted" for a column that is missing, unknown or in another unit.
+/// InputError "file:1: column: what is wrong; what is accepted" for a missing or unknown column or another unit.
 void check_columns(const io::CsvTable& table, const std::vector<std::string>& required,
                    const std::vector<std::string>& optional);
 
@@ -49,9 +47,8 @@ const std::array<std::string, kChannels>& channel_names();
 const std::array<std::string, kChannels>& sd_names();
 inline bool is_force(int channel) { return channel < 3; }
 
-/// InputError "file:line: column: what is wrong; what is accepted" for a column that is missing, unknown or in another
-/// unit, a value that is not finite, a standard deviation that is not above 0, and an input that exceeds the driver's
-/// limits.
+/// InputError "file:line: column: what is wrong; what is accepted" as by check_columns(), for a value that is not
+/// finite, a standard deviation that is not above 0, and an input beyond the driver's limits.
 MeasuredMap read_measured_map(const std::filesystem::path& path, const model::Driver& driver);
 MeasuredMap parse_measured_map(std::string_view text, const std::string& name, const model::Driver& driver);
 
@@ -60,10 +57,8 @@ std::vector<sim::Input> read_inputs(const std::filesystem::path& path, const mod
 
 void write_measured_map(const std::filesystem::path& path, const MeasuredMap& map);
 
-/// Number of different inputs.
 std::size_t distinct_inputs(const std::vector<sim::Input>& inputs);
 
-/// The map with the given rows only.
 MeasuredMap selected(const MeasuredMap& map, const std::vector<std::size_t>& rows);
 
 /// Moves `count` rows, evenly spread, from `map` to the map returned.

@@ -29,8 +29,7 @@ constexpr std::array<Answer, 6> kAnswers{{{0, 2, "thrust", 0},
 
 bool clear(const Slope& slope, double times = 1) { return std::abs(slope.value) > times * kSignificant * slope.sd; }
 
-/// Largest plausible noise of a value: kNoise standard deviations. Without declared sd, a standard deviation is 1/50 of
-/// the rms of all forces or torques.
+/// Largest plausible noise: kNoise sd; an undeclared sd is 1/50 of the rms of all forces or all torques.
 double noise(const MeasuredMap& map, std::size_t row, std::size_t channel) {
   constexpr double kUndeclared = 0.02;
   return kNoise * (map.sd.empty() ? kUndeclared * group_rms(map.wrenches)[is_force(static_cast<int>(channel)) ? 0 : 1]
@@ -42,8 +41,7 @@ double noise(const MeasuredMap& map, std::size_t row, std::size_t channel) {
                        "; " + kFlipped + kAccepted);
 }
 
-/// InputError where two rows differ in the answer's input alone and contradict the vehicle. Returns whether any pair
-/// could be tested.
+/// InputError where rows that differ in one input contradict the vehicle. Returns whether any pair could be tested.
 bool check_pairs(const MeasuredMap& map, const std::vector<Wrench>& simulated, const Answer& a) {
   double most = 0;
   for (const Wrench& w : simulated) most = std::max(most, std::abs(w[a.channel]));

@@ -17,8 +17,7 @@ namespace {
 
 /// Beats of spin-up, after which wings that started at rest are in phase.
 constexpr double kSpinUpBeats = 3;
-/// Share of the deviation from a logged stroke that is corrected in each interval of the IMU; a quarter of the logged
-/// noise remains.
+/// Share of a stroke's deviation corrected in each interval of the IMU; a quarter of the logged noise remains.
 constexpr double kStrokeShare = 0.1;
 constexpr double kMinChords = 5;  ///< least height above the ground, in mean chords
 /// Largest accepted rms innovation or bias of the smoother, in units of the declared noise.
@@ -75,7 +74,6 @@ StateVector noise_of(const flightlog::FlightHeader& h) {
   return {x, x, x, angle, angle, angle, v, v, v, rate, rate, rate};
 }
 
-/// truth.csv: the full state of a simulated flight.
 class Truth {
  public:
   /// InputError for rows that are not at equal intervals of whole steps.
@@ -152,7 +150,6 @@ struct Transitions::Flight {
   /// Spacing of the instants at which states are known best: intervals of the IMU, or rows of truth.csv.
   double grid_s() const { return truth ? truth->interval_s() : imu_interval_s; }
   int grid_steps() const { return std::max(1, static_cast<int>(std::lround(grid_s() / sim::kDefaultStep_s))); }
-  /// Number of steps of `beats` beats, rounded to the grid.
   int beat_steps(double beats) const {
     return std::max(1, static_cast<int>(std::lround(beats * beat_s / grid_s()))) * grid_steps();
   }
@@ -177,7 +174,6 @@ struct Transitions::Flight {
     return x;
   }
 
-  /// Selects the poses from which a replay can start.
   void choose_starts() {
     std::vector<double> holds;
     for (std::size_t i = 1; i < voltages.t_s.size(); ++i) holds.push_back(voltages.t_s[i] - voltages.t_s[i - 1]);

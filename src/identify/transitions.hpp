@@ -1,6 +1,6 @@
-// The open-loop test of the paper (Fei et al., ICRA 2019): from recorded states, the simulator flies the recorded voltages for one and
-// two wing beats. The error is simulated less recorded state at the end, for each of 12 states: absolute, and relative to the range of
-// the state within a beat.
+// The open-loop test of the paper (Fei et al., ICRA 2019): from recorded states, the simulator flies the recorded
+// voltages for one and two beats. Error: simulated less recorded, for 12 states, absolute and relative to the state's
+// range in a beat.
 #pragma once
 
 #include <array>
@@ -14,8 +14,7 @@
 
 namespace flappy::identify {
 
-/// Torso origin in W; roll, pitch and yaw of R = Rz Ry Rx; velocity in W; body rate in B as a gyro measures it: the
-/// mean over the last interval of the IMU.
+/// Torso origin and velocity in W; roll, pitch, yaw of R = Rz Ry Rx; mean body rate in B over the last IMU interval.
 inline constexpr std::array<const char*, 12> kStateNames = {"x_m",       "y_m",      "z_m",      "roll_rad",
                                                             "pitch_rad", "yaw_rad",  "vx_m_s",   "vy_m_s",
                                                             "vz_m_s",    "wx_rad_s", "wy_rad_s", "wz_rad_s"};
@@ -45,8 +44,7 @@ struct TransitionReport {
   /// |simulated - recorded| of each sample, after one and two beats; infinite where the simulator diverged.
   std::array<std::vector<StateVector>, 2> errors;
 
-  /// Quantile `share` of the absolute errors, or of errors over range if `of_range`. Infinite where it falls on samples
-  /// that diverged.
+  /// Quantile `share` of absolute errors, or over range if `of_range`. Infinite where it falls on diverged samples.
   StateVector quantile(int beats, double share, bool of_range) const;
 };
 
@@ -56,11 +54,10 @@ class Transitions {
   explicit Transitions(const TransitionOptions& options);
   ~Transitions();
 
-  /// Adds a flight. `vehicle` is simulated in the air density of the log. io::InputError "folder: what is wrong;
-  /// accepted" where the flight is too short, never higher than five chords, has sensors that contradict each other, or
-  /// beats of another length than the flights before.
+  /// `vehicle` is simulated in the log's air density. io::InputError "folder: what is wrong; accepted" for a flight
+  /// that is too short, never above five chords, contradicts itself in its sensors, or has beats of another length than
+  /// those before.
   void add(const std::filesystem::path& folder, const flightlog::FlightLog& log, const model::Vehicle& vehicle);
-  /// Replays samples of all flights that were added.
   TransitionReport run() const;
 
  private:

@@ -7,7 +7,7 @@
 
 namespace flappy::io {
 
-/// A write() appears in the file completely or not at all. Throws InputError, which names the file, where it cannot be written.
+/// A write() appears in the file completely or not at all. Throws InputError where the file cannot be written.
 class AppendFile {
  public:
   /// Keeps the first `keep` bytes of the file, cuts off the rest, and appends from there.
@@ -28,8 +28,8 @@ class AppendFile {
   std::uint64_t size_;
 };
 
-/// Locks a folder for this process until the object or the process ends, and removes temporary files that a killed process left in it
-/// (AtomicFile). Throws InputError where another process has locked the folder. Has no effect on file systems without locks.
+/// Locks a folder until the object or the process ends, and removes temporary files of a killed process (AtomicFile).
+/// Throws InputError where another process has locked the folder. Has no effect on file systems without locks.
 class FolderLock {
  public:
   explicit FolderLock(const std::filesystem::path& folder);

@@ -1,5 +1,4 @@
-// Options and commands of a program, parsed by CLI11. CLI11 is hidden behind this header because its templates take seconds to compile in every
-// file that includes them.
+// Options and commands of a program. Hides CLI11, whose templates take seconds to compile in every file.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +29,6 @@ class Option {
   Option excludes(Option other) const;
   /// For a list: the option takes one value each time it is given, so that words after it go to other options.
   Option one_at_a_time() const;
-  /// For a list: splits a value at `separator`.
   Option separated_by(char separator) const;
 
   bool given() const;
@@ -44,18 +42,15 @@ class Command {
  public:
   explicit Command(CLI::App* app) : app_(app) {}
 
-  /// T: int, unsigned, std::uint64_t, double, std::string, std::filesystem::path, or a vector of strings, doubles or
-  /// paths. A name without dashes makes a positional argument.
+  /// T: int, unsigned, uint64_t, double, string, path, vector of strings, doubles or paths. No dashes: positional.
   template <class T>
   Option option(const std::string& name, T& value, const std::string& help) const;
-  /// A name of the form "!--name" sets `value` to false.
-  Option flag(const std::string& name, bool& value, const std::string& help) const;
+  Option flag(const std::string& name, bool& value, const std::string& help) const;  ///< "!--name" sets false
   /// Accepts the old name of a flag, hidden from --help, and throws InputError with its new name.
   void renamed_flag(const std::string& name, const std::string& now) const;
   Command command(const std::string& name, const std::string& help) const;
   /// A command hidden from --help that takes any arguments, to report the new name of a renamed command.
   Command hidden_command(const std::string& name) const;
-  /// Requires from `least` to `most` commands.
   void expect_commands(std::size_t least, std::size_t most) const;
 
   bool given() const;

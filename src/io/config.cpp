@@ -15,7 +15,6 @@
 namespace flappy::io {
 namespace detail {
 
-/// A table and the keys of it that the reader asked for.
 struct Section {
   Document* document;
   toml::table* table;
@@ -50,7 +49,6 @@ constexpr std::string_view kString = "a string";
 constexpr std::string_view kFile = "the name of a file";
 constexpr std::string_view kTable = "a table";
 
-/// A key that a reader asks for: its section, its full path, and its value, if any.
 struct Entry {
   Section* section;
   std::string_view key;  ///< below the section; dotted when tables on the way are missing
@@ -256,7 +254,6 @@ std::vector<Entry> elements(Section& section, std::string_view key, std::string_
   return elements(find_required(section, key, accepted), accepted);
 }
 
-/// "an array of 3, each a number from 0 to 1"
 std::string describe_row(std::size_t length, const Range& each) {
   return "an array of " + std::to_string(length) + ", each " + describe(each);
 }
@@ -288,8 +285,7 @@ std::size_t end_of_string(std::string_view text, std::size_t begin) {
   return text.size();
 }
 
-/// The position where brackets or dotted keys nest too deeply, if any. Checked before toml++ parses, which builds and, on an error,
-/// destroys the nested tables recursively.
+/// Where brackets or dotted keys nest too deeply; checked first, because toml++ builds and destroys tables recursively.
 std::optional<std::size_t> find_too_deep(std::string_view text) {
   std::size_t brackets = 0, dots = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {

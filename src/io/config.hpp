@@ -2,9 +2,8 @@
 //
 //   v.toml:3:11: torso.mass_kg: -0.01 is out of range; accepted: a number above 0, at most 1
 //
-// Keys are dotted paths relative to a table. A reader may first call accept() with the keys it knows: then an unknown key is reported
-// before a missing or contradictory one. It reads every key, then calls finish(), which refuses the keys that
-// were not read.
+// Keys are dotted paths relative to a table. A reader may first call accept() with the keys that it knows; it reads
+// every key, then calls finish(), which refuses the keys that were not read.
 #pragma once
 
 #include <cstdint>
@@ -35,11 +34,9 @@ struct Range {
 constexpr Range positive(double high = std::numeric_limits<double>::infinity()) { return {0, high, true}; }
 constexpr Range non_negative(double high = std::numeric_limits<double>::infinity()) { return {0, high, false}; }
 
-/// A handle on one table; copies share it, and it keeps the configuration alive.
-///
-/// A reader refuses a key that is missing, of another type or not accepted. The `_or` readers return the
-/// fallback for a missing key and write it into Config::resolved(); a fallback that is itself not accepted
-/// means "not set" and is not written.
+/// A handle on one table; copies share it, and it keeps the configuration alive. Its readers refuse a key that is
+/// missing, of another type or not accepted. The `_or` readers return the fallback for a missing key and write it into
+/// Config::resolved(); a fallback that is not accepted means "not set" and is not written.
 class Table {
  public:
   double number(std::string_view key, Range range = {}) const;
@@ -56,7 +53,6 @@ class Table {
   std::string choice_or(std::string_view key, std::string_view fallback,
                         const std::vector<std::string>& accepted) const;
   std::vector<double> numbers(std::string_view key, Range each = {}) const;
-  /// Requires exactly `length` numbers.
   std::vector<double> numbers(std::string_view key, std::size_t length, Range each = {}) const;
   /// Reads any number of arrays of exactly `width` numbers.
   std::vector<std::vector<double>> rows(std::string_view key, std::size_t width, Range each = {}) const;
@@ -66,18 +62,14 @@ class Table {
 
   Table table(std::string_view key) const;
   std::optional<Table> optional_table(std::string_view key) const;
-  /// The tables of an array of tables; empty where it is missing.
+  /// Empty where the array of tables is missing.
   std::vector<Table> tables(std::string_view key) const;
 
-  /// Refuses every other key of this table (not of tables below), so that a misspelt key is reported before the missing
-  /// key that was meant. A reader that then asks for a key not among `names` has a bug.
+  /// Refuses other keys of this table, so that a misspelt key is reported before a missing one. Then read only `names`.
   void accept(const std::vector<std::string>& names) const;
-  /// Whether a key is present; counts as reading it.
-  bool has(std::string_view key) const;
-  /// Names of the keys present, sorted.
-  std::vector<std::string> keys() const;
-  /// Full dotted path of this table; empty for the root.
-  std::string path() const;
+  bool has(std::string_view key) const;   ///< counts as reading the key
+  std::vector<std::string> keys() const;  ///< sorted
+  std::string path() const;               ///< full dotted path; empty for the root
   /// Throws an InputError of the caller's choice about a key, or about this table where `key` is empty.
   [[noreturn]] void fail(std::string_view key, std::string_view what, std::string_view accepted) const;
   /// Refuses every key, in this table and in tables below, that was not read.
@@ -93,16 +85,14 @@ class Table {
 
 class Config {
  public:
-  /// Reads a file. Overrides are "a.b.c=value", as given to --set: the value is TOML, or else a bare word,
-  /// which is taken as a string. They replace values and create tables; an element of an array cannot be
-  /// overridden.
+  /// Reads a file. Overrides are "a.b.c=value", as given to --set: the value is TOML, else a bare word, taken as a
+  /// string. They replace values and create tables; an element of an array cannot be overridden.
   static Config load(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
   /// Reads text. `name` is the file name for messages; relative file names start at its folder.
   static Config parse(std::string_view text, const std::string& name, const std::vector<std::string>& overrides = {});
 
   Table root() const;
-  /// The whole configuration as TOML text, with overrides and defaults. Parsed under the same name, it reads
-  /// identically. Relative file names stay as written.
+  /// TOML with overrides and defaults, which reads identically under the same name. File names stay as written.
   std::string resolved() const;
   /// resolved() without one table of the root, for a table that has no influence on results.
   std::string resolved_without(std::string_view table) const;

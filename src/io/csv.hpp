@@ -20,8 +20,8 @@ struct CsvTable {
   const std::vector<double>& column(std::string_view column_name) const;
 };
 
-/// Reads a file of finite numbers. Accepts spaces around a cell, CRLF and a missing last newline;
-/// throws InputError, with file, line and column of the character, for anything else that is not a plain table.
+/// Reads a file of finite numbers. Accepts spaces around a cell, CRLF and a missing last newline; throws InputError,
+/// with file, line and column, for anything else that is not a plain table.
 CsvTable read_csv(const std::filesystem::path& path);
 
 /// read_csv() for text; `name` is the file name for messages.

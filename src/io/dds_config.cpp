@@ -15,7 +15,7 @@ bool is_name(const std::string& text) {
          std::ranges::all_of(text, [&](char c) { return letter(c) || (c >= '0' && c <= '9'); });
 }
 
-/// Whether `text` can be an address or host name; excludes characters with a meaning in the XML that contains it.
+/// An address or host name, without characters that mean something in the XML that contains it.
 bool is_address(const std::string& text) {
   return !text.empty() && text.size() <= 255 && std::ranges::all_of(text, [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '-' ||

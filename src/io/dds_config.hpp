@@ -1,18 +1,17 @@
 // The table [dds] of a configuration: whether a program communicates over DDS, and with whom.
 //
 //   enabled = false
-//   domain = 0                  ROS_DOMAIN_ID
-//   reach = "loopback"          who can discover us: "loopback" (programs of this machine that search the loopback interface), "host" (all
-//                               programs of this machine), "network"
-//   peers = ["192.0.2.7"]       machines to contact by address, where multicast does not reach them; only for reach = "network"
-//   config = "own"              or "environment": CYCLONEDDS_URI configures DDS
-//   namespace = "flappy"        gives /flappy/pose and so on; /flappy_1/pose for the second watched flapper
-//   watch = [0]                 numbers of the flappers that are published
-//   pace = 1.0                  for flappy-fly: simulated time over real time; 0: as fast as possible
-//   commands = false            whether commands from others are accepted
-//   insecure = false            whether to accept commands over a network without `keys`
-//   keys = "folder"             folder for DDS Security: identity_ca.cert.pem, cert.pem, key.pem, permissions_ca.cert.pem, governance.p7s,
-//                               permissions.p7s, like an enclave of ROS 2
+//   domain = 0              ROS_DOMAIN_ID
+//   reach = "loopback"      who discovers us: "loopback" (programs here that search it), "host" (all here), "network"
+//   peers = ["192.0.2.7"]   machines to contact by address, where multicast does not reach them; only for "network"
+//   config = "own"          or "environment": CYCLONEDDS_URI configures DDS
+//   namespace = "flappy"    gives /flappy/pose and so on; /flappy_1/pose for the second watched flapper
+//   watch = [0]             numbers of the flappers that are published
+//   pace = 1.0              for flappy-fly: simulated time over real time; 0: as fast as possible
+//   commands = false        whether commands from others are accepted
+//   insecure = false        whether to accept commands over a network without `keys`
+//   keys = "folder"         for DDS Security, like an enclave of ROS 2: identity_ca.cert.pem, cert.pem, key.pem,
+//                           permissions_ca.cert.pem, governance.p7s, permissions.p7s
 #pragma once
 
 #include <cstdint>

@@ -10,8 +10,7 @@
 
 namespace flappy::io {
 
-/// An error of the user. what() is the whole line to print on stderr before exiting with 2;
-/// control characters in it are shown as \xNN.
+/// An error of the user. what() is the line to print on stderr before exiting with 2, with control characters as \xNN.
 class InputError : public std::runtime_error {
  public:
   explicit InputError(std::string_view line);
@@ -26,7 +25,6 @@ std::string in_another_unit(std::string_view wrong, const std::vector<std::strin
 /// `; did you mean "x"?` with the nearest name; empty where there is none.
 std::string did_you_mean(std::string_view wrong, const std::vector<std::string>& names);
 
-/// Joins words to "a, b, c".
 std::string joined(const std::vector<std::string>& words, std::string_view between = ", ");
 
 /// A number with the shortest digits that read back as the same double.
@@ -35,8 +33,8 @@ std::string shortest_digits(double value);
 /// The bytes of a file. Throws InputError where it cannot be read.
 std::string read_text(const std::filesystem::path& path);
 
-/// A file that appears under its name only when it is complete: written to a temporary file in the same folder, then renamed. Throws InputError
-/// where it cannot be written, or where something other than a regular file has its name.
+/// A file that appears under its name only when it is complete: written to a temporary file in its folder, then
+/// renamed. Throws InputError where it cannot be written, or where something other than a regular file has its name.
 class AtomicFile {
  public:
   explicit AtomicFile(std::filesystem::path path);
@@ -46,8 +44,7 @@ class AtomicFile {
   AtomicFile& operator=(const AtomicFile&) = delete;
 
   void write(std::string_view text);
-  /// Flushes to the disk and renames; call it once, last. The new name survives a power failure only after
-  /// sync_folder().
+  /// Flushes to the disk and renames; call it once, last. The name survives a power failure only after sync_folder().
   void commit();
 
  private:
@@ -64,8 +61,7 @@ void make_folder(const std::filesystem::path& folder);
 /// Flushes a folder to the disk, so that the names of its files survive a power failure.
 void sync_folder(const std::filesystem::path& folder);
 
-/// Call it before long work, so that the work is not lost: throws InputError where `path` cannot be written, or is one of
-/// `inputs` under any name.
+/// Call it before long work: throws InputError where `path` cannot be written, or is one of `inputs` under any name.
 void check_output(const std::filesystem::path& path, const std::vector<std::filesystem::path>& inputs = {});
 
 void write_atomically(const std::filesystem::path& path, std::string_view text);

@@ -9,8 +9,8 @@ namespace flappy::io {
 /// The path of `name` below the parent folder of the running program's bin/.
 std::filesystem::path beside_program(const std::filesystem::path& name);
 
-/// The folder of the project's configurations: the value of the environment variable FLAPPY_CONFIGS, else
-/// share/flappy/configs of an installation, else configs/ next to the library that holds this code, else that of the source folder.
+/// The folder of the project's configurations: $FLAPPY_CONFIGS, else share/flappy/configs of an installation, else
+/// configs/ next to the library that holds this code, else that of the source folder.
 std::filesystem::path configs_folder();
 
 /// The path of one of these configurations, for example "vehicles/hummingbird_nominal.toml".

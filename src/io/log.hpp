@@ -1,5 +1,4 @@
-// The log of a program: messages on stderr from a chosen level on, and in log.txt of its output folder. Lines of
-// log.txt carry the time of day and are outside the determinism contract.
+// Messages on stderr from a chosen level on, and in log.txt, whose times of day are outside the determinism contract.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +10,8 @@ namespace flappy::io {
 
 enum class LogLevel { debug, info, warning, error };
 
-/// Call it once, before anything is logged. `on_stderr`: lowest level that stderr shows (until then warning; log.txt has at least info).
-/// `heading`: first line of each log.txt.
+/// Call it once, before anything is logged. `on_stderr`: lowest level that stderr shows (until then warning; log.txt
+/// has at least info). `heading`: first line of each log.txt.
 void start_log(LogLevel on_stderr, const std::string& heading);
 /// From now on also appends all messages to `folder`/log.txt. Throws InputError where it cannot be written.
 void log_into(const std::filesystem::path& folder);

@@ -1,5 +1,5 @@
-// A loop runs as OpenMP tasks: the caller and each helper work through a stretch of jobs of their own, then take jobs from the other stretches. The
-// caller waits only for helpers that have begun, so a helper that gets no processor delays nobody.
+// A loop runs as OpenMP tasks: the caller and each helper work through a stretch of jobs, then take jobs from the
+// others. The caller waits only for helpers that have begun, so a helper that gets no processor delays nobody.
 #include "io/parallel.hpp"
 
 #include <omp.h>
@@ -42,8 +42,7 @@ class At {
 };
 
 struct Loop {
-  /// Jobs from `next` to before `end`. Its own thread takes jobs from the front, and so do threads that have finished
-  /// their own stretch.
+  /// From `next` to before `end`. Its own thread, and threads that have finished their own, take jobs from the front.
   struct alignas(64) Stretch {
     std::atomic<std::size_t> next;
     std::size_t end;
@@ -85,7 +84,6 @@ struct Loop {
   std::exception_ptr failed;
 };
 
-/// Runs a loop jointly with the other threads of the parallel region.
 void share(Loop& loop) {
 #pragma omp taskgroup
   {
@@ -97,9 +95,9 @@ void share(Loop& loop) {
   }
 }
 
-/// GNU's OpenMP threads spin for milliseconds before they sleep, which takes processors from other programs. They spin for microseconds only where
-/// there are more threads than processors, so this starts that many threads, which sleep forever. (Setting the environment variable might come too
-/// late, as in Python, where libgomp may have read it before.) https://gcc.gnu.org/onlinedocs/libgomp/GOMP_005fSPINCOUNT.html
+/// GNU's OpenMP threads spin for milliseconds before they sleep, which takes processors from other programs; only for
+/// microseconds where there are more threads than processors. So this starts that many, which sleep forever. (The
+/// environment variable may come too late.) https://gcc.gnu.org/onlinedocs/libgomp/GOMP_005fSPINCOUNT.html
 void let_waiting_threads_sleep() {
   static std::once_flag once;
   std::call_once(once, [] {

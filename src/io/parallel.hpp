@@ -1,5 +1,4 @@
-// The only parallel loop of the project. Its jobs share no data, so results depend neither on the number of threads nor on other
-// programs that use the processors.
+// The only parallel loop of the project. Its jobs share no data, so results do not depend on the number of threads.
 #pragma once
 
 #include <concepts>
@@ -8,16 +7,13 @@
 
 namespace flappy::io {
 
-/// The number of processors that this process may use: limited by its affinity mask, by its control group, and by its share of
-/// the machine after share_processors().
+/// The processors that this process may use, by its affinity mask, its control group and share_processors().
 int processors();
 /// Tells processors() that `processes` such processes share the machine.
 void share_processors(int processes);
-/// The processors that the control group of a process allows, from `membership` (the kernel's /proc/self/cgroup) and the
-/// files below `root`; 0 where there is no limit.
+/// The limit of a process's control group, from `membership` (/proc/self/cgroup) and the files below `root`; 0: none.
 int processors_of_group(const std::filesystem::path& membership, const std::filesystem::path& root);
 
-/// `threads`, or the number of processors where it is 0.
 inline int thread_count(int threads) { return threads > 0 ? threads : processors(); }
 
 namespace detail {
@@ -26,15 +22,15 @@ void parallel_for(std::size_t count, int threads, const void* job, Call call);
 void together(int threads, const void* body, void (*call)(const void*));
 }  // namespace detail
 
-/// Calls body() on this thread. All parallel loops in it use one team of at most `threads` threads, which is kept between the loops.
+/// Calls body() on this thread. All parallel loops in it use one team of at most `threads` threads.
 template <class Body>
 void together(int threads, const Body& body) {
   detail::together(threads, &body, [](const void* it) { (*static_cast<const Body*>(it))(); });
 }
 
-/// Calls job(i) or job(i, thread) for every i below `count`, on at most `threads` threads (0: one for each processor). Threads
-/// are numbered from 0, the caller. If calls throw, the others still run, and the exception of the lowest index is
-/// rethrown. A loop inside a job, or while another thread runs a loop, runs on its caller alone.
+/// Calls job(i) or job(i, thread) for every i below `count`, on at most `threads` threads (0: one for each processor);
+/// thread 0 is the caller. If calls throw, the others still run, and the exception of the lowest index is rethrown. A
+/// loop inside a job, or while another thread runs a loop, runs on its caller alone.
 template <class Job>
 void parallel_for(std::size_t count, int threads, const Job& job) {
   detail::parallel_for(count, threads, &job, [](const void* it, std::size_t i, int thread) {

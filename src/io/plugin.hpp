@@ -7,7 +7,7 @@ namespace flappy::io {
 
 /// Whether this build or installation has the plugin lib/flappy/`name`.so.
 bool has_plugin(const std::string& name);
-/// The address that the plugin exports as `symbol`; it is never unloaded. Throws InputError: `missing` where there is no plugin, else the reason.
+/// The address of `symbol` in a plugin, which is never unloaded. InputError: `missing` without one, else the reason.
 const void* plugin_symbol(const std::string& name, const char* symbol, const std::string& missing);
 
 template <class Functions>

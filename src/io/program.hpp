@@ -1,4 +1,4 @@
-// Features that every program shares: --version, --json FILE, --progress FILE, --log-level, one line for each error of the user, exit codes.
+// What every program shares: --version, --json, --progress, --log-level, one line for each user error, exit codes.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,7 @@ namespace flappy::io {
 
 /// The commit that this program was built from, with "-dirty" where the source tree had changes.
 std::string commit();
-/// A hash as 16 hexadecimal digits, as results show it.
-std::string hexadecimal(std::uint64_t value);
+std::string hexadecimal(std::uint64_t value);  ///< 16 digits
 
 /// The last line of a program's output: the command that shows the results at `path`.
 std::string shown_by(const std::string& path);
@@ -29,16 +28,13 @@ class Program {
   ~Program();
 
   Command app() { return Command(app_.get()); }
-  /// Parses the command line, then runs `job`. Returns the exit code: 0 done; 2 error of the user, one line on stderr;
-  /// 1 fault of the program.
+  /// Parses, then runs `job`. Returns the exit code: 0 done; 1 our fault; 2 error of the user, one line on stderr.
   int run(int argc, char** argv, const std::function<void()>& job);
-  /// Allows several ranks to run the program jointly: adds --allow-network, lets only rank 0 print, and divides the
-  /// processors.
+  /// Allows several ranks: adds --allow-network, lets only rank 0 print, and divides the processors.
   void takes_ranks();
   /// The ranks; null where there is only one process. The first call meets the other ranks, with `agreed` as in meet().
   Ranks* ranks(const std::string& agreed);
-  /// Whether this rank writes the common results.
-  bool writes() const { return rank_.rank == 0; }
+  bool writes() const { return rank_.rank == 0; }  ///< the common results
   /// Writes `result` to the file of --json; does nothing without that option.
   void write_json(const nlohmann::ordered_json& result) const;
   /// write_json() for results that flappy-report shows; prints that command.

@@ -13,17 +13,15 @@ namespace flappy::io {
 /// From now on the first Ctrl-C (or SIGTERM) makes interrupted() true, the second ends the program.
 void stop_on_interrupt();
 bool interrupted();
-/// Resets interrupted(), for a process that goes on.
 void forget_interrupt();
 
-/// Estimates the remaining time as (1 - done) / rate. The rate is that of the last 20 s, or of the last
-/// three advances where those took longer.
+/// Estimates the remaining time as (1 - done) / rate, with the rate of the last 20 s, or of the last three advances if
+/// those took longer.
 class TimeLeft {
  public:
   /// `done`: 0 to 1; `now_s` must not decrease. A smaller `done` than before starts the estimate anew.
   void add(double now_s, double done);
-  /// Returns nothing before three advances.
-  std::optional<double> seconds(double now_s) const;
+  std::optional<double> seconds(double now_s) const;  ///< nothing before three advances
 
  private:
   struct Point {
@@ -33,8 +31,7 @@ class TimeLeft {
   double done_ = 0;
 };
 
-/// Seconds of a monotonic clock with an arbitrary origin.
-double steady_seconds();
+double steady_seconds();  ///< monotonic, with an arbitrary origin
 /// Sleeps until a time of steady_seconds(); returns early upon an interrupt.
 void sleep_until(double steady_s);
 
@@ -48,8 +45,7 @@ class ProgressLine {
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
 
-  /// Whether show() would write now.
-  bool due() const;
+  bool due() const;  ///< whether show() would write now
   /// `done`: 0 to 1. `more` is appended after the time left.
   void show(double done, const std::string& more = "");
   /// Clears the line; call it before printing anything else on stdout.
@@ -67,11 +63,10 @@ class ProgressLine {
   bool visible_ = false;
 };
 
-/// Clears the progress line that is visible, if any.
 void clear_progress();
-/// Progress lines made from now on are also written to `file`, at most once a second: {"share": 0.43, "message": "flown 43 %, 12 s left"}.
+/// Later progress lines also go to `file`, at most once a second: {"share": 0.43, "message": "flown 43 %, 12 s left"}.
 void write_progress(const std::filesystem::path& file);
-/// Progress lines made from now on show nothing, because another process shows the progress.
+/// Later progress lines show nothing, because another process shows the progress.
 void silence_progress();
 
 }  // namespace flappy::io

@@ -1,5 +1,5 @@
-// Ranks: several processes that do one piece of work jointly and exchange data. All run the same code on different shares, and an exchange gives
-// all of them the same data. The launcher tells a process its rank: torchrun (RANK, WORLD_SIZE), Open MPI's mpirun (OMPI_COMM_WORLD_RANK,
+// Ranks: processes that do one piece of work jointly: the same code on different shares; an exchange gives all the same
+// data. The launcher tells a process its rank: torchrun (RANK, WORLD_SIZE), Open MPI's mpirun (OMPI_COMM_WORLD_RANK,
 // OMPI_COMM_WORLD_SIZE) or Slurm's srun (SLURM_PROCID, SLURM_STEP_NUM_TASKS), tried in this order.
 #pragma once
 
@@ -18,12 +18,11 @@ struct Rank {
   int port = 29500;                   ///< MASTER_PORT
 };
 
-/// The rank of this process; rank 0 of 1 without a launcher. Throws InputError for variables that are missing, not numbers or out of range, and
-/// where MASTER_ADDR is missing although the ranks run on several machines.
+/// The rank of this process; rank 0 of 1 without a launcher. Throws InputError for variables that are missing, not
+/// numbers or out of range, and where MASTER_ADDR is missing although the ranks run on several machines.
 Rank this_rank();
 
-/// Whether an address is a loopback address: localhost, 127.x.x.x, ::1.
-bool is_loopback(const std::string& address);
+bool is_loopback(const std::string& address);  ///< localhost, 127.x.x.x, ::1
 
 /// Exit code of a process that ends because another rank is lost. Start the program again, or resume it.
 inline constexpr int kRankLost = 75;
@@ -40,10 +39,8 @@ class Ranks {
     double seconds = 0, bytes = 0;
   };
   virtual Costs costs() const = 0;
-  /// Waits until all ranks have called it.
-  void wait();
-  /// Whether `here` is true on any rank.
-  bool any(bool here);
+  void wait();          ///< until all ranks have called it
+  bool any(bool here);  ///< whether it is true on any rank
   /// Tells the other ranks that this one ends with an error, which it has reported; they end, too.
   virtual void leave() = 0;
   /// Every rank calls it last: a rank that ends without it counts as lost.
@@ -77,14 +74,12 @@ inline void wait(Ranks* ranks) {
 }
 inline bool any(Ranks* ranks, bool here) { return ranks == nullptr ? here : ranks->any(here); }
 
-/// Meets the other ranks at rank.address and port rank.port + 1, because the launcher may use the port itself. The
-/// rendezvous listens on every interface of rank 0's machine, whatever the address, and does not authenticate anybody.
-/// When a rank is lost later, this process ends with one line and exit code kRankLost. Throws InputError where the address is
-/// not loopback without `allow_network`, a port is in use, rank 0 cannot be reached, this build has no LibTorch, or `agreed` (lines
-/// of "what: value") differs between ranks.
+/// Meets the other ranks at rank.address and port rank.port + 1, because the launcher may use the port itself. Rank 0
+/// listens on every interface and authenticates nobody. When a rank is lost later, this process ends with one line and
+/// exit code kRankLost. Throws InputError where the address is not loopback without `allow_network`, a port is in use,
+/// rank 0 cannot be reached, this build has no LibTorch, or `agreed` (lines of "what: value") differs.
 std::unique_ptr<Ranks> meet(const Rank& rank, bool allow_network, const std::string& agreed);
 
-/// The functions of the plugin.
 struct RanksFunctions {
   std::unique_ptr<Ranks> (*meet)(const Rank& rank);
 };

@@ -1,4 +1,4 @@
-// Renamed keys of configuration files. For one release, a file with an old key is refused with a message that gives the new one.
+// Renamed keys of configuration files. For one release, an old key is refused with a message that gives the new one.
 #pragma once
 
 #include <string_view>
@@ -18,8 +18,7 @@ inline constexpr std::pair<std::string_view, const char*> kRenamedKeys[] = {
     {"entry_freedom", "effect_freedom"},
 };
 
-/// The new name of a key; null where it was not renamed.
-inline const char* new_name(std::string_view key) {
+inline const char* new_name(std::string_view key) {  ///< null: not renamed
   for (const auto& [old_key, now] : kRenamedKeys)
     if (old_key == key) return now;
   return nullptr;

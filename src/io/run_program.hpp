@@ -12,11 +12,10 @@ struct Finished {
   std::string out, err;
   double peak_bytes;  ///< peak memory
 };
-/// Runs a program (found along PATH, no shell) with `input` on its stdin. Throws std::system_error where it cannot be started.
+/// Runs a program (along PATH, no shell) with `input` on stdin. Throws std::system_error where it cannot be started.
 Finished run(const std::vector<std::string>& command, std::string_view input = {});
 
-/// Runs a program as run() does and returns its stdout. Throws InputError "result: is not written: ..." where the program is missing
-/// or fails; `result` names what the output is for.
+/// run() for its stdout. Throws InputError "result: is not written: ..." where the program is missing or fails.
 std::string run_program(const std::vector<std::string>& command, std::string_view input, const std::string& result);
 
 }  // namespace flappy::io

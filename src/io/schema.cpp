@@ -9,8 +9,7 @@ namespace flappy::io {
 std::string other_schema(std::int64_t given, std::int64_t read, const std::string& commit) {
   const std::string number = std::to_string(given);
   if (!commit.empty()) return number + " is read by flappy at commit " + commit + ", which wrote it";
-  // Every format is still at its first schema. Whoever raises one must name here the last commit that read the schema
-  // before.
+  // Every format is at its first schema. Whoever raises one must name here the last commit that read the schema before.
   return number + (given > read ? " is read by a newer flappy than this one" : " is read by no flappy");
 }
 

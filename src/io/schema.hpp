@@ -9,8 +9,7 @@
 
 namespace flappy::io {
 
-/// Describes a schema that this program does not read: "2 is read by a newer flappy than this one". `commit`: the commit of the program
-/// that wrote the file, or empty.
+/// Why a schema is not read: "2 is read by a newer flappy than this one". `commit`: that of the writer, or empty.
 std::string other_schema(std::int64_t given, std::int64_t read, const std::string& commit = "");
 
 /// "; flappy at commit X wrote it, and reads it"; empty where this program is of that commit or the commit is unknown.

@@ -11,7 +11,6 @@ namespace flappy::io {
 /// SHA-256 as 64 lower-case hexadecimal digits.
 std::string sha256(std::string_view bytes);
 
-/// SHA-256 of bytes that come in pieces.
 class Sha256 {
  public:
   Sha256();
@@ -20,8 +19,7 @@ class Sha256 {
   Sha256& operator=(const Sha256&) = delete;
 
   void add(std::string_view bytes);
-  /// Call it once, last.
-  std::string digits();
+  std::string digits();  ///< call it once, last
 
  private:
   evp_md_ctx_st* context_;

@@ -1,5 +1,4 @@
-// Statistics of samples, and tails of distributions. Samples may hold infinities but not NaN; a statistic of an empty sample is
-// NaN.
+// Statistics of samples, which may hold infinities but not NaN (NaN for an empty sample), and tails of distributions.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +7,7 @@
 
 namespace flappy::io {
 
-/// The 97.5 % quantile of the standard normal distribution: half the width of a 95 % interval, in standard deviations.
+/// The 97.5 % quantile of the standard normal distribution: half a 95 % interval, in standard deviations.
 inline constexpr double kNormal975 = 1.959963984540054;
 
 struct Interval {
@@ -30,12 +29,9 @@ double upper_median(std::vector<double> sample);
 /// 95 % interval of a probability after `successes` in `count` trials (Wilson, J. Am. Stat. Assoc. 22, 1927).
 Interval wilson_interval(std::size_t successes, std::size_t count);
 
-/// P(|T| > |t|) for Student's t.
-double t_tail(double t, double freedom);
-/// P(F > f) for the F distribution.
-double f_tail(double f, double above, double below);
-/// P(X > x) for chi squared; chi2_quantile is the x with P(X < x) = share.
-double chi2_tail(double x, double freedom);
-double chi2_quantile(double share, double freedom);
+double t_tail(double t, double freedom);              ///< P(|T| > |t|), Student
+double f_tail(double f, double above, double below);  ///< P(F > f)
+double chi2_tail(double x, double freedom);           ///< P(X > x)
+double chi2_quantile(double share, double freedom);   ///< the x with P(X < x) = share
 
 }  // namespace flappy::io

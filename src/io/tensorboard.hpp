@@ -16,7 +16,6 @@ namespace flappy::io {
 /// CRC-32C (Castagnoli), RFC 3720.
 std::uint32_t crc32c(std::string_view bytes);
 
-/// The frame that begins an event file.
 std::string event_file_start(double wall_s);
 
 /// The frame of one event with a scalar for each tag; leaves out values that are not finite. `wall_s` is Unix time.

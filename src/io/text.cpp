@@ -6,7 +6,7 @@
 namespace flappy::io {
 namespace {
 
-/// Size in bytes of the UTF-8 character (RFC 3629) at the beginning of `text`; 0 for a control character or invalid UTF-8.
+/// Bytes of the UTF-8 character (RFC 3629) that begins `text`; 0 for a control character or invalid UTF-8.
 std::size_t character_size(std::string_view text) {
   const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
   const unsigned first = byte(0), second = byte(1);

@@ -6,10 +6,9 @@
 
 namespace flappy::io {
 
-/// printf to a string of any length.
 [[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...);
 
-/// Replaces control characters and bytes that are not UTF-8 by \xNN, so that contents of foreign files can be shown and written as JSON.
+/// Replaces control characters and bytes that are not UTF-8 by \xNN, to show foreign text and write it as JSON.
 std::string printable(std::string_view text);
 
 /// printable() of at most `limit` bytes, with "..." where the text was cut.

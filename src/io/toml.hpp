@@ -1,6 +1,6 @@
-// toml++ 3.3, for the files of this folder only. For some texts it reaches code that it marks as unreachable or asserts not to reach, and that
-// would work without the marks (its issues 190 and 295). Replacing these macros requires its header-only form. Include it
-// through this file only, so that every file sees the same code.
+// toml++ 3.3; this folder includes it through this file only, so that every file sees the same code. For some texts it
+// reaches code that it marks as unreachable or asserts not to reach, and that would work without the marks (its issues
+// 190 and 295). Replacing these macros requires its header-only form.
 #pragma once
 
 #include <string>

@@ -9,11 +9,9 @@ namespace flappy::io {
 /// A string in double quotes, escaped; UTF-8 stays as it is.
 std::string toml_string(std::string_view text);
 
-/// A floating-point number with the shortest digits that read back as the same double.
-std::string toml_number(double value);
+std::string toml_number(double value);  ///< shortest digits that read back as the same double
 
-/// Whether a key can be written without quotes.
-bool is_bare(std::string_view key);
+bool is_bare(std::string_view key);  ///< whether it needs no quotes
 
 /// The dotted path of a key below `path`, quoted where necessary.
 std::string toml_path(const std::string& path, std::string_view key);

@@ -1,4 +1,4 @@
-// Checkpoints of a training run: named sections of bytes in one file, which is refused unless it is complete and undamaged.
+// Checkpoints of a training run: named sections of bytes in one file, refused unless complete and undamaged.
 //
 //     flappy checkpoint 1\n
 //     the bytes of the sections in order
@@ -24,19 +24,17 @@
 
 namespace flappy::learn {
 
-/// Origin of a checkpoint. A run can be resumed only if config_sha256 is that of its configuration; the rest is
-/// information.
+/// A run can be resumed only if config_sha256 is that of its configuration; the rest is information.
 struct CheckpointHeader {
   std::uint64_t update = 0;
-  std::string config_sha256;    ///< SHA-256 of the resolved configuration
-  std::string processor;        ///< type of the processor, as in /proc/cpuinfo
-  std::string instruction_set;  ///< instruction set of the kernels
-  std::string commit;           ///< commit of the program
+  std::string config_sha256;    ///< of the resolved configuration
+  std::string processor;        ///< as in /proc/cpuinfo
+  std::string instruction_set;  ///< of the kernels
+  std::string commit;           ///< of the program
   double wall_s = 0;            ///< wall-clock time of the training so far
 };
 
-/// Types without padding, because the values of padding bytes differ between runs. Store a padding-free struct of
-/// floats through std::as_bytes.
+/// Types without padding, whose bytes differ between runs. Store padding-free structs of floats by std::as_bytes.
 template <class T>
 concept Plain = std::is_arithmetic_v<T> || std::is_enum_v<T> ||
     (std::is_trivially_copyable_v<T>&& std::has_unique_object_representations_v<T>);
@@ -45,20 +43,18 @@ template <class V>
 concept PlainRange = std::ranges::contiguous_range<V> && std::ranges::sized_range<V> &&
     Plain<std::ranges::range_value_t<V>> && !std::is_array_v<std::remove_cvref_t<V>>;
 
-/// Position of a section in its file, in bytes.
 struct CheckpointSection {
   std::string name, sha256;
-  std::uint64_t offset = 0, size = 0;
+  std::uint64_t offset = 0, size = 0;  ///< in the file, bytes
 };
 
-/// Writes one checkpoint. The file appears under its name on commit(); without commit() no file is left, and an older
-/// file of that name stays. Throws io::InputError if writing fails.
+/// Writes one checkpoint. The file appears on commit(); without it, no file is left, and an older one of that name
+/// stays. Throws io::InputError if writing fails.
 class CheckpointWriter {
  public:
   CheckpointWriter(const std::filesystem::path& path, CheckpointHeader header);
 
-  /// Stores a number, or a vector, span, array or string of numbers, under a unique name. Writes at once and keeps no
-  /// copy.
+  /// Stores numbers (one, vector, span, array, string) under a unique name. Writes at once and keeps no copy.
   template <class V>
   requires PlainRange<V> || Plain<V>
   void put(std::string_view name, const V& value) {
@@ -81,14 +77,12 @@ class CheckpointWriter {
 /// A checkpoint for reading; the constructor has checked the whole file.
 class Checkpoint {
  public:
-  /// Throws io::InputError, with file and reason, if the file is no checkpoint, of another schema, truncated or
-  /// damaged.
+  /// Throws io::InputError, with file and reason, if it is no checkpoint, of another schema, truncated or damaged.
   explicit Checkpoint(std::filesystem::path path);
 
   const std::filesystem::path& path() const { return path_; }
   const CheckpointHeader& header() const { return header_; }
-  /// SHA-256 over names, sizes and contents of the sections in order of names, without the header: equal for equal
-  /// states of training.
+  /// SHA-256 over the sections' names, sizes, contents, in order of names: equal for equal states of training.
   const std::string& payload_sha256() const { return payload_sha256_; }
   bool has(std::string_view name) const;
 
@@ -123,8 +117,8 @@ std::vector<std::filesystem::path> checkpoints_in(const std::filesystem::path& r
 /// Removes all but the `count` newest checkpoints.
 void keep_newest(const std::filesystem::path& run, std::size_t count);
 
-/// The newest checkpoint of a run folder. Throws io::InputError if there is none, or if it is damaged; the message then
-/// names an earlier good checkpoint and how to resume from it. A damaged checkpoint is never skipped silently.
+/// The newest checkpoint of a run folder. Throws io::InputError if there is none, or if it is damaged, naming an
+/// earlier good one and how to resume from it. A damaged checkpoint is never skipped silently.
 Checkpoint newest_checkpoint(const std::filesystem::path& run);
 
 }  // namespace flappy::learn

@@ -45,8 +45,7 @@ Collector::Collector(const TrainConfig& config, io::Ranks* ranks)
   for (std::size_t i = 0; i < fleet_.size(); ++i) start(i);
 }
 
-/// Starts the next episode of a flapper: from a random snapshot of pool_, or with the episode's vehicle if there is no
-/// pool.
+/// Starts the next episode: from a random snapshot of pool_, or with the episode's vehicle if there is no pool.
 void Collector::start(std::size_t i) {
   Pending& p = pending_[i];
   ++p.episode;
@@ -111,8 +110,8 @@ void Collector::gather(std::size_t i, std::size_t item) {
   std::copy_n(next, inputs_, observation(i, p.count));
 }
 
-/// Emits the transition of the oldest of n pending actions: its n-step return, the sum over k < n of discount^k r_k,
-/// and the weight discount^n of the value of the present observation, 0 if the episode terminated.
+/// Emits the transition of the oldest of n pending actions: its return, sum over k < n of discount^k r_k, and the
+/// weight of the present observation's value: discount^n, 0 if the episode terminated.
 void Collector::emit(std::size_t i, std::size_t item, const float* next, bool terminated) {
   Pending& p = pending_[i];
   const auto discount = static_cast<float>(config_.discount);

@@ -1,6 +1,6 @@
-// Flies episodes of many flappers and collects their transitions for the learner. One step is one action of every flapper. Its blocks
-// may be flown on any thread, while a learner works. Transitions of a step enter the replay memory only in end(). With several
-// ranks, each flies its share of the blocks, and every rank's memory gets the transitions of all.
+// Flies episodes of many flappers and collects transitions. A step is one action of every flapper. Its blocks may be
+// flown on any thread, while a learner works. Transitions enter the replay memory only in end(). Each rank flies its
+// share of the blocks; every rank's memory gets all transitions.
 #pragma once
 
 #include "flight/fleet.hpp"
@@ -10,8 +10,7 @@
 
 namespace flappy::learn {
 
-/// Sums over the episodes that ended since the last take_sums(): count, returns, and counts of captures, hand-backs and
-/// terminations.
+/// Sums over the episodes since the last take_sums(): count, returns, captures, hand-backs, terminations.
 struct EpisodeSums {
   double episodes = 0, returns = 0, captured = 0, handed_back = 0, terminated = 0;
 };

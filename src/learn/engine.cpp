@@ -50,8 +50,7 @@ class LanesEngine : public LearnerEngine {
 
 constexpr const char* kPlugin = "torch_learner";
 
-/// Engine on LibTorch, with the same samples and noise as the lanes. The update is one item of a parallel loop: one
-/// thread does it, and the others do the work `beside`.
+/// Draws the lanes' samples and noise. One item of a parallel loop is the update; other threads do the work `beside`.
 class TorchEngine : public LearnerEngine {
  public:
   explicit TorchEngine(const LearnerOptions& o)

@@ -1,6 +1,6 @@
-// Interface of the learner, with two implementations: our own lanes (learn/lanes), and LibTorch (learn/torch, a plugin that is loaded
-// on demand, because LibTorch takes half a second to start). Both implement the algorithm of learner.hpp with the same options, initial
-// weights, samples and noise; their results differ only by rounding.
+// Interface of the learner, implemented by our lanes (learn/lanes) and by LibTorch (learn/torch, a plugin loaded on
+// demand, because LibTorch takes half a second to start). Both run learner.hpp's algorithm with the same options,
+// initial weights, samples and noise; results differ only by rounding.
 #pragma once
 
 #include <memory>
@@ -18,8 +18,8 @@ class LearnerEngine {
  public:
   virtual ~LearnerEngine() = default;
 
-  /// One gradient step at the given learning rates of Adam. The update's threads also do the work `beside`. Throws
-  /// std::invalid_argument if `replay` is empty or has another shape.
+  /// One step of Adam; its threads also do the work `beside`. Throws std::invalid_argument if `replay` is empty or has
+  /// another shape.
   virtual void update(const Replay& replay, double actor_rate, double critic_rate, const ParallelWork& beside) = 0;
   virtual const UpdateMetrics& metrics() const = 0;
 
@@ -30,9 +30,8 @@ class LearnerEngine {
   /// Actions for `count` observations: [count][observations] to [count][actions].
   virtual void act(const float* observations, std::size_t count, float* actions) const = 0;
 
-  /// State for checkpoints: the numbers of the networks (save, load) and the counters. An engine can load only numbers
-  /// that the same kind of engine saved. load() throws std::invalid_argument if their count is wrong or one of them is
-  /// not finite.
+  /// State for checkpoints: the networks' numbers and the counters. An engine loads only numbers that its kind saved.
+  /// load() throws std::invalid_argument for a wrong count or a number that is not finite.
   virtual std::vector<float> save() const = 0;
   virtual void load(std::span<const float> numbers) = 0;
   virtual LearnerCounters& counters() = 0;
@@ -42,10 +41,8 @@ class LearnerEngine {
   virtual std::string describe() const = 0;
 };
 
-/// Throws std::invalid_argument as Learner's constructor does, and io::InputError for EngineKind::libtorch in a build
-/// without LibTorch.
+/// Throws std::invalid_argument as Learner does; io::InputError for libtorch in a build without LibTorch.
 std::unique_ptr<LearnerEngine> make_engine(EngineKind kind, const LearnerOptions& options);
-/// Whether this build has the LibTorch plugin.
 bool has_libtorch();
 
 }  // namespace flappy::learn

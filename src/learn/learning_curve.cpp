@@ -39,8 +39,7 @@ double interquartile_mean(std::vector<double> values) {
 }
 
 io::Interval bootstrap_interval(std::span<const double> values) {
-  // no std::uniform_int_distribution: the C++ standard fixes the generator's numbers, but not the algorithms of
-  // distributions
+  // Not std::uniform_int_distribution: the standard fixes the generator's numbers, not the distributions'.
   std::mt19937_64 generator(1);  // NOLINT(bugprone-random-generator-seed,cert-msc51-cpp): to be reproducible
   std::vector<double> resample(values.size()), means(kResamples);
   for (double& each : means) {

@@ -12,7 +12,6 @@
 
 namespace flappy::learn {
 
-/// One evaluation of a run.
 struct CurvePoint {
   std::uint64_t update = 0;
   double wall_s = 0;
@@ -24,15 +23,13 @@ struct SeedCurve {
   std::vector<CurvePoint> points;
 };
 
-/// The evaluations of a run folder: its records that have a value in column `score`, with `wall_s` of timing.jsonl.
-/// Throws io::InputError as read_metrics() does.
+/// Reads the records with a value in column `score`, with `wall_s` of timing.jsonl. Throws as read_metrics().
 SeedCurve read_seed_curve(const std::filesystem::path& run, std::uint64_t seed, const std::string& score);
 
 /// Mean of the values without the lowest and the highest quarter (rounded down). Needs at least one value.
 double interquartile_mean(std::vector<double> values);
 
-/// 95 % percentile interval of the interquartile mean over 10,000 resamples of the values; the same bits on every
-/// machine.
+/// 95 % percentile interval of the interquartile mean over 10,000 resamples; the same bits on every machine.
 io::Interval bootstrap_interval(std::span<const double> values);
 
 struct CurveRow {
@@ -53,8 +50,7 @@ LearningCurve learning_curve(std::span<const SeedCurve> runs);
 /// Writes columns update, median_wall_s, mean, iqm, low, high, and seed_N for each seed.
 void write_curve_csv(const std::filesystem::path& path, const LearningCurve& curve);
 
-/// Draws interval, interquartile mean and seeds with gnuplot. The same version of gnuplot gives the same bytes.
-/// Throws io::InputError if gnuplot is missing or fails, or if the file cannot be written.
+/// Draws with gnuplot, whose version fixes the bytes. Throws io::InputError if it is missing, fails or cannot write.
 void write_curve_svg(const std::filesystem::path& path, const LearningCurve& curve, const std::string& score);
 
 }  // namespace flappy::learn

@@ -44,8 +44,7 @@ std::string csv_header(const std::vector<std::string>& names) {
 /// Length in bytes of the text's first line with its line end; 0 if there is no complete line.
 std::size_t line_size(std::string_view text) { return text.find('\n') + 1; }
 
-/// Length in bytes of the first headers + records pieces of a file. `piece_size` gives the length of a text's first
-/// piece.
+/// Length of the first headers + records pieces of a file; `piece_size`: of a text's first piece, in bytes.
 std::uint64_t kept_bytes(const std::filesystem::path& file, std::size_t (*piece_size)(std::string_view),
                          std::uint64_t records, std::uint64_t headers) {
   const std::string text = io::read_text(file);

@@ -1,5 +1,5 @@
 // Records of a training run, in its folder:
-//   metrics.jsonl, metrics.csv    one record per report, the same values in both; the same bytes for any number of threads and resumptions
+//   metrics.jsonl, metrics.csv    one record per report, the same bytes for any number of threads and resumptions
 //   timing.jsonl                  wall-clock times of the same reports
 //   events.out.tfevents.flappy    all values, for TensorBoard
 #pragma once
@@ -15,9 +15,8 @@
 
 namespace flappy::learn {
 
-/// Names of columns, fixed for a run. The first column is the step (update), by which TensorBoard and timing.jsonl
-/// order records. Values that only some reports have, as those of an evaluation, are columns that are empty in the
-/// others.
+/// Names of columns, fixed for a run. The first is the step (update), which orders records. Columns that only some
+/// reports have, as those of an evaluation, are empty in the others.
 struct MetricsColumns {
   std::vector<std::string> metrics, timing;
 };
@@ -25,16 +24,15 @@ struct MetricsColumns {
 /// Writer of the records. All functions throw io::InputError, with the file's name, if a file cannot be written.
 class Metrics {
  public:
-  /// Starts new files, or continues after the first `records` records, the count of sync() at a checkpoint; later
-  /// records are cut off. Throws io::InputError if a file holds fewer records or has other columns.
+  /// Starts new files, or continues after `records` records, sync()'s count at a checkpoint, and cuts off later ones.
+  /// Throws io::InputError if a file holds fewer records or has other columns.
   Metrics(const std::filesystem::path& run, const MetricsColumns& columns, std::uint64_t records = 0);
 
-  /// Appends a record, one value for each column. NaN and infinity mean "not available" (null, an empty cell, no
-  /// event). The record is handed to the operating system before it returns, so a killed program loses nothing.
+  /// Appends a record, one value per column; NaN and infinity: not available (null, empty cell, no event). The
+  /// operating system has it on return, so a killed program loses nothing.
   void record(std::span<const double> metrics, std::span<const double> timing);
 
-  /// Syncs all records to the disk and returns their number. Call it for each checkpoint, before
-  /// CheckpointWriter::commit().
+  /// Syncs to the disk; returns the number of records. Call for each checkpoint, before CheckpointWriter::commit().
   std::uint64_t sync();
 
  private:

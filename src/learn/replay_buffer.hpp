@@ -1,4 +1,4 @@
-// Replay memory: the newest transitions, one row of float each, so that a random sample reads from one place in memory.
+// Replay memory: the newest transitions, a row of float each, so that a sample reads one place in memory.
 #pragma once
 
 #include <cstddef>
@@ -11,12 +11,10 @@ namespace flappy::learn {
 /// Number of transitions that an update processes together; the batch is a multiple of it.
 inline constexpr std::size_t kChunk = 64;
 
-/// Number of elements of observation and action.
 struct TransitionShape {
-  int observation = 0, action = 0;
+  int observation = 0, action = 0;  ///< numbers of elements
 };
 
-/// One transition.
 struct Transition {
   const float *observation, *action, *next_observation;
   float reward;    ///< scaled, discounted sum over n steps
@@ -31,14 +29,14 @@ struct TransitionLayout {
 
 class Replay {
  public:
-  /// Allocates memory for `capacity` transitions at once. Throws std::invalid_argument for a capacity of 0 or above
-  /// 2^32 - 1, or for an observation or action without elements.
+  /// Allocates all memory at once. Throws std::invalid_argument for a capacity of 0 or above 2^32 - 1, or for an
+  /// observation or action without elements.
   Replay(const TransitionShape& shape, std::size_t capacity);
 
   /// Adds a transition. When the memory is full, it replaces the oldest one.
   void add(const Transition& transition);
-  /// add() in two steps, for many transitions: threads may call put() at the same time with different `ahead` (0 <=
-  /// ahead < capacity); then one thread calls advance() with their number. No thread may sample in between.
+  /// add() in two steps: threads put() at once with different `ahead` (0 <= ahead < capacity); then one calls advance()
+  /// with their number. No thread may sample in between.
   void put(std::size_t ahead, const Transition& transition);
   void advance(std::size_t count);
 
@@ -50,8 +48,8 @@ class Replay {
   std::size_t bytes() const { return rows_.size() * sizeof(float); }
   const float* row(std::size_t i) const { return &rows_[i * layout_.row]; }
 
-  /// Samples members `first` to `first + out.size() - 1` of an update's batch, as rows, uniformly among the rows held.
-  /// The result depends only on seed, update, number in the batch, and size(). `first` must be even.
+  /// Samples members `first` (even) to `first + out.size() - 1` of an update's batch, as rows, uniformly among those
+  /// held. Depends only on seed, update, number in the batch, and size().
   void sample(std::uint64_t seed, std::uint64_t update, std::size_t first, std::span<std::uint32_t> out) const;
 
   /// The rows held, for checkpoints.

@@ -1,4 +1,3 @@
-// Reading of a finished training run from its folder.
 #pragma once
 
 #include <filesystem>
@@ -13,8 +12,7 @@ struct FinishedRun {
   rollout::FlyConfig fly;  ///< resolved configuration, with the run's best actor
 };
 
-/// Throws io::InputError, one line, if `folder` is not a run, the run is not finished, or one of its files is changed,
-/// damaged or from another run.
+/// Throws io::InputError, one line, unless `folder` is a finished run whose files are its own and undamaged.
 FinishedRun read_finished_run(const std::filesystem::path& folder);
 
 }  // namespace flappy::learn

@@ -1,28 +1,28 @@
 // Configuration of a training run, as in configs/train/*.toml:
 //
 //   schema = 1
-//   fly = "file"            configuration of the flights: vehicles, task, sensors, controller; relative to this configuration's folder
+//   fly = "file"            configuration of the flights: vehicles, task, sensors, controller; relative to this file
 //   seed                    seed of weights, samples, noise and training vehicles; evaluation uses the seed of `fly`
 //   threads                 0: all
-//   [observation]           optional: part = [scale of each of its signals], instead of 2 / (high - low) of their ranges
+//   [observation]           optional: part = [scale of each of its signals], instead of 2 / (high - low) of their range
 //   [networks]              actor, critic: widths of hidden layers; activation = "relu" | "tanh" | "elu" | "silu";
-//                           layer_norm (before the activation; default false). elu, silu, layer_norm, and in [learn] weight_decay,
-//                           gradient_clip (largest norm of a gradient; 0: none) and device = "cpu" | "cuda" need libtorch
-//   [collect]               flappers, vehicles (number of settled vehicles from which episodes start), noise_low, noise_high,
-//                           noise_kept (correlation from action to action), steps_before (actions of each flapper before the first update)
+//                           layer_norm (before the activation; default false). Only in libtorch: elu, silu, layer_norm,
+//                           [learn] weight_decay, gradient_clip (largest norm; 0: none), device = "cpu" | "cuda"
+//   [collect]               flappers, vehicles (settled ones from which episodes start), noise_low, noise_high,
+//                           noise_kept (correlation from action to action), steps_before (actions of each flapper
+//                           before the first update)
 //   [reward]                scale, discount (per action), steps (n of the critics' n-step return)
-//   [learn]                 engine = "lanes" (default) | "libtorch", updates, updates_per_step, batch, actor_rate, critic_rate,
-//                           schedule = "line" (default) | "cosine": learning rates fall to last_rate, their share at the last update;
-//                           warm_up (updates in which the rates rise to their full value; default 0), actor_after (updates in which
-//                           only the critics learn, for an actor that can fly already; default 0), averaging (tau), twin,
-//                           policy_delay, target_noise, target_noise_clip, huber (0: squares), replay (transitions kept),
-//                           policy_averaging (weight of the actor in the policy's moving average; 1: the policy is the actor)
+//   [learn]                 engine = "lanes" (default) | "libtorch", updates, updates_per_step, batch, actor_rate,
+//                           critic_rate, schedule = "line" (default) | "cosine": rates fall to their share last_rate;
+//                           warm_up (updates in which rates rise; default 0), actor_after (updates in which only the
+//                           critics learn, for an actor that can fly; default 0), averaging (tau), twin, policy_delay,
+//                           target_noise, target_noise_clip, huber (0: squares), replay (transitions kept),
+//                           policy_averaging (weight of the actor in its moving average, the policy; 1: no averaging)
 //   [evaluate]              every (updates), vehicles
 //   [checkpoint]            every (updates), keep
 //
-// Updates are done in whole steps: every number of updates above is rounded up to a multiple of updates_per_step.
-//
-// Overrides of other keys, as "task.reward.goal=1", apply to the configuration `fly`.
+// Every number of updates above is rounded up to a multiple of updates_per_step. Overrides of other keys, as
+// "task.reward.goal=1", apply to `fly`.
 #pragma once
 
 #include "learn/engine.hpp"
@@ -49,8 +49,7 @@ struct TrainConfig {
   std::uint64_t evaluate_every = 0, checkpoint_every = 0;
   std::size_t evaluate_vehicles = 0, keep = 2;
 
-  /// Resolved texts of the files by file name, as FlyConfig::resolved; train.toml names fly.toml, which names the run's
-  /// policy as its actor.
+  /// Texts of the files by name, as FlyConfig::resolved: train.toml names fly.toml, which names the actor.
   std::map<std::string, std::string> resolved;
   std::string sha256;  ///< SHA-256 of all of them without the number of threads
 

@@ -132,8 +132,7 @@ class Trainer {
     return options;
   }
   bool writes() const { return io::writes(ranks_); }
-  /// One action of every flapper and, in parallel, the updates of this step. False: a rank wants this step to be the
-  /// last.
+  /// One action of every flapper and, in parallel, the step's updates. False: a rank wants this to be the last step.
   bool step() {
     const auto from = Clock::now();
     io::together(config_.threads, [&] { fly_and_learn(); });
@@ -329,8 +328,7 @@ class Trainer {
     payload_sha256_ = from.payload_sha256();
   }
 
-  /// Removes checkpoints after `update`, because those updates are done again. Newest first, so that the run can be
-  /// resumed if it is killed meanwhile.
+  /// Removes checkpoints after `update`, which is redone: newest first, so that a killed run can be resumed.
   void forget_after(std::uint64_t update) const {
     for (const fs::path& path : checkpoints_in(options_.folder)) {
       if (path.filename() <= checkpoint_name(update)) break;

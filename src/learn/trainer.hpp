@@ -8,12 +8,10 @@
 //   RUN/summary.json
 //   RUN/log.txt          messages of flappy-train
 //
-// With several ranks, each flies its share of the flappers and of the validation vehicles, and does its share of every batch. The
-// first rank writes the folder.
-//
-// In every step, the actor of the step before flies, while the learner samples transitions of earlier steps. The lag is always one
-// step, so results do not depend on which is faster. All files but timing.jsonl, summary.json, run.json, the events and log.txt are
-// the same for any number of threads, and after any number of resumptions.
+// Each rank flies its share of flappers and validation vehicles and does its share of every batch; the first one writes
+// the folder. In every step, the actor of the step before flies while the learner samples earlier steps' transitions:
+// the lag is always one step, so results do not depend on speed. All files but timing.jsonl, summary.json, run.json,
+// events and log.txt are the same for any number of threads and resumptions.
 #pragma once
 
 #include <chrono>
@@ -41,8 +39,8 @@ struct TrainInit {
   std::string sha256;  ///< SHA-256 over all of it
 };
 
-/// Reads initial networks: from a file the actor alone; from a run folder its best actor, with critics and moments of
-/// its newest checkpoint. Throws io::InputError if one of them cannot be read.
+/// Reads from a file the actor, from a run its best actor with critics and moments of its newest checkpoint. Throws
+/// io::InputError if one cannot be read.
 std::shared_ptr<const TrainInit> read_train_init(const std::filesystem::path& path);
 
 struct TrainOptions {
@@ -85,8 +83,7 @@ void refuse_run_in(const std::filesystem::path& folder);
 void refuse_other_run_in(const std::filesystem::path& folder, const TrainConfig& config, const TrainInit* init);
 /// The newest checkpoint of a run that is not finished; empty if there is none.
 std::optional<std::filesystem::path> unfinished_run_in(const std::filesystem::path& folder);
-/// Trains. Throws io::InputError if the folder holds another run, a checkpoint does not fit, the disk is full, or
-/// learning diverged.
+/// Throws io::InputError for another run in the folder, an unfit checkpoint, a full disk, or diverged learning.
 TrainSummary train(const TrainConfig& config, const TrainOptions& options);
 TrainCosts costs_of(const TrainConfig& config);
 /// Processor type of this machine, as in /proc/cpuinfo.

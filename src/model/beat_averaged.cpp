@@ -19,7 +19,6 @@ constexpr const char* kAccepted =
 constexpr int kMaxPower = 4;
 constexpr double kLargest = 1e6, kLongestLag_s = 2, kFarthest_m = 1;
 
-/// A factor, and the variables that it multiplies.
 struct Monomial {
   double factor = 1;
   std::vector<std::size_t> variables;
@@ -36,7 +35,7 @@ Sum times(const Sum& a, const Sum& b) {
   return all;
 }
 
-/// Reads an expression by recursive descent: sum = product {+- product}, product = power {* power}, power = atom [^ whole].
+/// Reads an expression: sum = product {+- product}, product = power {* power}, power = atom [^ whole].
 class Reader {
  public:
   Reader(std::string_view text, const BeatAveraged& vehicle) : text_(text), vehicle_(vehicle) {}
@@ -136,7 +135,6 @@ class Reader {
   const BeatAveraged& vehicle_;
 };
 
-/// Refuses a name that an expression cannot use, or that is already taken.
 void check_name(const io::Table& table, const std::string& name, const BeatAveraged& v) {
   const bool word =
       !name.empty() && !std::isdigit(static_cast<unsigned char>(name.front())) &&
@@ -173,7 +171,6 @@ BeatAveragedWrench::BeatAveragedWrench(const BeatAveraged& vehicle) {
       for (const Monomial& m : sum) {
         products_.push_back({k, m.factor, m.variables});
         if (k >= 3) continue;
-        // moment of this force about the origin: at x force
         const std::size_t next = (k + 1) % 3, last = (k + 2) % 3;
         if (at[last] != 0) products_.push_back({3 + next, m.factor * at[last], m.variables});
         if (at[next] != 0) products_.push_back({3 + last, -m.factor * at[next], m.variables});

@@ -1,29 +1,28 @@
-// A beat-averaged robot: force and moment are means over its beats, computed at each instant from the state of its actuators and its motion. Its file
-// says how:
+// A beat-averaged robot: force and moment are means over its beats, computed from the state of its actuators and its
+// motion. Its file:
 //
 //   model = "beat_averaged"
-//   [beat]                                   # nominal_Hz, bandwidth_Hz; compares_moments = false: moments are not compared with flights,
-//                                            #   because in recorded flights the autopilot counteracts them
-//   [torso]                                  # the whole robot: mass_kg, com_m, inertia_kg_m2
-//   [input.left_flap]                        # a column of command.csv: low, high; and for flight, how it follows a controller's outputs:
-//                                            #   neutral + amplitude A + difference D + bias B + split_cycle S, within low and high
-//   [actuator.left_Hz]                       # input, role ("flapping", "stroke_plane", "other"), gain, offset, lag_s:
-//                                            #   a' = (gain u + offset - a) / lag_s
-//   [coefficients]                           # thrust_N_Hz = 0.035, or { value = 0.035, sd = 0.005 } with its standard deviation
-//   [wrench.wings]                           # at_m, and any of force_x_N ... moment_z_Nm, in B:
+//   [beat]                     # nominal_Hz, bandwidth_Hz; compares_moments = false: moments are not compared,
+//                              #   because the autopilot counteracts them in flights
+//   [torso]                    # the whole robot: mass_kg, com_m, inertia_kg_m2
+//   [input.left_flap]          # a column of command.csv: low, high; in flight it is, within low and high,
+//                              #   neutral + amplitude A + difference D + bias B + split_cycle S
+//   [actuator.left_Hz]         # input, role ("flapping", "stroke_plane", "other"), gain, offset, lag_s:
+//                              #   a' = (gain u + offset - a) / lag_s
+//   [coefficients]             # thrust_N_Hz = 0.035, or { value = 0.035, sd = 0.005 } with its standard deviation
+//   [wrench.wings]             # at_m, and any of force_x_N ... moment_z_Nm, in B:
 //   force_z_N = "thrust_N_Hz * (left_Hz + right_Hz) - heave_N_s_m * v_z"
 //
-// An expression consists of + - * ( ) ^ (a whole power) over numbers, coefficients, actuators and
+// An expression has + - * ( ) ^ (a whole power) over numbers, coefficients, actuators and
 //   v_x v_y v_z   velocity of the torso's origin in the air, in B, m/s      speed   its length
-//   w_x w_y w_z   body rates in B, rad/s                                    battery  voltage over the nominal one, 1 if it is unknown
+//   w_x w_y w_z   body rates in B, rad/s              battery   voltage over the nominal one, 1 if unknown
 // so every force is a sum of products.
 //
-// model = "predicted" replaces all [wrench] tables by the predictions of an external simulator: force and moment of a flight, and their
-// derivatives by the coefficients, stand in the folder of the flight (gap/replay/predicted_loads.hpp). Then
-//
-//   [coefficients]                           # drag_N_s_m = { value = 0.02, sd = 0.01, predicted_at = 0.02 }: the forces were predicted with
-//                                            #   predicted_at (default: value); a diagnosis that corrects value keeps predicted_at
-//   [input], [actuator]                      # optional: beat frequency and stroke plane, for the effects that need them
+// model = "predicted" replaces [wrench] by the predictions of an external simulator: force and moment of a flight, and
+// their derivatives by the coefficients, stand in its folder (gap/replay/predicted_loads.hpp). Each coefficient may
+// then have predicted_at (default: value), the value with which the forces were predicted, which a diagnosis that
+// corrects value keeps. [input] and [actuator] are optional: beat frequency and stroke plane, for the effects that need
+// them.
 #pragma once
 
 #include <array>
@@ -48,7 +47,6 @@ struct BeatAveragedLoad {
   std::array<double, 3> force_N{}, moment_Nm{};
 };
 
-/// The expressions of a vehicle as sums of products.
 class BeatAveragedWrench {
  public:
   /// Throws std::invalid_argument if an expression is invalid; read_any_vehicle() reports those by line and column.
@@ -71,23 +69,18 @@ class BeatAveragedWrench {
   bool has_moments_ = false;
 };
 
-/// What is wrong with an expression, and what is accepted instead.
 struct ExpressionFault {
   std::string what, accepted;
 };
-/// Checks an expression over the coefficients and actuators of `vehicle`; nullopt: it is valid.
 std::optional<ExpressionFault> expression_fault(std::string_view text, const BeatAveraged& vehicle);
 
-/// Names of the components of a load in files.
 inline constexpr std::array<const char*, 6> kLoadNames = {"force_x_N",   "force_y_N",   "force_z_N",
                                                           "moment_x_Nm", "moment_y_Nm", "moment_z_Nm"};
 
-/// Reads the table of an input; input_text() gives text that reads back as the same input.
 BeatAveraged::Input read_input(const std::string& name, const io::Table& table);
 std::string input_text(const BeatAveraged::Input& input);
 
-/// Reads the tables beat, input, actuator, coefficients and, unless the forces are `predicted`, wrench of a vehicle
-/// file.
+/// Reads the tables beat, input, actuator, coefficients and, unless the forces are `predicted`, wrench.
 BeatAveraged read_beat_averaged(const io::Table& root, bool predicted);
 /// Text that reads back as the same, together with parameters().
 std::string beat_averaged_text(const BeatAveraged& vehicle);

@@ -48,15 +48,13 @@ Matrix6 mass_of(const RigidBody& b) {
   return m;
 }
 
-/// Velocity of a point from the velocity and angular velocity of its body.
 Jacobian point_of(const RigidBody& b, const Triple& position_m) {
   Jacobian j;
   j << Eigen::Matrix3d::Identity(), -across(vec(position_m) - vec(b.com_m));
   return j;
 }
 
-/// An upper bound of w: the largest row sum of absolute values is at least the largest eigenvalue (Gershgorin). It uses
-/// plain sums and products, whose bits are the same on every processor.
+/// Upper bound of w by Gershgorin's row sums. Plain sums and products: the same bits on every processor.
 double largest_inverse_mass(const RigidBody& b, const Triple& position_m) {
   const InertiaTensor& i = b.inertia_kg_m2;
   const auto inertia = inverse(Sym3<double>{i.xx, i.yy, i.zz, i.xy, i.yz, i.xz});

@@ -1,31 +1,32 @@
-// Contact of a point with a surface: a compliant normal force with Hunt and Crossley's damping, friction by one bristle, and the
-// distance of a point to simple solids.
-//
-// With d the depth of the point below the surface, n the surface's normal, u = d' the speed at which the point sinks:
+// Contact of a point with a surface: a compliant normal force with Hunt and Crossley's damping, friction by one
+// bristle, and distances to simple solids. With d the depth of the point, n the surface's normal, u = d' the speed at
+// which the point sinks:
 //   F_n = k d max(0, 1 + a u)            a = 3/2 c                                          [1]
 //   F_t = -(k_t s + c_t v_t)             |F_t| <= mu F_n                                    [2]
-// s: stretch of the bristle along the surface, measured from its anchor. An anchor that is pulled harder than mu F_n follows the point. The
-// bristle does not creep: at rest its stretch holds the load. k_t = 0.8 k, for bodies with Poisson's ratio 1/3 [3]; c_t = 2 sqrt(k_t / w), critical
-// for the mass 1/w below. The exponent of d is 1, as for a pad of constant area. With point and plane alone and no other forces, a ball that
-// lands with the speed u leaves with e u, where
+// s: stretch of the bristle along the surface from its anchor. An anchor that is pulled harder than mu F_n follows the
+// point; at rest the stretch holds the load without creep. k_t = 0.8 k, for Poisson's ratio 1/3 [3]; c_t = 2 sqrt(k_t /
+// w), critical for the mass 1/w below. The exponent of d is 1, as for a pad of constant area. Without other forces, a
+// ball that lands on a plane with the speed u leaves with e u, where
 //   a u (1 + e) = ln((1 + a u)/(1 - a e u))         e = 1 - c u + O((c u)^2)
-// for any k, mass and exponent: u du/(1 + a u) = -(k/m) d dd, integrated from d = 0 to d = 0.
-// F_n >= 0, so nothing sticks, except points that grasp: a point that meets a pole (a cylinder) more slowly than its limit is held in all three
-// directions by its bristle, however hard it is pulled, until a reset.
+// for any k, mass and exponent: u du/(1 + a u) = -(k/m) d dd, integrated from d = 0 to d = 0. F_n >= 0, so nothing
+// sticks, except points that grasp: a point that meets a pole (a cylinder) more slowly than its limit is held by its
+// bristle in all three directions, however hard it is pulled, until a reset.
 //
-// Time step h, leapfrog: positions are half a step ahead of rates. Springs are explicit, damping is implicit. u in the middle of the step is
-// u - h w F/2, where only the contact force F changes it; the same for v_t:
+// Time step h, leapfrog: positions are half a step ahead of rates. Springs are explicit, damping is implicit. u in the
+// middle of the step is u - h w F/2, where only the contact force F changes it; the same for v_t:
 //   F_n = k d max(0, 1 + a u)/(1 + h w k d a/2)     F_t = -(k_t s + c_t v_t)/(1 + h w c_t/2)
-// This is first order in h if other forces act, and damping never reverses a speed. w, 1/kg, is at least the inverse mass that the point has in any
-// direction while its body flies alone: hinges only add to that mass. An explicit spring is stable for h^2 omega^2 < 4; omega^2 is at most the
-// largest eigenvalue of M^-1 sum k J^T J of one body with all its points, because the kinetic energy of a vehicle is the sum of those of its
-// bodies (Rayleigh). contact_fault() accepts h^2 omega^2 <= 1.
+// This is first order in h if other forces act, and damping never reverses a speed. w, 1/kg, is at least the inverse
+// mass of the point in any direction while its body flies alone: hinges only add to that mass. An explicit spring is
+// stable for h^2 omega^2 < 4; omega^2 is at most the largest eigenvalue of M^-1 sum k J^T J of one body with all its
+// points, because a vehicle's kinetic energy is the sum of those of its bodies (Rayleigh). contact_fault() accepts h^2
+// omega^2 <= 1.
 //
-// [1] Hunt, Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42(2), 440-445, 1975.
+// Assumes points, whose friction resists no spin, rigid solids, and depths well below the thickness of the solids.
+// Where several surfaces meet, each presses independently; the bristle acts on the one in which the point is deepest.
+// [1] Hunt, Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42(2), 440-445,
+// 1975.
 // [2] Cundall, Strack, A discrete numerical model for granular assemblies, Geotechnique 29(1), 47-65, 1979.
 // [3] Mindlin, Compliance of elastic bodies in contact, J. Appl. Mech. 16, 259-268, 1949: k_t/k = 2 (1 - nu)/(2 - nu).
-// Assumes points, whose friction resists no spin, rigid solids, and depths well below the thickness of the solids. Where several surfaces meet, each
-// presses independently; the bristle acts on the surface in which the point is deepest.
 #pragma once
 
 #include <optional>
@@ -56,8 +57,8 @@ FLAPPY_INLINE Gap<T> gap_to_sphere(const Vec3<T>& p, const T& radius_m) {
   return {length - radius_m, where(apart, scale * p, Vec3<T>{T(0), T(0), T(1)})};
 }
 
-/// Gap between a point and a box; `p`: in the frame of the box. Outside, the nearest point of a face, edge or corner
-/// counts; inside, the nearest face.
+/// Gap to a box; `p`: in its frame. Outside, the nearest point of a face, edge or corner counts; inside, the nearest
+/// face.
 template <class T>
 FLAPPY_INLINE Gap<T> gap_to_box(const Vec3<T>& p, const Vec3<T>& half_m) {
   const T zero(0), one(1);
@@ -89,7 +90,6 @@ FLAPPY_INLINE Gap<T> gap_to_cylinder(const Vec3<T>& p, const T& radius_m, const 
   return {where(outside, length, nearest), {nr * x, nr * y, where(p.z < zero, T(-nz), nz)}};
 }
 
-/// Constants of a point of contact in a step.
 template <class T>
 struct ContactConstants {
   Vec3<T> position_m;                      // in the frame of its body
@@ -99,7 +99,6 @@ struct ContactConstants {
   T grasp_m_s;
 };
 
-/// State of the bristle of a point of contact.
 template <class T>
 struct Bristle {
   Vec3<T> anchor_m;  // in W, while the point touches
@@ -170,7 +169,6 @@ FLAPPY_INLINE Vec3<T> contact_force(const ContactConstants<T>& q, const Pressed<
 
 inline constexpr std::size_t kMaxContactPoints = 16;
 
-/// Constants of the points of contact of a vehicle, in their order.
 std::vector<ContactConstants<double>> contact_constants(const Vehicle& vehicle);
 
 /// Largest h^2 omega^2 that contact_fault() accepts by default; explicit springs are stable below 4.

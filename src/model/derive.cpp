@@ -18,8 +18,7 @@ Sym3<double> outer(double mass, const Vec3<double>& r) {
 
 Vec3<double> first_moment(const RigidBody& b) { return b.mass_kg * vec(b.com_m); }
 
-/// Second moment of mass (integral of r r^T) about the frame's origin, from the inertia I about the centre of mass:
-/// P = tr(I)/2 1 - I + m c c^T.
+/// Second moment of mass about the frame's origin from the inertia I about the centre of mass: tr(I)/2 1 - I + m c c^T.
 Sym3<double> second_moment(const RigidBody& b) {
   const InertiaTensor& i = b.inertia_kg_m2;
   const double half = (i.xx + i.yy + i.zz) / 2;

@@ -6,21 +6,18 @@
 
 namespace flappy::model {
 
-/// Constants of one flapper in double precision. `step_s`: physics step, s.
 Parameters<double> derive(const Vehicle& vehicle, double step_s);
 
 /// The members of SideParameters that describe the planform as a single-point blade element; all others are 0.
 SideParameters<double> derive_planform(const Planform& planform, double air_density_kg_m3);
 
-/// A body's first and second moment of mass about its frame's origin, kg m and kg m^2.
 Vec3<double> first_moment(const RigidBody& body);
 Sym3<double> second_moment(const RigidBody& body);
 
 /// The vehicle after its effects of Stage::body have changed it.
 Vehicle built(Vehicle vehicle);
 
-/// Constants of both sides that effects need in addition to Parameters; 0 for beat-averaged robots and articulated
-/// wings.
+/// Constants that effects need in addition to Parameters; 0 for beat-averaged robots and articulated wings.
 Sides<SideConstants<double>> effect_constants(const Vehicle& vehicle);
 
 /// Beat frequency: of the driver, of the gait, or the nominal one.

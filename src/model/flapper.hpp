@@ -1,7 +1,6 @@
-// Parameters (derived once from a Vehicle) and state of one flapper, over a scalar type. Every member is a T, so a flapper is also a plain list of
-// numbers: a block of lanes stores one row for each.
-// Coordinates: stroke and rotation are the published angles psi and theta; beta = side * psi turns about +z on both sides. L is the frame of a
-// leading edge: origin at the shoulder, B turned by beta.
+// Parameters (derived once from a Vehicle) and state of one flapper. Every member is a T, so a flapper is also a list
+// of numbers: a block of lanes stores one row for each. Stroke and rotation are the published psi and theta; beta =
+// side * psi turns about +z on both sides. L, frame of a leading edge: origin at the shoulder, B turned by beta.
 #pragma once
 
 #include "model/linear_algebra.hpp"
@@ -50,8 +49,7 @@ template <class T>
 struct SideState {
   T stroke_rad, rotation_rad;
   T stroke_rate_rad_s, rotation_rate_rad_s;
-  // rates a step earlier; equal to the present rates after a reset without accelerations, and for a hinge that was on
-  // its stop
+  // rates a step earlier; the present ones after a reset without accelerations, and for a hinge that was on its stop
   T stroke_rate_before_rad_s, rotation_rate_before_rad_s;
 };
 

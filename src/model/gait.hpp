@@ -1,15 +1,15 @@
 // A driven angle: a Fourier series in the phase of the beat, modulated by inputs, with its rate and acceleration.
 //
-// Phase. The clock t counts beats, t' = f. Timing d > 0 makes the first half of a beat faster and the second slower, d < 0 the opposite:
+// Phase. The clock t counts beats, t' = f. Timing d > 0 makes the first half of a beat faster, d < 0 the second:
 //   p = t + d (1 - cos 2 pi t)/(2 pi)     p' = f (1 + d sin 2 pi t) + d' (1 - cos 2 pi t)/(2 pi)
 //   p'' = f' (1 + d sin 2 pi t) + 2 pi f^2 d cos 2 pi t + 2 f d' sin 2 pi t + d'' (1 - cos 2 pi t)/(2 pi)
 // Angle. With O = 2 pi p', the harmonics g(p) = sum a_k cos(2 pi k p) + b_k sin(2 pi k p), factor s and offset o:
-//   g' = O dg    g'' = O^2 ddg + O' dg      q = o + s g     q' = o' + s' g + s g'     q'' = o'' + s'' g + 2 s' g' + s g''
-//   dg = sum k (b_k cos - a_k sin)          ddg = -sum k^2 (a_k cos + b_k sin)
-// so f, d, s and o need two derivatives. They are linear in the inputs u, which follow the commanded U by a critically damped second-order filter
-// with the time constant T, whose derivatives are known:
-//   u'' = (U - u)/T^2 - 2 u'/T            e = u - U:  e(h) = ((1 + h/T) e + h u') E   u'(h) = ((1 - h/T) u' - h/T^2 e) E   E = exp(-h/T)
-// exact while U is constant. cos and sin of the multiples follow from the addition theorem.
+//   g' = O dg    g'' = O^2 ddg + O' dg    q = o + s g    q' = o' + s' g + s g'    q'' = o'' + s'' g + 2 s' g' + s g''
+//   dg = sum k (b_k cos - a_k sin)        ddg = -sum k^2 (a_k cos + b_k sin)
+// so f, d, s and o need two derivatives. They are linear in the inputs u, which follow the commanded U by a critically
+// damped second-order filter with the time constant T, u'' = (U - u)/T^2 - 2 u'/T. With e = u - U and E = exp(-h/T),
+// exact while U is constant:
+//   e(h) = ((1 + h/T) e + h u') E         u'(h) = ((1 - h/T) u' - h/T^2 e) E
 #pragma once
 
 #include <numbers>
@@ -19,7 +19,6 @@
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
-/// A quantity with its first two derivatives by time.
 template <class T>
 struct Moving {
   T value, rate, acceleration;
@@ -29,7 +28,6 @@ struct Moving {
   }
 };
 
-/// a + s b.
 template <class T>
 FLAPPY_INLINE Moving<T> add_scaled(const Moving<T>& a, const T& s, const Moving<T>& b) {
   return {a.value + s * b.value, a.rate + s * b.rate, a.acceleration + s * b.acceleration};
@@ -65,15 +63,13 @@ struct BeatPhase {
   T rate_rad_s, acceleration_rad_s2;
 };
 
-/// Sine and cosine of 2 pi x.
 template <class T>
 FLAPPY_INLINE SinCos<T> turn_of(const T& x) {
   const T near = x - nearest(x);
   return sin_cos_pi(T(near + near));
 }
 
-/// Phase without timing. `clock_turn`: sine and cosine of 2 pi t. `frequency`: f with its derivatives, of which the
-/// second is not used.
+/// Phase without timing. `clock_turn`: sine and cosine of 2 pi t. `frequency`: f and derivatives, the second unused.
 template <class T>
 FLAPPY_INLINE BeatPhase<T> untimed_phase(const SinCos<T>& clock_turn, const Moving<T>& frequency) {
   const T full(2 * std::numbers::pi);
@@ -110,7 +106,6 @@ FLAPPY_INLINE Moving<T> harmonics(const BeatPhase<T>& phase, std::size_t count, 
   return {g, w * dg, T(w * w) * ddg + phase.acceleration_rad_s2 * dg};
 }
 
-/// The angle: offset + scale x harmonics, with its derivatives.
 template <class T>
 FLAPPY_INLINE Moving<T> modulated(const Moving<T>& g, const Moving<T>& scale, const Moving<T>& offset) {
   return {offset.value + scale.value * g.value, offset.rate + T(scale.rate * g.value + scale.value * g.rate),

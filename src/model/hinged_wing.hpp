@@ -1,10 +1,8 @@
-// One wing and its leading edge, hinged at a shoulder: their pose, their inertia seen from the vehicle, and the inertial forces of their motion
-// relative to it.
-//
-// In the leading edge's frame L (B turned by beta about z), about the shoulder. h: first moment of mass, P: second
-// moment (integral of r r^T; inertia J = tr P - P); index w: the wing, turned by theta about y; none: wing and edge.
-// Body rate w; relative rates W_edge = (0, 0, b), W_wing = (0, t, b) with b = beta', t = theta'. If beta'' = theta'' = 0, the
-// acceleration of a point relative to the frozen vehicle is
+// One wing and its leading edge, hinged at a shoulder: pose, inertia seen from the vehicle, and the inertial forces of
+// their motion relative to it. In the leading edge's frame L (B turned by beta about z), about the shoulder; h: first
+// moment of mass, P: second moment (integral of r r^T; inertia J = tr P - P); index w: the wing, turned by theta about
+// y; none: wing and edge. Body rate w; relative rates W_edge = (0, 0, b), W_wing = (0, t, b) with b = beta', t =
+// theta'. If beta'' = theta'' = 0, the acceleration of a point relative to the frozen vehicle is
 //   2 w x (W x r) + W x (W x r) + W' x r          W'_edge = 0,  W'_wing = (-b t, 0, 0)
 // and its moments are
 //   integral r x (2 w x (W x r)) = 2 (P w) x W    integral r x (W x (W x r)) = (P W) x W    J W'
@@ -27,7 +25,6 @@ FLAPPY_INLINE HingeRates<T> hinge_rates(const SideState<T>& q) {
   return {q.stroke_rate_rad_s, q.rotation_rate_rad_s, q.rotation_rate_rad_s * q.rotation_rate_rad_s};
 }
 
-/// Pose of a wing, and its motion relative to B.
 template <class T>
 struct WingPose {
   SinCos<T> beta, theta;
@@ -37,8 +34,7 @@ struct WingPose {
   Vec3<T> moment, momentum;         // h, and the momentum of the relative motion, in B
 };
 
-/// Inertia of a wing with its leading edge, and the inertial loads of its relative motion while the hinges do not
-/// accelerate.
+/// Inertia of a wing with its leading edge, and inertial loads of its relative motion without hinge accelerations.
 template <class T>
 struct WingInertia {
   Sym3<T> second;                      // P, in B
@@ -49,7 +45,6 @@ struct WingInertia {
   T stroke_bias, rotation_bias;                 // hinge torques, with the frozen part about the shoulder
 };
 
-/// First moment of a wing and its leading edge about the shoulder, in B, for the centre of mass.
 template <int side, class T>
 FLAPPY_INLINE Vec3<T> moment_about_shoulder(const SideParameters<T>& p, const SideState<T>& q) {
   const SinCos<T> beta = sin_cos(T(T(side) * q.stroke_rad)), theta = sin_cos(q.rotation_rad);

@@ -16,8 +16,8 @@ constexpr double kMax = 100;  // largest change per unit of an input
 constexpr double kShortestLag_s = 1e-5, kLongestLag_s = 1;
 constexpr double kLargestCoefficient = 20;
 constexpr double kFarthest_m = 1;
-/// Points of a beat at which an angle is evaluated; between them the 16th harmonic is off by at most
-/// (pi 16 / 512)^2 / 2, half a percent of it.
+/// Points of a beat at which an angle is evaluated; between them the 16th harmonic is off by at most (pi 16 / 512)^2 /
+/// 2, half a percent of it.
 constexpr int kPoints = 512;
 constexpr double kFullTurn_rad = 2 * std::numbers::pi;
 
@@ -91,17 +91,14 @@ Jointed::Input read_modulation(const std::string& name, const io::Table& t) {
   return input;
 }
 
-/// Largest absolute value of an input.
 double reach(const Jointed::Input& i) { return std::max(std::abs(i.low), std::abs(i.high)); }
 
-/// Largest change that all inputs together may cause.
 double most(const Jointed& v, const auto& part) {
   double sum = 0;
   for (const Jointed::Input& i : v.inputs) sum += reach(i) * part(i);
   return sum;
 }
 
-/// Largest absolute value of an angle's harmonics.
 double largest_swing(const Jointed::Angle& a) {
   double largest = 0;
   for (int i = 0; i < kPoints; ++i) {

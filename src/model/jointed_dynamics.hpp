@@ -1,22 +1,26 @@
-// Exact dynamics of a torso with articulated wings: two sides of four angles, any of which may be fixed, driven or free.
+// Exact dynamics of a torso with articulated wings: two sides of four angles, any of which may be fixed, driven or
+// free.
 //
-// Coordinates. The leading edge of a side has the frame E, from B by R_y(-Phi) R_z(s psi) R_x(s phi); its wing is R_y(theta) from E, all about the
-// shoulder at r_s: as published (Fei et al. 2019), except the sign of Phi on the right, so that a mirrored vehicle has the same numbers. With the
-// axes e_j of the four angles and w_0 the body rate,
+// Coordinates. The leading edge of a side has the frame E, from B by R_y(-Phi) R_z(s psi) R_x(s phi); its wing is
+// R_y(theta) from E, all about the shoulder at r_s: as published (Fei et al. 2019), except the sign of Phi on the
+// right, so that a mirrored vehicle has the same numbers. With the axes e_j of the four angles and w_0 the body rate,
 //   w_j = w_(j-1) + e_j q_j'        a_j = a_(j-1) + e_j q_j'' + w_(j-1) x e_j q_j'         E: j = 3, wing: j = 4
-// Newton and Euler about the shoulder, with h the first and P the second moment of mass of a body, A the acceleration of the shoulder less gravity:
+// Newton and Euler about the shoulder, with h the first and P the second moment of mass of a body, A the acceleration
+// of the shoulder less gravity:
 //   force = m A + a x h + w x (w x h)            moment = h x A + (tr P - P) a - w x (P w)
-// The air that the wing carries adds Sym3 K on (v_x' , w_y', w_z') in the wing's axes (strip_aerodynamics.hpp), without gravity.
+// The air that the wing carries adds Sym3 K on (v_x' , w_y', w_z') in the wing's axes (strip_aerodynamics.hpp), without
+// gravity.
 //
-// Unknowns. Accelerations a_0 of the torso's origin and w_0' (both in B), and q'' of the free angles only. The terms that are linear in them form
-// a symmetric mass matrix; all other terms, including the prescribed q'' of driven angles, form the right-hand side, so the body feels the reaction
-// of the gait (Kane's method [1] in the form of the composite body [2]). The matrix is factored as L D L^T without pivoting, which a positive
-// definite matrix does not need. Then inverse dynamics, the same equations with all accelerations known, give the torque about every axis. The
-// torque of a driven axis, less that of a parallel spring and damper, is the muscle's; its power is that torque times q'.
+// Unknowns. Accelerations a_0 of the torso's origin and w_0' (both in B), and q'' of the free angles only. The terms
+// that are linear in them form a symmetric mass matrix; all other terms, including the prescribed q'' of driven angles,
+// form the right-hand side, so the body feels the reaction of the gait (Kane's method [1] in the form of the composite
+// body [2]). The matrix is factored as L D L^T without pivoting, which a positive definite matrix does not need. Then
+// inverse dynamics, the same equations with all accelerations known, give the torque about every axis. The torque of a
+// driven axis, less that of a parallel spring and damper, is the muscle's; its power is that torque times q'.
 //
-// In a step h, angles lead rates by h/2 (sim/jointed_step.cpp). Springs and stops of free angles act at q + h^2/4 q'', the weighted mean of the
-// angles of three steps, dampers at the mean of old and new rate: of second order, and stable for any stiffness (Newmark's method [3] with
-// beta = 1/4). Both add to the mass matrix.
+// In a step h, angles lead rates by h/2 (sim/jointed_step.cpp). Springs and stops of free angles act at q + h^2/4 q'',
+// the weighted mean of the angles of three steps, dampers at the mean of old and new rate: of second order, and stable
+// for any stiffness (Newmark's method [3] with beta = 1/4). Both add to the mass matrix.
 // [1] Kane, Levinson, Dynamics: Theory and Applications, 1985. [2] Featherstone, Rigid Body Dynamics Algorithms, 2008.
 // [3] Newmark, A method of computation for structural dynamics, J. Eng. Mech. Div. 85, 1959.
 // Assumes rigid bodies, and muscles that follow the gait with whatever torque it needs.
@@ -32,7 +36,6 @@ inline namespace FLAPPY_ISA {
 inline constexpr int kJoints = 4;
 enum JointAxis : int { kPlane, kStroke, kDeviation, kRotation };
 
-/// One angle: its mean or fixed value, and the spring, damper and stops that act on it.
 template <class T>
 struct JointParameters {
   T mean_rad, stiffness_Nm_rad, rest_rad, damping_Nm_s;
@@ -114,14 +117,12 @@ FLAPPY_INLINE JointedPose<T> place_side(const JointedSide<T>& p, const Moving<T>
   return g;
 }
 
-/// The inertia tensor of a second moment P, tr P - P, times a vector.
 template <class T>
 FLAPPY_INLINE Vec3<T> inertia_times(const Sym3<T>& second, const Vec3<T>& a) {
   const T trace = T(second.xx + second.yy) + second.zz;
   return trace * a - second * a;
 }
 
-/// Force and moments that a motion of one side requires, at its shoulder, in E.
 template <class T>
 struct SideWrench {
   Vec3<T> force, edge_moment, wing_moment;
@@ -251,8 +252,7 @@ FLAPPY_INLINE void add_carried_air(const JointedSide<T>& p, const JointedPose<T>
   }
 }
 
-/// Force and moments that a unit acceleration of an angle requires, at the shoulder in E: of the whole side, and of its
-/// wing.
+/// Force and moments for a unit acceleration of an angle, at the shoulder in E: of the whole side, and of its wing.
 template <class T>
 struct JointColumn {
   Vec3<T> force, moment, wing_moment;
@@ -278,7 +278,6 @@ FLAPPY_INLINE JointColumn<T> joint_column(const JointedSide<T>& p, const Jointed
   return c;
 }
 
-/// Torque on a free angle, and the inertia that stands for implicit springs, dampers and stops.
 template <class T>
 struct JointPull {
   T torque_Nm, inertia_kg_m2;
@@ -296,8 +295,8 @@ FLAPPY_INLINE JointPull<T> pull_of(const JointParameters<T>& j, const T& angle, 
           half * T(damping + half * T(j.stiffness_Nm_rad + stop))};
 }
 
-/// Adds one side: its inertia, the loads that its motion requires, and the air's `force` and `moment` at the shoulder
-/// in E. `pulls`: for free angles.
+/// Adds one side: inertia, loads of its motion, and `force`, `moment` of the air at the shoulder in E. `pulls`: of free
+/// angles.
 template <class T>
 FLAPPY_INLINE void add_side(const JointedSide<T>& p, const JointedPose<T>& g, const SideWrench<T>& taken,
                             const Vec3<T>& force, const Vec3<T>& moment, const JointPull<T> (&pulls)[kJoints],

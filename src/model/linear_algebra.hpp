@@ -39,7 +39,6 @@ FLAPPY_INLINE Vec3<T> cross(const Vec3<T>& a, const Vec3<T>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-/// base + a x b.
 template <class T>
 FLAPPY_INLINE Vec3<T> plus_cross(const Vec3<T>& base, const Vec3<T>& a, const AcrossZ<T>& b) {
   return {base.x - a.z * b.h.x, base.y - a.z * b.h.y, base.z + T(a.x * b.h.x + a.y * b.h.y)};
@@ -56,7 +55,6 @@ FLAPPY_INLINE Vec3<T> where(auto condition, const Vec3<T>& yes, const Vec3<T>& n
   return {where(condition, yes.x, no.x), where(condition, yes.y, no.y), where(condition, yes.z, no.z)};
 }
 
-/// Symmetric 3x3 tensor.
 template <class T>
 struct Sym3 {
   T xx, yy, zz, xy, yz, xz;
@@ -70,8 +68,7 @@ struct Sym3 {
   }
 };
 
-/// An inverse as adjugate and 1 / determinant, not multiplied out, so that later products need not wait for the
-/// division.
+/// An inverse as adjugate and 1 / determinant, not multiplied out: later products need not wait for the division.
 template <class M, class T>
 struct Inverse {
   M adjugate;
@@ -91,7 +88,6 @@ FLAPPY_INLINE Sym3<T> inertia_of(const Sym3<T>& p) {
   return {p.yy + p.zz, p.xx + p.zz, p.xx + p.yy, -p.xy, -p.yz, -p.xz};
 }
 
-/// Rotates a vector by an angle about z, given its sine and cosine.
 template <class T>
 FLAPPY_INLINE Vec3<T> rotate_z(const T& s, const T& c, const Vec3<T>& v) {
   return {c * v.x - s * v.y, s * v.x + c * v.y, v.z};
@@ -101,13 +97,11 @@ template <class T>
 FLAPPY_INLINE Vec3<T> rotate_z(const T& s, const T& c, const T& x, const T& z) {
   return {c * x, s * x, z};
 }
-/// Rotates a vector back, by the transpose.
 template <class T>
 FLAPPY_INLINE Vec3<T> rotate_back_z(const T& s, const T& c, const Vec3<T>& v) {
   return {c * v.x + s * v.y, c * v.y - s * v.x, v.z};
 }
 
-/// Rotations of a vector about x and y.
 template <class T>
 FLAPPY_INLINE Vec3<T> rotate_x(const T& s, const T& c, const Vec3<T>& v) {
   return {v.x, c * v.y - s * v.z, s * v.y + c * v.z};
@@ -134,7 +128,6 @@ FLAPPY_INLINE Sym3<T> rotate_z(const T& s, const T& c, const Sym3<T>& p) {
   return {mean + d, mean - d, p.zz, half * s2 + p.xy * c2, s * p.xz + c * p.yz, c * p.xz - s * p.yz};
 }
 
-/// R P R^T for a rotation about y.
 template <class T>
 FLAPPY_INLINE Sym3<T> rotate_y(const T& s, const T& c, const Sym3<T>& p) {
   const T twice = s + s, s2 = twice * c, c2 = T(1) - twice * s;
@@ -143,7 +136,6 @@ FLAPPY_INLINE Sym3<T> rotate_y(const T& s, const T& c, const Sym3<T>& p) {
   return {mean + d, p.yy, mean - d, c * p.xy + s * p.yz, c * p.yz - s * p.xy, p.xz * c2 - half * s2};
 }
 
-/// R P R^T for a rotation about x.
 template <class T>
 FLAPPY_INLINE Sym3<T> rotate_x(const T& s, const T& c, const Sym3<T>& p) {
   const T twice = s + s, s2 = twice * c, c2 = T(1) - twice * s;
@@ -158,7 +150,6 @@ struct Quaternion {
   T w, x, y, z;
 };
 
-/// Rotation matrix by rows.
 template <class T>
 struct Matrix3 {
   Vec3<T> row_x, row_y, row_z;

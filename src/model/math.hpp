@@ -1,5 +1,5 @@
-// Elementary functions that give the same bits on every processor, which those of libm do not.
-// Minimax polynomials; the stated errors are those of the polynomial, before rounding.
+// Elementary functions that give the same bits on every processor, which those of libm do not. Minimax polynomials; the
+// stated errors are those of the polynomial, before rounding.
 #pragma once
 
 #include <numbers>
@@ -24,8 +24,7 @@ struct SinCos {
   T sin, cos;
 };
 
-/// Sine and cosine for |x| <= kLargestAngle_rad, without range reduction. Absolute error of the polynomials:
-/// 1.4e-8 and 9e-10 in float, 1.5e-18 and 8e-18 in double.
+/// Sine and cosine for |x| <= kLargestAngle_rad. Absolute errors: 1.4e-8, 9e-10 in float, 1.5e-18, 8e-18 in double.
 template <class T>
 FLAPPY_INLINE SinCos<T> sin_cos(T x) {
   const T u = x * x;
@@ -80,8 +79,7 @@ FLAPPY_INLINE T exp_negative(T x) {
   return where(x > T(kLargestDecay<T>), T(0), T(T(T(r * r) * e + (T(1) - r)) * half_to(k)));
 }
 
-/// exp(x); 0 below -87 (double: -708), where the result would be subnormal, and at most exp(88) (double: exp(709)),
-/// which is finite.
+/// exp(x); 0 below -87 (double: -708), where it would be subnormal; at most the finite exp(88) (double: exp(709)).
 template <class T>
 FLAPPY_INLINE T exp(T x) {
   constexpr double kLargest = sizeof(Element<T>) == 4 ? 88 : 709;
@@ -113,8 +111,7 @@ FLAPPY_INLINE T log(T x) {
   return n * T(std::numbers::ln2) + T(2) * T(s + T(s * u) * series);
 }
 
-/// Angle of (x, y) from the x axis, in [-pi, pi]; 0 at the origin. Relative error of the polynomials: 3e-9 in float,
-/// 5e-18 in double.
+/// Angle of (x, y) in [-pi, pi]; 0 at the origin. Relative error of the polynomials: 3e-9 in float, 5e-18 in double.
 template <class T>
 FLAPPY_INLINE T atan2(T y, T x) {
   constexpr double kTanHalfOctant = 0.41421356237309505;
@@ -156,7 +153,6 @@ FLAPPY_INLINE T asin(T x) {
   return copysign(where(upper, T(T(std::numbers::pi / 2) - T(2) * small), small), x);
 }
 
-/// cos(pi x) for |x| <= 1.
 template <class T>
 FLAPPY_INLINE T cos_pi(T x) {
   return sin_cos(T((T(0.5) - abs(x)) * T(std::numbers::pi))).sin;

@@ -1,11 +1,12 @@
-// Brushed motor, gear and stroke spring of one wing. Gear N, efficiency eta; friction f, damping b, inertia J on the motor's side:
+// Brushed motor, gear and stroke spring of one wing. Gear N, efficiency eta; friction f, damping b, inertia J on the
+// motor's side:
 //   tau = N eta (K i - J N psi'' - b N psi' - f sgn psi')      i = (V - K N psi')/R, also when driven back
-// so about the stroke axis: torque per volt N eta K/R, damping eta N^2 (K^2/R + b), friction eta N f, inertia eta N^2 J.
-// The rotor's spin N psi', of sense s and parallel to the stroke's axis, adds S beta' about z to the body's momentum, with S = s N J: as much as a
-// disc of inertia S that turns with the leading edge. Therefore derive() adds such a disc to the leading edge, and subtracts it from the body and S
-// from the stroke's inertia. Nothing else changes, and the coupling S w_z' beta'' between yaw and stroke is exact. The gear's efficiency is left out
-// of it, because momentum would be lost otherwise.
-// Spring: -k (psi - psi_0), with a separate k for each direction. Winding inductance is neglected.
+// so about the stroke axis: torque per volt N eta K/R, damping eta N^2 (K^2/R + b), friction eta N f, inertia eta N^2
+// J. The rotor's spin N psi', of sense s and parallel to the stroke's axis, adds S beta' about z to the body's
+// momentum, S = s N J: as much as a disc of inertia S on the leading edge. So derive() adds that disc, and subtracts it
+// from the body and S from the stroke's inertia; the coupling S w_z' beta'' of yaw and stroke is then exact. Without
+// the gear's efficiency, which would lose momentum. Spring: -k (psi - psi_0), with a k for each direction. Winding
+// inductance is neglected.
 #pragma once
 
 #include "model/flapper.hpp"

@@ -10,8 +10,7 @@ namespace {
 
 using Rows = std::vector<std::vector<double>>;
 
-/// Share of a correlation that rounding may leave instead of 0, in a file of shortest digits or in a product of
-/// matrices.
+/// Share of a correlation that rounding may leave instead of 0, in files and matrix products.
 constexpr double kRounding = 1e-9;
 
 /// Whether a equals b up to rounding, relative to their possible `size`.

@@ -1,4 +1,4 @@
-// The posterior of a vehicle: its table in the vehicle file, its factor for random draws, and its construction from a fit.
+// The posterior of a vehicle: its table in the vehicle file, its factor for random draws, its construction from a fit.
 #pragma once
 
 #include <functional>
@@ -11,9 +11,9 @@
 
 namespace flappy::model {
 
-/// Reads the table [posterior] of the file of `vehicle`. Throws io::InputError for a path that the vehicle does not
-/// have, that is given twice, or that is the same for a whole batch; for a mean out of its range; for sizes that do not
-/// match; and for a covariance that is not symmetric and positive semidefinite.
+/// Reads [posterior]. Throws io::InputError for a path that `vehicle` does not have, given twice or the same for a
+/// whole batch; a mean out of range; sizes that do not match; a covariance that is not symmetric and positive
+/// semidefinite.
 Posterior read_posterior(const io::Table& table, const Vehicle& vehicle);
 
 /// Text that reads back as the same posterior.

@@ -1,6 +1,6 @@
-// Functions in which the physics is written, for plain float and double; lanes.hpp has the same functions for many flappers at once. FLAPPY_ISA
-// names the instruction set for which a file is compiled, so that one program can contain the same templates for several instruction sets without
-// the linker merging their code.
+// Functions in which the physics is written, for plain float and double; lanes.hpp has the same functions for many
+// flappers at once. FLAPPY_ISA names the instruction set for which a file is compiled, so that one program can contain
+// the same templates for several instruction sets without the linker merging their code.
 #pragma once
 
 #include <bit>
@@ -32,12 +32,10 @@ FLAPPY_INLINE double sqrt(double a) { return __builtin_sqrt(a); }
 FLAPPY_INLINE float abs(float a) { return __builtin_fabsf(a); }
 FLAPPY_INLINE double abs(double a) { return __builtin_fabs(a); }
 
-/// The magnitude of one number with the sign of another.
 FLAPPY_INLINE float copysign(float magnitude, float sign) { return __builtin_copysignf(magnitude, sign); }
 FLAPPY_INLINE double copysign(double magnitude, double sign) { return __builtin_copysign(magnitude, sign); }
 
-// The functions below read and write the bits of numbers. Adding 1.5 x 2^23 (in double 1.5 x 2^52) puts a whole number
-// into the lowest bits, without a conversion, which not every instruction set has.
+// Functions on bits. Adding 1.5 x 2^23 (double: 2^52) puts a whole number into the lowest bits without a conversion.
 
 /// 2^-k for a whole number k within the normal range.
 FLAPPY_INLINE float half_to(float k) { return std::bit_cast<float>(std::bit_cast<std::uint32_t>(12583039 - k) << 23); }

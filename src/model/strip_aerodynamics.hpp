@@ -1,27 +1,28 @@
-// Quasi-steady aerodynamics of a wing by strips along its span, in the wing's own axes: x its normal, y along the span, z towards the leading edge.
-//
-// v: velocity of the shoulder, w: angular velocity of the wing, both relative to the air. A strip of width dr at y (s times the distance from the
-// shoulder), chord c, leading edge l above the axis of rotation, moves at its quarter chord with
-//   v_n = v_x - w_z y + w_y (l - c/4)   (normal)      v_c = v_z + w_x y   (chordwise)      U^2 = v_n^2 + v_c^2      sin a = -v_n/U, cos a = v_c/U
+// Quasi-steady aerodynamics of a wing by strips along its span, in the wing's own axes: x its normal, y along the span,
+// z towards the leading edge. v: velocity of the shoulder, w: angular velocity of the wing, both relative to the air. A
+// strip of width dr at y (s times the distance from the shoulder), chord c, leading edge l above the axis of rotation,
+// moves at its quarter chord with
+//   v_n = v_x - w_z y + w_y (l - c/4) (normal)   v_c = v_z + w_x y (chordwise)   U^2 = v_n^2 + v_c^2
+//   sin a = -v_n/U, cos a = v_c/U
 //   dN  = 1/2 rho c dr C_N(a) U^2              along x, at d_cp(a) c behind the leading edge [1]
 //   dT  = 1/2 rho c dr C_T(a) U^2              along -z
 //   dR  = factor rho c^2 dr C_R v_c w_y        along x, at mid-chord, C_R = pi/2 [2]
-//   dM  = -1/8 rho C_rd |w_y| w_y ((c - l)|c - l|^3 + l|l|^3) dr     about y [1]
-//   dD  = 1/6 rho C_rd |w_y| w_y (|c - l|^3 - |l|^3) dr     along x; dM and dD are the drag of a plate that turns about y, integrated over its
-//   chord
-// C_N = sin a P(cos a), C_T = Q(cos a): sums of sin(k a) and of cos(k a), as Chebyshev polynomials of cos a. w_y is the angular velocity about the
-// wing's y axis, to which stroke, deviation and body contribute, not theta' alone. The circulation's force is proportional to v_c, not to U, and
-// normal to the plate: it changes sign with the flow, as in thin-aerofoil theory. That theory makes the flow tangent at 3/4 chord. A turn about the
-// quarter chord, where the bound vortex is and where v_n is taken, moves that point at c/2 w_y. [2] has pi (3/4 - x_0) because it takes the flow at
-// the axis, at x_0 of the chord; the sum is the same. So the position of the axis enters the force only through the motion of the wing.
-// Added mass [2, 3], rho pi/4 c^2 dr at mid-chord z = l - c/2 and rho pi/128 c^4 dr about it, causes a force and moments that are linear in
-// (v_n)' = a_x + z w_y' - y w_z' and w_y', where ' is the rate of components in the wing's axes. They form a symmetric matrix on
-// (v_x', w_y', w_z'), which is part of the vehicle's mass matrix (jointed_dynamics.hpp). Like [2], without Kirchhoff's terms w x momentum:
-// separated flow has no leading-edge suction.
+//   dM  = -1/8 rho C_rd |w_y| w_y ((c - l)|c - l|^3 + l|l|^3) dr     about y [1]; dM, dD: drag of a plate that turns
+//   dD  = 1/6 rho C_rd |w_y| w_y (|c - l|^3 - |l|^3) dr              along x         about y, integrated over its chord
+// C_N = sin a P(cos a), C_T = Q(cos a): sums of sin(k a) and of cos(k a), as Chebyshev polynomials of cos a. Stroke,
+// deviation and body contribute to w_y, not theta' alone. The circulation's force is proportional to v_c, not to U, and
+// normal to the plate: it changes sign with the flow. Thin-aerofoil theory makes the flow tangent at 3/4 chord, which a
+// turn about the quarter chord, where the bound vortex is and v_n is taken, moves at c/2 w_y. [2] has pi (3/4 - x_0)
+// because it takes the flow at the axis, at x_0 of the chord; the sum is the same. So the axis enters the force only
+// through the motion of the wing. Added mass [2, 3], rho pi/4 c^2 dr at mid-chord z = l - c/2 and rho pi/128 c^4 dr
+// about it, causes a force and moments linear in (v_n)' = a_x + z w_y' - y w_z' and w_y', ' the rate of components in
+// the wing's axes: a symmetric matrix on (v_x', w_y', w_z') in the vehicle's mass matrix (jointed_dynamics.hpp). Like
+// [2], without Kirchhoff's terms w x momentum: separated flow has no leading-edge suction.
 //
-// [1] Fei et al., ICRA 2019, arXiv 1902.09628. [2] Sane, Dickinson, J. Exp. Biol. 205, 2002. [3] Sedov 1965, as cited in [2].
-// Assumes that flow along the span has no influence, a rigid flat wing, no wake; valid for |w_y| c/U below about 1, and for C_N, C_T at the Reynolds
-// number at which they were measured.
+// Assumes that flow along the span has no influence, a rigid flat wing, no wake; valid for |w_y| c/U below about 1, and
+// for C_N, C_T at the Reynolds number of their measurement.
+// [1] Fei et al., ICRA 2019, arXiv 1902.09628. [2] Sane, Dickinson, J. Exp. Biol. 205, 2002. [3] Sedov 1965, cited in
+// [2].
 #pragma once
 
 #include "model/jointed_dynamics.hpp"

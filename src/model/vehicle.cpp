@@ -144,8 +144,7 @@ class Lister {
 /// equals for a flat plate.
 constexpr double kRounding = 1e-4;
 
-/// Why no rigid body has this inertia; empty if it is possible. The principal moments of a body are positive, and none
-/// exceeds the sum of the other two.
+/// Empty if the inertia is possible: principal moments are positive, and none exceeds the sum of the other two.
 std::string impossible(const InertiaTensor& i) {
   Eigen::Matrix3d m;
   m << i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz;

@@ -1,26 +1,27 @@
-// Exact dynamics of the five bodies: torso, two leading edges, two wings.
-//
-// Coordinates: the velocity of the whole vehicle's centre of mass C (its momentum / mass), body rate w, and the hinge rates
-// q' = (beta_l', beta_r', theta_l', theta_r'). About C the translation decouples exactly:
+// Exact dynamics of the five bodies: torso, two leading edges, two wings. Coordinates: the velocity of the whole
+// vehicle's centre of mass C (its momentum / mass), body rate w, and the hinge rates q' = (beta_l', beta_r', theta_l',
+// theta_r'). About C the translation decouples exactly:
 //   M dv_C/dt = F + M g
 //   | I    G | | w'  |   | t |     I: inertia about C
 //   | G^T  H | | q'' | = | r |     G: angular momentum about C per unit hinge rate
 //                                  H: hinge inertias, rotor included, less the share of the motion of C, e_i . e_j / M
-// e_i: momentum per unit hinge rate; t: external less relative inertial moment, less w x I w. A hinge also feels the acceleration of its shoulder,
-// A = (F - F_rel)/M + w x (w x d), d from C to the shoulder. Elimination order: body, strokes, rotations. Rotations come last so that a wing that
-// lands on its stop is one 2x2 solve.
+// e_i: momentum per unit hinge rate; t: external less relative inertial moment, less w x I w. A hinge also feels the
+// acceleration of its shoulder, A = (F - F_rel)/M + w x (w x d), d from C to the shoulder. Elimination order: body,
+// strokes, rotations, so that a wing that lands on its stop is one 2x2 solve.
 //
-// Time step h: rates first, then positions with the new rates, a leapfrog in which positions lead by h/2. Terms that depend on rates are taken in the
-// middle of the step, where positions already are (sim/physics_step.hpp): with the rates at its start, the method would be first order in h even
-// without stops. Linear damping acts at the mean of old and new rate, M_rd at |old| new (exact for pure quadratic drag). Dry friction is the torque
-// that would stop the hinge within the step, limited to the friction, so the hinge sticks. The part that reaches a stroke through the rotation of its
-// wing is first order in h.
+// Time step h: rates first, then positions with the new rates, a leapfrog in which positions lead by h/2. Terms that
+// depend on rates are taken in the middle of the step, where positions already are (sim/physics_step.hpp): with the
+// rates at its start, the method would be first order in h even without stops. Linear damping acts at the mean of old
+// and new rate, M_rd at |old| new (exact for pure quadratic drag). Dry friction is the torque that would stop the hinge
+// within the step, limited to the friction, so the hinge sticks. What reaches a stroke through the rotation of its wing
+// is first order in h.
 //
-// A landing takes two steps. In the first, the stop prescribes the turn d that lands on it exactly, which leaves d/h = tau u of the rate u. In the
-// second the hinge would be held, and the rest of its momentum goes. Angles lead rates by h/2, so the landing was (3/2 - tau) h before the rates at
-// the end of the second step, and a torque that pulls the stroke off its stop acts from then on: with a = the acceleration without the stop, the
-// stroke leaves with the rate (3/2 - tau) h a. Exception: another hinge lands in the same step, because its impulse is not such a torque. No
-// penetration, and the impulse never adds energy.
+// A landing takes two steps. In the first, the stop prescribes the turn d that lands on it exactly, which leaves d/h =
+// tau u of the rate u. In the second the hinge would be held, and the rest of its momentum goes. Angles lead rates by
+// h/2, so the landing was (3/2 - tau) h before the rates at the end of the second step, and a torque that pulls the
+// stroke off its stop acts from then on: it leaves with the rate (3/2 - tau) h a, a the acceleration without the stop;
+// not if another hinge lands in the same step, because its impulse is no such torque. No penetration, and the impulse
+// never adds energy.
 #pragma once
 
 #include "model/hinged_wing.hpp"
@@ -28,13 +29,11 @@
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
-/// A quantity of the left and of the right side.
 template <class S>
 struct Sides {
   S left, right;
 };
 
-/// Loads on one side during a step.
 template <class T>
 struct SideLoad {
   T force_x_N, force_z_N;                  // on the wing at the shoulder, in L; the force along the span is 0
@@ -62,7 +61,6 @@ FLAPPY_INLINE WholeVehicle<T> whole_vehicle(const Parameters<T>& p, const Sides<
           p.right.shoulder_m - com};
 }
 
-/// The vehicle's centre of mass from the torso origin, in B.
 template <class T>
 FLAPPY_INLINE Vec3<T> centre_of_mass(const Parameters<T>& p, const State<T>& x) {
   return p.inverse_mass_1_kg * (p.fixed_moment_kg_m + (moment_about_shoulder<+1>(p.left, x.left) +
@@ -76,7 +74,6 @@ FLAPPY_INLINE Sym3<T> hung_at(const Vec3<T>& s, const Vec3<T>& h) {
   return {xx + xx, yy + yy, zz + zz, s.x * h.y + s.y * h.x, s.y * h.z + s.z * h.y, s.x * h.z + s.z * h.x};
 }
 
-/// Second moment of the whole vehicle about C in B.
 template <class T>
 FLAPPY_INLINE Sym3<T> second_moment_about_com(const Parameters<T>& p, const Sides<WingPose<T>>& pose,
                                               const Sides<WingInertia<T>>& wing, const Vec3<T>& com) {
@@ -109,7 +106,6 @@ FLAPPY_INLINE Hinge<T> rotation_hinge(const SideParameters<T>& p, const SideStat
           p.rotation_upper_rad - q.rotation_rad, p.rotation_friction_Nm};
 }
 
-/// Dry friction: the torque that would stop the hinge within the step, limited to the friction.
 template <class T>
 FLAPPY_INLINE T dry_friction(const T& inertia, const Hinge<T>& q, const T& torque, const T& per_step) {
   return clamp(T(-(inertia * T(q.rate * per_step) + torque)), T(-q.friction), q.friction);
@@ -270,7 +266,6 @@ FLAPPY_INLINE RotationSystem<T> eliminate_strokes(const HingeSystem<T>& h, const
   return e;
 }
 
-/// Motion of the vehicle within a step.
 template <class T>
 struct Motion {
   T stroke_left, stroke_right, rotation_left, rotation_right;  // turns of beta and theta in this step, rad

@@ -14,7 +14,6 @@
 namespace flappy::model {
 namespace {
 
-/// All effects that such a vehicle may have, for the message about an unknown one.
 std::string known_effects(const std::string& wrong, const Vehicle& vehicle) {
   std::vector<std::string> names;
   for (const CatalogueEffect& e : catalogue_of(vehicle)) names.push_back(e.info.id);
@@ -39,7 +38,6 @@ void read_effects(const io::Table& table, Vehicle& vehicle) {
 const std::vector<std::string> kBodies = {"torso", "left.leading_edge", "left.wing", "right.leading_edge",
                                           "right.wing"};
 
-/// Reads names of points and their bodies; all else of a point is read as parameters.
 void read_contact(const io::Table& table, Vehicle& vehicle) {
   for (const std::string& name : table.keys()) {
     if (!io::is_bare(name)) table.fail(name, "is no name of a point", "letters, digits, underscores and dashes");

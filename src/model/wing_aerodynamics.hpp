@@ -1,8 +1,7 @@
-// Blade-element quasi-steady aerodynamics of one wing (Fei et al., ICRA 2019, arXiv 1902.09628).
-//
-// E is the frame of the leading edge (y along the span, +y outward on the left, inward on the right), by however many angles it was turned; v and w
-// are the velocity of the shoulder and the angular velocity of E, both in E, relative to the air; s = +1 left, -1 right. Seen from E the wing moves
-// in-plane along -x and out of plane along z. At span r:
+// Blade-element quasi-steady aerodynamics of one wing (Fei et al., ICRA 2019, arXiv 1902.09628). E is the frame of the
+// leading edge (y along the span, +y outward on the left, inward on the right); v and w are the velocity of the
+// shoulder and the angular velocity of E, both in E, relative to the air; s = +1 left, -1 right. Seen from E the wing
+// moves in-plane along -x and out of plane along z. At span r:
 //   U_i = U_i1 r + U_i0      U_i1 = s w_z      U_i0 = -v_x
 //   U_o = U_o1 r + U_o0      U_o1 = s w_x      U_o0 =  v_z
 //   alpha = theta + sgn(U_i) pi/2 - atan(U_o/U_i), at r_cp
@@ -12,11 +11,10 @@
 //   M_rd   = -1/8 rho |theta'| theta' C_rd R c^4 z_rd                          about +y
 //   C_N  = 1.8 sin 2a cos a + 1.95 sin a - 1.5 cos 2a sin a = sin a (0.6 cos^2 a + 3.45)
 //   d_cp = 0.46 - 0.332 cos a - 0.037 cos 3a - 0.013 cos 5a, even and 2 pi periodic
-// The paper's text has the opposite signs in U_i0 and U_o0, +v_x and -v_z. The signs here are those of its published code (Wing.cpp), and of the
-// geometry: translation along -x has the same sign as a stroke that moves the wing along -x.
-//
-// With b = sgn(U_i) pi/2 - atan(U_o/U_i), (cos b, sin b) = (U_o, U_i)/|U| for both signs of U_i: alpha = theta + b needs no arc tangent. Assumes
-// quasi-steady flow, Re about 1e4 and a rigid wing; src/model/effects has the unsteady effects.
+// U_i0 and U_o0 have the signs of the paper's code (Wing.cpp), opposite to its text, and of the geometry: translation
+// along -x has the sign of a stroke that moves the wing along -x. With b = sgn(U_i) pi/2 - atan(U_o/U_i), (cos b, sin
+// b) = (U_o, U_i)/|U| for both signs of U_i: alpha = theta + b needs no arc tangent. Assumes quasi-steady flow, Re
+// about 1e4 and a rigid wing; src/model/effects has the unsteady effects.
 #pragma once
 
 #include "model/flapper.hpp"
@@ -54,8 +52,7 @@ FLAPPY_INLINE WingWrench<T> scaled(const WingWrench<T>& w, const T& factor) {
   return {factor * w.normal_force_N, factor * w.force_x_N, factor * w.force_z_N, factor * w.moment_Nm};
 }
 
-/// Scales the lift by `factor`: the force normal to the plane of the strokes, and its moment about the leading edge's
-/// x.
+/// Scales the lift: the force normal to the plane of the strokes, and its moment about the leading edge's x.
 template <class T>
 FLAPPY_INLINE WingWrench<T> with_lift(const WingWrench<T>& w, const T& factor) {
   return {w.normal_force_N, w.force_x_N, factor * w.force_z_N, {factor * w.moment_Nm.x, w.moment_Nm.y, w.moment_Nm.z}};

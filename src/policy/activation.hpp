@@ -1,4 +1,3 @@
-// Activation functions of hidden layers.
 #pragma once
 
 namespace flappy::policy {

@@ -1,5 +1,5 @@
-// Evaluation of a trained actor (multilayer perceptron) for many flappers at once: rows of observations to rows of actions.
-// Training, evaluation, diagnosis and flights all use it.
+// Evaluation of a trained actor (multilayer perceptron) for many flappers at once: rows of observations to rows of
+// actions. Training, evaluation, diagnosis and flights all use it.
 #pragma once
 
 #include <algorithm>
@@ -80,7 +80,6 @@ FLAPPY_INLINE void activate(Activation kind, int count, L* x) {
   }
 }
 
-/// Layer norm: subtracts the mean of a layer, divides by its standard deviation, and applies gains and shifts.
 template <class L>
 FLAPPY_INLINE void normalise(const Element<L>* gains, int count, L* x) {
   const L share = L(1) / L(static_cast<Element<L>>(count));

@@ -58,7 +58,6 @@ std::string compile(const fs::path& header, const fs::path& source, const fs::pa
   }
 }
 
-/// The first error in a compiler's messages, as one line.
 std::string first_error(const fs::path& header, const std::string& complaints) {
   constexpr std::string_view kMark = "error: ";
   const std::size_t mark = complaints.find(kMark);

@@ -36,11 +36,9 @@ class Policy {
 /// has other sizes, does not compile or fails its self-test.
 std::unique_ptr<const Policy> load_policy(const std::filesystem::path& path, int observations, int actions);
 
-/// Default prefix of the names that flappy-export writes.
 inline constexpr std::string_view kPrefix = "flappy";
 
-/// C text in which the prefix of names that begin with "flappy_" or "FLAPPY_" is replaced by `prefix` in the same case.
-/// Paths are not changed.
+/// Replaces the prefix "flappy_" or "FLAPPY_" of names by `prefix` in the same case; not in paths.
 std::string with_prefix(std::string_view text, std::string_view prefix);
 
 /// Whether this build or installation has the LibTorch plugin, which reads and writes TorchScript.

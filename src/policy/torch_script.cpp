@@ -12,7 +12,6 @@
 namespace flappy::policy {
 namespace {
 
-/// The line of a LibTorch error message that gives the reason.
 std::string reason(const std::string& complaint) {
   const std::size_t mark = complaint.rfind("Error: ");
   const std::size_t begin = mark == std::string::npos ? 0 : mark + 7;

@@ -13,8 +13,8 @@ namespace flappy::policy {
 /// load_policy() for TorchScript files. Throws io::InputError in a build without LibTorch.
 std::unique_ptr<const Policy> load_torch_script(const std::filesystem::path& path, int observations, int actions);
 
-/// The bytes of a TorchScript file whose forward(float[n][inputs]) gives float[n][outputs]; an observation with a NaN
-/// gives zeros. Its attribute `contract` holds the given text. Equal arguments give equal bytes. Throws
+/// The bytes of a TorchScript file whose forward(float[n][inputs]) gives float[n][outputs], zeros for an observation
+/// with a NaN; its attribute `contract` holds the given text. Equal arguments give equal bytes. Throws
 /// std::invalid_argument without LibTorch.
 std::string torch_script(const PolicyNetwork& network, const std::string& contract);
 

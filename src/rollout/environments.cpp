@@ -15,7 +15,6 @@ namespace {
 constexpr std::uint32_t kSettledVehicles = 256;
 /// Observations are clamped to this multiple of a flying vehicle's range, so that only a lost vehicle is clamped.
 constexpr double kObservationRoom = 10;
-/// Largest number of flappers in a block.
 constexpr std::size_t kMaxLanes = 64;
 
 FlyConfig checked(FlyConfig config) {
@@ -116,7 +115,6 @@ class EnvironmentsOf final : public Environments {
   }
 
  private:
-  /// Progress of an environment.
   struct Life {
     std::uint32_t episode = 0, steps = 0;
     double episode_return = 0;
@@ -142,8 +140,7 @@ class EnvironmentsOf final : public Environments {
     }
   }
 
-  /// Starts the present episode. Episode 0 starts as in flappy-fly; if the task starts settled, later ones start from a
-  /// random hover of others_.
+  /// Episode 0 starts as in flappy-fly; if the task starts settled, later ones start from a random hover of others_.
   void start(std::size_t i) {
     Life& life = lives_[i];
     const flight::Snapshot<T>* hover = nullptr;

@@ -1,7 +1,6 @@
-// A configuration as environments of reinforcement learning: step() takes one action and returns one transition for each environment.
-// Environment i depends only on its actions, on the seed, on i and on its episode number: not on the number of environments or of
-// threads. Sensor clocks run on from the last reset of all environments, so an episode that begins later may begin at another moment
-// between two samples.
+// A configuration as environments of reinforcement learning. Environment i depends only on its actions, the seed, i and
+// its episode number, not on the number of environments or threads. Sensor clocks run on from the last reset of all, so
+// a later episode may begin at another moment between two samples.
 #pragma once
 
 #include <memory>
@@ -21,7 +20,6 @@ struct EnvironmentOptions {
   Autoreset autoreset = Autoreset::same_step;
 };
 
-/// Where step() writes its results, one row for each environment.
 struct Transitions {
   float* observation;  ///< [count][observations]
   float* reward;       ///< [count]: sum over the control periods of the step
@@ -44,20 +42,18 @@ class Environments {
   virtual const FlyConfig& config() const = 0;
   std::size_t count() const { return options_.count; }
   const EnvironmentOptions& options() const { return options_; }
-  /// Observed signals; low and high are the bounds to which observations are clamped: ten times the range of a flying
-  /// vehicle.
+  /// Observed signals; low and high bound the observations: ten times the range of a flying vehicle.
   const std::vector<flight::Signal>& observed() const { return observed_; }
   /// Action signals; low and high are the physical values of actions -1 and 1.
   const std::vector<flight::Signal>& actions() const { return actions_; }
   double step_s() const { return step_s_; }  ///< duration of one action
 
-  /// Restarts all environments and their sensor clocks: with a seed at episode 0, as flappy-fly flies it; else each at
-  /// its next episode.
+  /// Restarts all and their sensor clocks: with a seed at episode 0, as flappy-fly flies it; else at their next
+  /// episode.
   virtual void reset(std::optional<std::uint64_t> seed, float* observation) = 0;
   /// Starts the next episode of the environments in `which`; writes only their rows of `observation`.
   virtual void reset(std::span<const bool> which, float* observation) = 0;
-  /// Flies all environments for one action. `action`: [count][actions()], clamped to [-1, 1]. Returns the number of
-  /// episodes that ended.
+  /// Flies all for one action, [count][actions()], clamped to [-1, 1]. Returns the number of episodes that ended.
   virtual std::size_t step(const float* action, const Transitions& to) = 0;
 
   /// [count]: whether the episode of each environment ended in the last step.

@@ -19,8 +19,7 @@ using flight::Task;
 
 constexpr double kNever_s = 1e9;
 
-/// Changes a task for a controller without a policy: no held trim, no hand-back unless to rest, no rules that end
-/// flights early.
+/// Without a policy: no held trim, no hand-back unless to rest, no rules that end flights early.
 void leave_alone(Task& task) {
   auto& k = task.constants;
   k.holds_trim = 0;
@@ -28,7 +27,6 @@ void leave_alone(Task& task) {
   k.limits.faced_by_s = k.limits.arrived_by_s = kNever_s;
 }
 
-/// A part of the evaluation: flights that are flown together.
 template <class T>
 class Part {
  public:

@@ -1,5 +1,5 @@
-// Flies a policy, or a controller alone, on many randomised vehicles. Vehicles, starts and noise depend only on the configuration
-// and the numbers of the flappers, not on the number of threads or the size of the parts.
+// Flies a policy, or a controller alone, on many randomised vehicles. Vehicles, starts and noise depend only on the
+// configuration and the numbers of the flappers, not on the number of threads or the size of the parts.
 #pragma once
 
 #include "io/ranks.hpp"
@@ -19,9 +19,8 @@ struct EvaluationOptions {
   io::Ranks* ranks = nullptr;  ///< each rank flies its share of the flights and gets the outcomes of all
 };
 
-/// An actor or a policy, which acts on top of the controller. With neither, the controller flies alone to the set
-/// point, without hand-back to the controller and without the two rules that end flights early (faced_by_s,
-/// arrived_by_s).
+/// An actor or a policy, on top of the controller. With neither, the controller flies to the set point, without
+/// hand-back to it and without the two rules that end flights early (faced_by_s, arrived_by_s).
 struct Agent {
   std::shared_ptr<const policy::Actor> actor;
   const policy::Policy* policy = nullptr;
@@ -38,8 +37,7 @@ struct Evaluation {
   double wall_s = 0, steps = 0;  ///< wall-clock time, and number of physics steps; both with the hover if it was flown
 };
 
-/// [part][flight]: snapshots of settled hover; empty before the hover is flown, and for tasks that do not start
-/// settled.
+/// [part][flight]: snapshots of settled hover; empty before it is flown, and for tasks that do not start settled.
 template <class T>
 using Hovers = std::vector<std::vector<flight::Snapshot<T>>>;
 
@@ -49,9 +47,8 @@ class Evaluator {
   /// success, is judged for longer than duration_s, is flown on a stand, or has an excitation.
   Evaluator(FlyConfig config, const EvaluationOptions& options);
 
-  /// Flies all vehicles. If the task starts settled, each starts from its own hover, which is flown once for all calls.
-  /// `keep_going` gets the share that is done; false ends the evaluation. Throws std::invalid_argument for an agent
-  /// that does not fit the task.
+  /// Flies all vehicles; their hovers are flown once for all calls. `keep_going` gets the share done; false ends the
+  /// evaluation. Throws std::invalid_argument for an agent that does not fit the task.
   Evaluation fly(const Agent& agent, Detail detail, const std::function<bool(double done)>& keep_going = {});
 
   const FlyConfig& config() const { return config_; }
@@ -63,8 +60,7 @@ class Evaluator {
   Hovers<double> double_hovers_;
 };
 
-/// The configuration without randomisation: all flights use the nominal vehicle and the middle of the task's start
-/// range.
+/// The configuration without randomisation: the nominal vehicle, from the middle of the task's start range.
 FlyConfig nominal(FlyConfig config);
 
 }  // namespace flappy::rollout

@@ -26,8 +26,7 @@ std::string log_name(std::size_t i, std::size_t count) {
   return std::string(width - digits.size(), '0') + digits;
 }
 
-/// Checks the log folder before the flights. Throws io::InputError if it cannot be written or holds files of another
-/// run.
+/// Throws io::InputError if it cannot be written or holds files of another run.
 void prepare_log_folder(const fs::path& folder, std::size_t count, const std::string& vehicle) {
   if (std::ranges::count(flightlog::log_file::kAll, vehicle) > 0)
     throw io::InputError("vehicle: " + vehicle + " is also the name of a file of the log; accepted: another name");

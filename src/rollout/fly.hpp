@@ -1,5 +1,5 @@
-// Flies a configuration many times and summarises the flights. Noise, gyro bias, start and randomised vehicle of a flight depend
-// only on the number of its flapper, so flights may be flown all at once or in parts.
+// Flies a configuration many times and summarises the flights. Noise, gyro bias, start and randomised vehicle of a
+// flight depend only on the number of its flapper, so flights may be flown all at once or in parts.
 #pragma once
 
 #include <functional>
@@ -11,8 +11,7 @@ namespace flappy::rollout {
 
 struct FlyOptions {
   std::size_t count = 1;
-  /// Folder for logs; empty: no logs. It is itself the log of a single flight; several flights get subfolders 0000,
-  /// 0001, ...
+  /// Folder for logs; empty: none. It is the log of a single flight; several flights get subfolders 0000, 0001, ...
   std::filesystem::path log_folder;
   /// File for the log of a single flight as topics of ROS 2; empty: no file.
   std::filesystem::path mcap;

@@ -162,7 +162,6 @@ class Reader {
     c_.welded = t.choice_or("support", "task", {"task", "welded"}) == "welded";
   }
 
-  /// Loads the file that the configuration names under `key`, with its overrides.
   io::Config file(const std::string& key) {
     const std::filesystem::path path = root_.file(key);
     return for_file(key, [&] {

@@ -1,4 +1,4 @@
-// Configuration of flights, as in configs/fly/*.toml. It names files for vehicle, task, sensors and controller.
+// Configuration of flights, as in configs/fly/*.toml.
 //
 //   schema = 1
 //   vehicle, task, sensors, controller = "file"     paths, also those below, are relative to the configuration's folder
@@ -14,8 +14,7 @@
 //   [log.power]       battery_nominal_V, rate_hz, latency_s, voltage_noise_V, current_noise_A
 //   [log.wings]       rate_hz, noise_rad
 //   [dds]             io/dds_config.hpp; it does not change the flights, so `resolved` leaves it out
-//
-// An override "controller.attitude.pitch.p=4" applies to the controller's file; "controller=other.toml" replaces the file.
+// Override "controller.attitude.pitch.p=4" applies to the controller's file; "controller=other.toml" replaces the file.
 #pragma once
 
 #include <map>
@@ -31,7 +30,6 @@
 
 namespace flappy::rollout {
 
-/// Optional streams of a log.
 struct LogOptions {
   std::optional<flightlog::PowerHeader> power;
   std::optional<flightlog::WingsHeader> wings;
@@ -54,15 +52,13 @@ struct FlyConfig {
   std::shared_ptr<const policy::Actor> actor;
   io::DdsConfig dds;
   std::shared_ptr<Watch> watch;  ///< observer of the flights; may be null
-  /// Resolved texts of the files by file name: overrides applied, defaults filled in; fly.toml names the others. Actors
-  /// and scripts are not copied.
+  /// Texts by file name, overrides applied, defaults filled in; fly.toml names the others. Without actors and scripts.
   std::map<std::string, std::string> resolved;
 
   /// The vehicle of a flapper in an episode. With randomisation, every flapper and episode has a vehicle of its own.
   model::Vehicle vehicle_of(std::uint32_t flapper, std::uint32_t episode = 0) const;
 };
 
-/// The configuration without `watch`.
 FlyConfig unwatched(FlyConfig config);
 
 /// Throws io::InputError for anything that is missing, unknown, out of range or inconsistent.

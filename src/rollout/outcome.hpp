@@ -1,5 +1,4 @@
-// Outcomes of flights, for tasks that define success. They are judged on the instantaneous true state at each control tick; nothing
-// is averaged over a wing beat.
+// Outcomes of flights, judged on the instantaneous true state at each control tick, not averaged over a beat.
 #pragma once
 
 #include <array>
@@ -54,17 +53,14 @@ struct Outcome {
   std::uint64_t hash = 0;  ///< hash of the final motion state; also without a monitor
 };
 
-/// Observes one flight tick by tick and determines its outcome.
 class OutcomeMonitor {
  public:
-  /// Construct it at the start of the flight.
   OutcomeMonitor(const flight::Task& task, const flight::Motion& start, const flight::Target& goal);
 
   /// Adds a control tick. `so_far`: captured_s, lost_s, status and ended up to this tick.
   void see(const flight::Motion& truth, const flight::Target& goal, double t_s, const Outcome& so_far);
   /// Whether the energy of this tick counts. Call it before spend().
   bool manoeuvring(double t_s) const;
-  /// Adds the energy of a tick.
   void spend(double energy_J, double period_s, bool handed_back);
   void finish(Outcome& outcome) const;
 
@@ -85,8 +81,7 @@ struct Rate {
 };
 Rate rate_of(std::size_t successes, std::size_t flights);
 
-/// 10 % quantile, median and 90 % quantile; empty without flights; infinite where the quantile is a flight that never
-/// reached the goal.
+/// Empty without flights; infinite where a flight never reached the goal.
 struct Quantiles {
   std::optional<double> p10, median, p90;
 };

@@ -22,9 +22,8 @@ constexpr double kPi = std::numbers::pi;
 /// Rounds to 1 ns, to remove the rounding errors of sums of steps.
 double tidy(double t_s) { return std::round(t_s * 1e9) / 1e9; }
 
-/// Columns of the joints' file of a vehicle with articulated wings: angle, rate and torque of each joint; power of each
-/// side's muscles; positive_work_J: work since the start while a side's power is positive; work_J: work with negative
-/// work subtracted.
+/// Columns of the joints' file: angle, rate and torque of each joint; power of each side's muscles; positive_work_J:
+/// while a side's power is positive; work_J: negative work subtracted.
 const std::vector<std::string> kJointNames = [] {
   std::vector<std::string> names = {"t_s"};
   for (const std::string side : {"left_", "right_"}) {
@@ -43,8 +42,7 @@ const std::vector<std::string> kTruthNames = [] {
   return names;
 }();
 
-/// Sample times of a stream that is sampled at control ticks: each sample is taken at the first tick at or after its
-/// time.
+/// Each sample is taken at the first control tick at or after its time.
 class TickSampler {
  public:
   explicit TickSampler(double rate_hz) : rate_hz_(rate_hz) {}
@@ -260,7 +258,6 @@ struct Recorder<T>::Storage {
     c.phase_rad->push_back(2 * kPi * 0x1p-32 * u.phase);
   }
 
-  /// Records the inputs of a vehicle without motors at physics step `step`.
   void add_inputs(std::int64_t step) {
     const std::vector<double> inputs = sim::storage_of(fleet.batch()).inputs_of(flapper);
     log.command.t_s.push_back(time_s(step));
@@ -272,9 +269,8 @@ struct Recorder<T>::Storage {
     return sim::normal(key, index);
   }
 
-  /// Records battery voltage and motor currents at the start of a control period. They depend on the state then and the
-  /// voltages from then on. To read them, a copy of the block repeats the first physics step of the period with a
-  /// meter.
+  /// Battery voltage and motor currents at the start of a period; they depend on the voltages from then on, so a copy
+  /// of the block repeats the period's first step with a meter.
   void add_power(double t_s) {
     const flightlog::PowerHeader& h = *log.header.power;
     if (!power.due(t_s)) return;

@@ -15,15 +15,13 @@ struct DriverUpdate {
   double left_V, right_V;
 };
 
-/// Driver updates of flapper `i` in the fleet's last control period. A batch does not show them, because they lie
-/// within the period; they are computed again, with the same bits. If voltages were set directly: one update, at the
-/// start of the period.
+/// Driver updates of flapper `i` in the last control period. A batch does not show them: they are computed again, with
+/// the same bits. If voltages were set directly: one update, at the start.
 template <class T>
 std::vector<DriverUpdate> driver_updates(flight::Fleet<T>& fleet, std::size_t i);
 
-/// Header that describes the simulated IMU to readers of logs, who assume one first-order low-pass and a latency. Its
-/// bandwidth_hz is the frequency at which the simulated IMU (mean over an interval, then a low-pass) passes 1/sqrt(2).
-/// The latency is chosen so that the total delay of slow motion is right:
+/// Describes the simulated IMU to readers of logs, who assume one first-order low-pass and a latency. It (mean over an
+/// interval, then a low-pass) passes 1/sqrt(2) at bandwidth_hz. The total delay of slow motion is right:
 ///   latency + interval/2 + (1-c)/c interval - 1/(2 pi bandwidth)      c: share of a new value in the low-pass
 flightlog::ImuHeader imu_header(const flight::ImuSensor& imu);
 

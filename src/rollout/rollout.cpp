@@ -69,7 +69,6 @@ void Rollout<T>::step() {
   if (!recorders_.empty()) each([&](std::size_t i) { recorders_[i].record(); });
 }
 
-/// Lets the policy act for all flappers that have not been handed back.
 template <class T>
 void Rollout<T>::act() {
   std::vector<std::size_t> acting;

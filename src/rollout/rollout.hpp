@@ -1,5 +1,4 @@
-// Flights of a configuration from start to end. A flight depends only on the number of its flapper, so flights may be flown all at
-// once or in parts, on any number of threads.
+// A flight depends only on its flapper's number: all flights at once, or in parts, on any number of threads.
 #pragma once
 
 #include <functional>
@@ -16,14 +15,13 @@ class Rollout {
  public:
   using Hover = std::vector<flight::Snapshot<T>>;
 
-  /// `count` flights, of the flappers from fleet.first_flapper on. The configuration's actor acts, or `policy`; with
-  /// neither, the controller flies alone. If the task starts settled, flights start from the snapshots in `hover`; if
-  /// it is empty, it is flown and filled first.
+  /// `count` flights of the flappers from fleet.first_flapper on. The configuration's actor acts, or `policy`; with
+  /// neither, the controller alone. If the task starts settled, flights start from `hover`, which is filled first if
+  /// empty.
   Rollout(FlyConfig config, std::size_t count, const policy::Policy* policy = nullptr, Hover* hover = nullptr);
   Rollout(const Rollout&) = delete;
 
-  /// Starts an episode of flapper `i`: from the snapshot `hover`; if that is null, from the task's start with the
-  /// episode's vehicle.
+  /// Starts an episode of flapper `i` from the snapshot `hover`, or if null from the task's start with its vehicle.
   static void start(flight::Fleet<T>& fleet, const FlyConfig& config, std::size_t i, std::uint32_t episode,
                     const flight::Snapshot<T>* hover);
 
@@ -39,7 +37,6 @@ class Rollout {
   void step();
   std::int64_t tick() const { return tick_; }  ///< control periods so far
   double t_s() const { return static_cast<double>(tick_) * fleet_.period_s(); }
-  /// Whether the configuration's duration has been flown.
   bool over() const { return tick_ >= ticks(config_); }
   static std::int64_t ticks(const FlyConfig& config);
   double physics_steps() const;  ///< physics steps so far, summed over flights
@@ -60,7 +57,6 @@ class Rollout {
 extern template class Rollout<float>;
 extern template class Rollout<double>;
 
-/// Reports the share of work that is done to a callback, which may end the work.
 struct Progress {
   const std::function<bool(double done)>& keep_going;
   double all, done = 0;

@@ -6,8 +6,7 @@
 namespace flappy::rollout {
 namespace {
 
-/// Task to hover at the origin. Flappers are released in the air, because on a support a controller would accept too
-/// little thrust.
+/// At the origin, released in the air: on a support a controller would accept too little thrust.
 flight::Task staying() {
   flight::Task task;
   task.name = "settle";

@@ -9,9 +9,8 @@ namespace flappy::rollout {
 
 inline constexpr double kHover_s = 3;  // long enough for a controller to learn its trim
 
-/// Snapshots of `count` vehicles after `seconds` of hover. Each is taken at another phase of the wing beat. `options`:
-/// sensors, controller and world of the later flights; its task and its world's shapes are not used. Each snapshot
-/// depends only on its vehicle, the options and the number of its flapper.
+/// Snapshots of `count` vehicles after `seconds` of hover, each at another phase of the beat. The task and shapes of
+/// `options` are not used. A snapshot depends only on its vehicle, the options and its flapper's number.
 template <class T>
 std::vector<flight::Snapshot<T>> settle(const flight::FleetOptions& options, std::size_t count, double seconds,
                                         const std::function<model::Vehicle(std::uint32_t flapper)>& vehicle);

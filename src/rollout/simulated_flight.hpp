@@ -13,9 +13,8 @@ struct SimulatedFlight {
   bool lost = false;                        ///< frozen, tipped over, or far from its path while it was logged
 };
 
-/// Flies `vehicle` `copies` times on one thread, each time with other noise. `given`: path, controller or actor,
-/// sensors, excitation and duration; its vehicle and randomisation are not used. Before `from_s`, flights are neither
-/// logged nor judged.
+/// Flies `vehicle` `copies` times on one thread, each with other noise. The vehicle and randomisation of `given` are
+/// not used. Before `from_s`, flights are neither logged nor judged.
 std::vector<SimulatedFlight> simulate(const FlyConfig& given, const model::Vehicle& vehicle, std::size_t copies,
                                       double from_s = 0);
 

@@ -76,7 +76,6 @@ struct Problem {
   }
 };
 
-/// Flies the flights and scores them.
 void judge(const TuneConfig& config, FlyConfig fly, std::span<Score> scores) {
   Rollout<float> flights(std::move(fly), scores.size());
   const flight::Fleet<float>& fleet = flights.fleet();

@@ -1,9 +1,8 @@
-// Tuning of a controller: evolution strategy (CMA-ES) over the logarithms of its gains; the cost is the mean over many flights.
-//
+// Tuning of a controller: CMA-ES over the logarithms of its gains; the cost is the mean over many flights.
 //   schema = 1
 //   vary = ["attitude.roll.p", ...]       gains, as in the controller's file; each starts above 0
 //   duration_s, settle_s, seed, population, generations
-//   [[trial]]                             flights that give the cost; the search starts from the first trial's controller
+//   [[trial]]                             flights that give the cost; the first one's controller starts the search
 //   fly = "file"                          a configuration of flappy-fly
 //   count, weight
 #pragma once
@@ -34,10 +33,9 @@ struct TuneConfig {
 /// Throws io::InputError for anything that is missing, unknown or out of range.
 TuneConfig read_tune_config(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
 
-/// Mean cost of a flight, weighted over trials. A flight that strays 0.3 m from its path costs 3 to 4, more if it
-/// strays earlier. Any other flight costs (largest distance / 0.3 m)^2 plus, after settle_s, the mean of (roll / 5
-/// deg)^2 + (pitch / 5 deg)^2 + (distance / 5 cm)^2 plus the mean of (yaw / 10 deg)^2, the latter at most 1. Errors are
-/// from the set point.
+/// Mean cost of a flight, weighted over trials. Straying 0.3 m from the path costs 3 to 4, more if earlier. Else
+/// (largest distance / 0.3 m)^2 plus, after settle_s, the mean of (roll / 5 deg)^2 + (pitch / 5 deg)^2 + (distance / 5
+/// cm)^2 plus that of (yaw / 10 deg)^2, the latter at most 1; errors from the set point.
 double cost_of(const TuneConfig& config, const flight::Controller& controller);
 
 struct TuneResult {
@@ -46,7 +44,6 @@ struct TuneResult {
   unsigned generations = 0;
 };
 
-/// Searches for the best gains. `progress` is called after each generation; false ends the search.
 TuneResult tune(const TuneConfig& config, const std::function<bool(const TuneResult&)>& progress);
 
 }  // namespace flappy::rollout

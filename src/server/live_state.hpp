@@ -1,4 +1,4 @@
-// The live state: the state of the flapper that the dashboard shows. A receiver of telemetry sets it, the dashboard reads it.
+// The live state of the flapper that the dashboard shows. A receiver of telemetry sets it, the dashboard reads it.
 #pragma once
 
 #include <array>

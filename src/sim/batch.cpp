@@ -20,8 +20,7 @@ using model::Parameters;
 using model::State;
 using model::Vec3;
 
-/// Largest h^2 omega^2 of a contact. It exceeds kStiffestContact, which limits vehicle files, because vehicles are also
-/// drawn at random around such a file.
+/// Largest h^2 omega^2 of a contact: above kStiffestContact, the limit of files, around which vehicles are drawn.
 constexpr double kStiffestDrawn = 2;
 
 /// Velocity of the centre of mass relative to the torso origin, in W.
@@ -110,8 +109,7 @@ void Batch<T>::Storage::put_contact(std::size_t i, const std::vector<T>& rows, c
   for_contact_memory(i, [&](T& number) { number = memory[next++]; });
 }
 
-/// Effects of sensors only: other effects of beat-averaged robots are in rows of their own, and articulated wings have
-/// none.
+/// Effects of sensors only: beat-averaged robots have others in rows of their own, articulated wings have none.
 template <class T>
 void Batch<T>::Storage::put_effects_of_sensors(std::size_t i, const model::Vehicle& v) {
   model::Vehicle seen;
@@ -195,7 +193,6 @@ void Batch<T>::Storage::put_effects(std::size_t i, std::uint64_t set, const std:
   unite_effects(i / kLanes<T>);
 }
 
-/// Gives the effects of `set` memory, and keeps the memory that others already have.
 template <class T>
 void Batch<T>::Storage::keep_effects(std::uint64_t set) {
   if (lane_effects.empty()) {
@@ -317,7 +314,6 @@ void Batch<T>::Storage::put_state(std::size_t i, const FlapperState& state, Star
   x.right = hinges(1);
   const Vec3<double> velocity{state.velocity_m_s[0], state.velocity_m_s[1], state.velocity_m_s[2]};
   x.com_velocity_m_s = velocity + com_minus_origin_velocity(get<Parameters<double>>(block.parameters, lane), x);
-  // with points of contact, the flapper stands on them without a support
   if (start == Start::standing && points.empty()) x.support = static_cast<double>(model::Support::standing);
   if (start == Start::welded) x.support = static_cast<double>(model::Support::welded);
   put(x, block.state, lane);

@@ -1,7 +1,6 @@
-// Data of beat-averaged robots (model/beat_averaged.hpp) in addition to the rows of their Block. The robots of a batch share inputs, actuators and
-// expressions; every number is each robot's own.
-//
-// In a Block, drive.input has the controller's outputs, which the vehicle's inputs mix; sides, phase and voltages are unused.
+// Data of beat-averaged robots in addition to the rows of their Block. The robots of a batch share inputs, actuators
+// and expressions, not numbers. In a Block, drive.input has the controller's outputs, which the vehicle's inputs mix;
+// sides, phase and voltages are unused.
 #pragma once
 
 #include <tuple>
@@ -19,21 +18,18 @@ inline constexpr double kLongestDelay_s = 0.5;
 
 inline namespace FLAPPY_ISA {
 
-/// One input, as rows.
 template <class T>
 struct BeatAveragedInput {
   T low, high, neutral;
   T mix[4];
 };
 
-/// One actuator, as rows.
 template <class T>
 struct BeatAveragedActuator {
   T gain, offset;
   T kept;  // share of its distance to the commanded value that remains after half a step
 };
 
-/// The rigid body, as rows.
 template <class T>
 struct BeatAveragedBody {
   T mass_kg;

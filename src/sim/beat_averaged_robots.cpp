@@ -1,4 +1,3 @@
-// Beat-averaged robots of a batch: conversion of vehicles to rows.
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>

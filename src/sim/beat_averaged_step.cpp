@@ -1,7 +1,8 @@
 // The step of beat-averaged robots: a rigid body under the force and moment of the vehicle's expressions and effects.
-//   m v' = R F + m g      I w' = M - w x I w      q' = q w / 2      F, M of (q, position, v, w, actuators), about the centre of mass
-// Positions drift for half a step; then rates change by the loads in the middle of the step, which depend on these rates (the midpoint rule); then
-// positions drift on with the new rates: of second order. Compiled once for each instruction set (FLAPPY_ISA); the bits are the same on all of them.
+//   m v' = R F + m g   I w' = M - w x I w   q' = q w / 2   about the centre of mass
+// Positions drift for half a step; then rates change by the loads in the middle, which depend on them (midpoint rule);
+// then positions drift on with the new rates: of second order. Compiled once per instruction set (FLAPPY_ISA), with the
+// same bits.
 #include <utility>
 
 #include "sim/end_of_steps.hpp"
@@ -10,7 +11,6 @@ namespace flappy::sim {
 inline namespace FLAPPY_ISA {
 namespace {
 
-/// Motion of a rigid body.
 template <class L>
 struct Body {
   Vec3<L> com_m, velocity_m_s;  // of the centre of mass, in W
@@ -24,7 +24,6 @@ struct Acceleration {
   BeatAveragedLoads<L> load;            // without gravity
 };
 
-/// The robots of one register of lanes, with the constants of their steps.
 template <class T>
 class BeatAveragedLanes {
   using L = Lanes<T, kWidth<T>>;
@@ -41,7 +40,6 @@ class BeatAveragedLanes {
 
   const BeatAveragedBody<L>& body() const { return body_; }
 
-  /// Mixes the inputs of these steps from the controller's outputs.
   void set_inputs(const WingBeat<L>& says) {
     const L four[] = {says.amplitude_V, says.difference_V, says.bias_V, says.split_cycle};
     for (std::size_t k = 0; k < rows_of_.inputs; ++k) {
@@ -115,7 +113,6 @@ class BeatAveragedLanes {
     return a;
   }
 
-  /// Stores the memory of the lanes in `moves`.
   void store(typename L::Mask moves) const {
     where(moves, L(1), memory(0)).store(memory_at(0));
     for (std::size_t k = 0; k < rows_of_.actuator_count; ++k)
@@ -133,8 +130,7 @@ class BeatAveragedLanes {
                                               first_);
   }
 
-  /// Initialises a robot that has not flown yet: its actuators and past inputs are those of its first inputs held for
-  /// long.
+  /// For a robot that has not flown: actuators and past inputs as if its first inputs had been held for long.
   void start_fresh() {
     const auto fresh = memory(0) == L(0);
     if (!any(fresh)) return;
@@ -165,7 +161,6 @@ class BeatAveragedLanes {
     }
   }
 
-  /// Force and moment of the vehicle's expressions, about the torso's origin.
   BeatAveragedLoads<L> own_load(const BeatAveragedState<L>& s) const {
     const Vec3<L> air = s.velocity_B_m_s - s.wind_B_m_s;
     const std::size_t n = rows_of_.actuator_count;
@@ -217,8 +212,7 @@ FLAPPY_INLINE void drift(Body<L>& x, const L& time_s) {
   x.attitude = rotated(x.attitude, L(L(0.5) * time_s) * x.rate_rad_s);
 }
 
-/// Adds the loads to the impulse on the support of a held body, and to its averaged lift; releases a standing body once
-/// that lift carries it.
+/// Adds to support impulse and averaged lift of a held body; releases a standing body once that lift carries it.
 template <class L>
 FLAPPY_INLINE void feel(const Parameters<L>& p, const BeatAveragedBody<L>& body, const BeatAveragedLoads<L>& load,
                         const L& lift_N, const StepPlan& plan, State<L>& x) {

@@ -1,5 +1,5 @@
-// A block: kLanes flappers next to each other, one row for each number of a flapper. It is the unit of work: a block steps a whole control period
-// with its state in registers and L1 before the next block starts, and blocks do not depend on each other.
+// A block: kLanes flappers next to each other, one row for each number of a flapper. The unit of work: a block steps a
+// whole control period with its state in registers and L1, independent of other blocks.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +11,11 @@ namespace flappy::sim {
 
 inline namespace FLAPPY_ISA {
 
-/// Voltages of the motors, held between driver updates.
 template <class T>
 struct Voltages {
   T left_V, right_V;
 };
 
-/// Inputs, limits and voltages of a flapper between its control updates, as rows.
 template <class T>
 struct Drive {
   model::WingBeat<T> input;  // as commanded
@@ -35,8 +33,7 @@ inline constexpr int kParameterRows = model::kRows<model::Parameters>;
 inline constexpr int kStateRows = model::kRows<model::State>;
 inline constexpr int kDriveRows = model::kRows<Drive>;
 
-/// Status bit of a flapper whose voltages were set directly and stay, while others have those of their wing beat. It is
-/// kept in the word of Status, because a row of its own would make every flapper larger than 2 kB.
+/// Status bit: voltages were set directly and stay. In the word of Status, because a row would exceed 2 kB per flapper.
 inline constexpr std::uint32_t kDirect = std::uint32_t{1} << 31;
 
 template <class T>

@@ -1,5 +1,4 @@
-// End of the steps of every kernel: contact events, and freezing of implausible states. For files that are compiled once for each
-// instruction set.
+// End of the steps of every kernel: contact events, and freezing of implausible states.
 #pragma once
 
 #include "sim/rows.hpp"
@@ -78,7 +77,6 @@ FLAPPY_INLINE typename L::Mask freeze_implausible(const State<L>& x, Block<T>& b
   return moves;
 }
 
-/// Restores the state `before` in the given lanes.
 template <class L>
 FLAPPY_INLINE void keep(const typename L::Mask& lanes, const State<L>& before, State<L>& x) {
   const L* from = reinterpret_cast<const L*>(&before);

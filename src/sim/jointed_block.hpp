@@ -1,8 +1,7 @@
-// Data of vehicles with articulated wings (model/jointed.hpp) in addition to the rows of their Block. The vehicles of a batch share modes, harmonics,
-// strips and the structure of their modulations; every number is each vehicle's own.
-//
-// In a Block, parameters have the single-point wings and the extent, drive.input has the controller's outputs, which the vehicle's inputs mix, and
-// the velocity of the state is that of the torso's origin.
+// Data of vehicles with articulated wings in addition to the rows of their Block. The vehicles of a batch share modes,
+// harmonics, strips and modulations, not numbers. In a Block, parameters have the single-point wings and the extent,
+// drive.input has the controller's outputs, which the inputs mix, and the state's velocity is that of the torso's
+// origin.
 #pragma once
 
 #include <vector>
@@ -73,7 +72,6 @@ struct JointedProgram {
   bool operator==(const JointedProgram&) const = default;
 };
 
-/// Pointers to the data of one block.
 template <class T>
 struct JointedRows {
   const JointedShape* shape = nullptr;

@@ -1,8 +1,8 @@
-// The step of vehicles with articulated wings: a gait prescribes the driven angles, model/jointed_dynamics.hpp solves for the rest.
-// Positions, free angles and the clock of the beat drift for half a step. In the middle, loads and accelerations are computed with the rates
-// u + h/2 u'(previous step), and change the rates; then positions drift on with the new rates (leapfrog, with rates by the method of Adams and
-// Bashforth: of second order). Driven angles are exactly those of the gait in the middle. Compiled once for each instruction set (FLAPPY_ISA); the
-// bits are the same on all of them.
+// The step of vehicles with articulated wings: a gait prescribes the driven angles, model/jointed_dynamics.hpp solves
+// for the rest. Positions, free angles and the clock of the beat drift for half a step. In the middle, accelerations,
+// computed with the rates u + h/2 u'(previous step), change the rates; then positions drift on with the new ones
+// (leapfrog, rates by Adams and Bashforth: of second order). Driven angles are exactly the gait's in the middle.
+// Compiled once per instruction set (FLAPPY_ISA), with the same bits.
 #include <cstddef>
 #include <type_traits>
 
@@ -15,11 +15,9 @@ namespace {
 
 using Mode = Jointed::Mode;
 
-/// Angles of both sides, with rates and accelerations.
 template <class L>
 using Angles = Sides<Moving<L>[kJoints]>;
 
-/// The vehicles of one register of lanes, with the constants of their steps.
 template <class T>
 class JointedLanes {
   using L = Lanes<T, kWidth<T>>;
@@ -35,7 +33,6 @@ class JointedLanes {
         block_(view_rows<Parameters<L>>(block.parameters, first)),
         m_(load_rows<JointedMemory<L>>(memory(), first)) {}
 
-  /// Mixes the inputs of these steps from the controller's outputs.
   void set_inputs(const WingBeat<L>& says, const State<L>& x) {
     const L four[] = {says.amplitude_V, says.difference_V, says.bias_V, says.split_cycle};
     for (int k = 0; k < shape_.inputs; ++k) {
@@ -115,8 +112,7 @@ class JointedLanes {
       }
   }
 
-  /// Loads of air on one side at its shoulder in E, and pulls of its free angles. `shoulder_m_s`: velocity of the
-  /// shoulder in the air, in B.
+  /// Air at the shoulder in E, and pulls of free angles. `shoulder_m_s`: its velocity in the air, in B.
   template <int s>
   JointedLoad<L> load_side(const JointedPose<L>& g, const Vec3<L>& shoulder_m_s) const {
     constexpr int kSide = s > 0 ? 0 : 1;
@@ -145,8 +141,7 @@ class JointedLanes {
       if (shape_.modes[kSide][j] != Mode::free) continue;
       load.pulls[j] = pull_of(p.joints[j], m_.angle_rad[kSide][j], m_.rate_rad_s[kSide][j], step_);
       if (j != kRotation) continue;
-      // aerodynamic damping of a light wing may be stiff: it acts as inertia, relative to the acceleration of the
-      // last step
+      // may be stiff for a light wing: it acts as inertia, relative to the acceleration of the last step
       const L damped = L(step_ * L(p.rotational_damping_Nm_s2 * abs(g.wing_rate.y)));
       load.pulls[j].inertia_kg_m2 += damped;
       load.pulls[j].torque_Nm += damped * m_.acceleration_rad_s2[kSide][j];
@@ -154,7 +149,6 @@ class JointedLanes {
     return load;
   }
 
-  /// Advances the rates of free angles, and computes torque and work of the others.
   void take(const JointedMotion<L>& motion, const Angles<L>& q) {
     m_.acceleration_B_m_s2 = motion.acceleration_m_s2;
     m_.angular_acceleration_rad_s2 = motion.angular_acceleration_rad_s2;
@@ -253,7 +247,6 @@ class JointedLanes {
         if (shape_.modes[side][j] == Mode::free) use(side, j);
   }
 
-  /// Beats per second with the present inputs.
   L frequency() const {
     L factor(1);
     for (int i = 0; i < shape_.modulations; ++i)
@@ -305,8 +298,7 @@ class JointedLanes {
   L positive_J{0.0}, all_J{0.0};
 };
 
-/// Adds the air on the wings to the impulse on the support of a held body, and to its averaged lift; releases a
-/// standing body once that lift carries it.
+/// Adds to support impulse and averaged lift of a held body; releases a standing body once that lift carries it.
 template <class L>
 FLAPPY_INLINE void feel(const Parameters<L>& p, const Vec3<L>& force_B, const Vec3<L>& moment_B, const Matrix3<L>& R,
                         const StepPlan& plan, const typename L::Mask& held, State<L>& x) {

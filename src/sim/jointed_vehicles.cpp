@@ -1,4 +1,3 @@
-// Vehicles of a batch with articulated wings: conversion of vehicles to rows.
 #include <stdexcept>
 
 #include "model/derive_jointed.hpp"

@@ -6,8 +6,7 @@
 
 #include "sim/step.hpp"
 
-/// Declares `kernel` for each instruction set (FLAPPY_ISA) for which it is compiled, and a table `kernel`s of all,
-/// worst first.
+/// Declares `kernel` for each instruction set (FLAPPY_ISA), and a table `kernel`s of all, worst first.
 #if defined(__aarch64__)
 #define FLAPPY_KERNELS(Type, kernel) \
   inline namespace scalar {          \
@@ -36,8 +35,8 @@
 
 namespace flappy::sim {
 
-/// Index of an instruction set in such tables; the best one for an empty name. Throws std::invalid_argument if this
-/// processor does not have it.
+/// Index of an instruction set in these tables; the best for an empty name. std::invalid_argument if the processor
+/// lacks it.
 std::size_t place_of(std::string_view instruction_set);
 
 /// The element for an instruction set of T's table.

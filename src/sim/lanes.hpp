@@ -1,6 +1,6 @@
-// Lanes<T, N>: N flappers in one register. Arithmetic is elementwise and the same to the bit on every instruction set: a product that meets a sum is
-// one fused multiply-add *because the source says so* (operator* returns an unevaluated Product), never because a compiler chose to contract. The
-// instruction set v2 has no fma instruction and emulates it.
+// Lanes<T, N>: N flappers in one register. Arithmetic is elementwise and the same to the bit on every instruction set:
+// a product that meets a sum is one fused multiply-add *because the source says so* (operator* returns an unevaluated
+// Product), never because a compiler chose to contract. The instruction set v2 has no fma instruction and emulates it.
 #pragma once
 
 #if defined(__x86_64__)
@@ -104,8 +104,7 @@ struct Lanes {
   friend FLAPPY_INLINE Lanes where(Mask m, Lanes yes, Lanes no) { return select(m, yes, no); }
   friend FLAPPY_INLINE Lanes clamp(Lanes v, Lanes low, Lanes high) { return min(max(v, low), high); }
 
-  // Elementwise functions that the compiler's vector types lack. Intrinsics replace the loops where the processor has
-  // the instruction. All are correctly rounded, so the bits are the same.
+  // Intrinsics replace loops where the processor has them; all are correctly rounded, so the bits are the same.
   template <class Op>
   static FLAPPY_INLINE Lanes each(Op op) {
     Lanes r;

@@ -1,5 +1,5 @@
-// Random numbers for many flappers at once: the words of random.hpp, drawn in lanes. A word w becomes the uniform number
-// ((w >> 9) + 1/2) 2^-23, which float represents exactly, so flights in float and in double have the same noise.
+// Random numbers for many flappers at once: the words of random.hpp, drawn in lanes. A word w becomes the uniform
+// number ((w >> 9) + 1/2) 2^-23, which float represents exactly, so flights in float and in double have the same noise.
 #pragma once
 
 #if defined(__x86_64__)
@@ -24,8 +24,7 @@ struct Normals4 {
   L n[4];
 };
 
-/// 32-bit words of N lanes, each in the low half of 64 bits, as 64-bit multiplication needs and returns them; the high
-/// half is undefined.
+/// 32-bit words, each in the low half of 64 bits, as 64-bit multiplication needs and returns them; high half undefined.
 template <int N>
 struct WideWords {
   using Raw __attribute__((vector_size(N * sizeof(std::uint64_t)))) = std::uint64_t;

@@ -13,14 +13,12 @@ inline namespace FLAPPY_ISA {
 
 using namespace model;
 
-/// Constants of all steps of a block.
 template <class T>
 struct Constants {
   T step, half_step, per_step, gravity, ground_z, ceiling_z;
 };
 
-/// Effects in force in a block, with their parameters in lanes. All lanes share the set; magnitudes may be 0 in some
-/// lanes.
+/// Effects in force in a block. All lanes share the set; magnitudes may be 0 in some lanes.
 template <class T>
 struct ActiveEffects {
   std::uint64_t set = 0, kept = 0;  // effects in force; effects with memory in the batch
@@ -76,10 +74,9 @@ FLAPPY_INLINE auto on_stop(const T& angle, const T& lower, const T& upper) {
 }
 
 /// Rates in the middle of the step, where angles already are. With u the rate of this step and u_before of the last,
-/// the next rate is v = 2 u - u_before, limited by the stops; a hinge on its stop keeps its rate, because it has none
-/// to extrapolate. Mean and mean square, (u + v)/2 and (u^2 + v^2)/2, are second order. For a landing they are the true
-/// values of its two steps, or near them: within these the rate drops to 0, tau of a step after the angle was where it
-/// is, and they sum to u (1/2 + tau) and u^2 (1/2 + tau^2).
+/// the next is v = 2 u - u_before, limited by the stops; a hinge on its stop keeps its rate. Mean and mean square, (u +
+/// v)/2 and (u^2 + v^2)/2, are second order. For a landing they are near the true values of its two steps, in which the
+/// rate drops to 0, tau of a step after the angle was where it is: sums u (1/2 + tau), u^2 (1/2 + tau^2).
 template <class T>
 FLAPPY_INLINE HingeRates<T> mid_step_rates(const SideParameters<T>& p, const SideState<T>& q,
                                            const T& rotation_lower_rad, const T& rotation_upper_rad, const T& step,
@@ -95,8 +92,8 @@ FLAPPY_INLINE HingeRates<T> mid_step_rates(const SideParameters<T>& p, const Sid
 }
 
 /// Loads of air and motor on one side. `air` includes M_rd at the mid-step rate of theta, `mid_rad_s`, which the body
-/// feels; the hinge feels |old| new instead. Damping is implicit, as inertia added to the hinge: step/2 damping, and
-/// step M_rd/|theta'|.
+/// feels; the hinge feels |old| new instead. Damping is implicit, as inertia on the hinge: step/2 damping, and step
+/// M_rd/|theta'|.
 template <int side, class T>
 FLAPPY_INLINE SideLoad<T> load_side(const SideParameters<T>& p, const SideState<T>& q, const T& mid_rad_s,
                                     const WingWrench<T>& air, const T& voltage_V, const T& step) {
@@ -133,7 +130,6 @@ FLAPPY_INLINE void turn(const SideParameters<T>& p, SideState<T>& q, const T& be
   q.rotation_rad = clamp(T(q.rotation_rad + theta), p.rotation_lower_rad, p.rotation_upper_rad);
 }
 
-/// Distance of the torso's origin to the nearest wall, and the normal of that wall.
 template <class T>
 FLAPPY_INLINE void find_wall(const ActiveEffects<T>& effects, Surroundings<T>& s) {
   s.wall_clearance_m = T(1e6);
@@ -186,7 +182,6 @@ FLAPPY_INLINE void put_hinges(const Hinges<T>& h, SideParameters<T>& p) {
   p.rotation_upper_rad = h.rotation_upper_rad;
 }
 
-/// Loads on a flapper without effects.
 template <bool with_effects, class T>
 struct Acting {
   const Parameters<T>& p;
@@ -217,9 +212,8 @@ FLAPPY_INLINE void read_meter(const Surroundings<T>& s, const Sides<Hinges<T>>& 
   current(hinges.right, s.constants.right).store(meter + 2 * stride);
 }
 
-/// Energy that a motor draws in a step in excess of that at the driver's voltage `given_V` without effects: V i h, at
-/// the rate at the end of the step, which is the rate that turns the wing; exactly 0 if no effect changes the motor.
-/// `slip_rad_s`: rate of the motor relative to the wing.
+/// Energy of a motor in a step in excess of that at `given_V` without effects: V i h, at the rate at the end of the
+/// step, which turns the wing; exactly 0 if no effect changes the motor. `slip_rad_s`: motor relative to wing.
 template <int side, class T>
 FLAPPY_INLINE T extra_work_J(const ActiveEffects<T>& effects, const Hinges<T>& h, const T& given_V, const T& rate_rad_s,
                              const T& slip_rad_s, const T& step_s) {
@@ -250,7 +244,6 @@ FLAPPY_INLINE void widen_stops(const T& reach_rad, T& lower_rad, T& upper_rad) {
   upper_rad = where(reach_rad > T(0), reach_rad, upper_rad);
 }
 
-/// Applies all stages, in the order of effect.hpp.
 template <class T>
 FLAPPY_INLINE void apply_effects(const ActiveEffects<T>& effects, Acting<true, T>& a) {
   Surroundings<T>& s = a.s;
@@ -303,7 +296,6 @@ FLAPPY_INLINE void add_hinges(const Hinges<T>& h, SideLoad<T>& load, WingInertia
   wing.cross_inertia += h.cross_inertia_kg_m2;
 }
 
-/// Lets effects update their memory at the end of the step.
 template <class T>
 FLAPPY_INLINE void remember(const ActiveEffects<T>& effects, Acting<true, T>& a) {
   effects.apply(
@@ -327,7 +319,6 @@ FLAPPY_INLINE typename T::Mask hold(const Parameters<T>& p, State<T>& x, const W
   return x.support > T(0);
 }
 
-/// Adds the air on the wings to the impulse on the support of a held body, and to its averaged lift.
 template <class T>
 FLAPPY_INLINE void feel(const Parameters<T>& p, State<T>& x, const Sides<WingPose<T>>& pose,
                         const Sides<WingWrench<T>>& air, const T& lift, const T& step, typename T::Mask held) {
@@ -391,12 +382,10 @@ FLAPPY_INLINE Acting<with_effects, T> acts_on(const Parameters<T>& p, const Stat
   }
 }
 
-/// One physics step. `com_m`: the vehicle's centre of mass in W, integrated instead of the torso's origin because
-/// momentum is that of the centre of mass.
+/// One physics step. `com_m`: centre of mass in W, integrated instead of the torso's origin as momentum belongs to it.
 template <bool with_effects, class T>
 FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const Voltages<T>& voltages, Vec3<T>& com_m,
                                 const ActiveEffects<T>& effects, const Constants<T>& k) {
-  // pose and motion of the wings
   const Matrix3<T> R = rotation_matrix(x.attitude);
   const Vec3<T>& w = x.body_rate_rad_s;
   const auto mid_rates = [&](const SideParameters<T>& p, const SideState<T>& q) {
@@ -409,7 +398,6 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const
   const WholeVehicle<T> whole = whole_vehicle(vehicle, pose);
   const auto held = hold(vehicle, x, whole, R, com_m, k.gravity);
 
-  // loads: air, effects beyond the base model, motors
   auto acting = acts_on<with_effects>(vehicle, x, voltages, R, pose, whole, com_m, effects, k);
   if constexpr (with_effects) apply_effects(effects, acting);
   const Parameters<T>& p = acting.p;
@@ -434,7 +422,6 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const
     slip_right = acting.hinges.right.motor_rate_rad_s - x.right.stroke_rate_rad_s;
   }
 
-  // new rates
   const BodyInertia<T> inertia = body_inertia(p, x, pose, wing, whole);
   const BodyDrive<T> body_drive = drive_body(p, x, pose, wing, whole, inertia, load, acting.body, R.row_z, k.gravity);
   const HingeSystem<T> hinges = eliminate_body(p, pose, wing, whole, inertia, body_drive, load);
@@ -444,7 +431,6 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const
   x.com_velocity_m_s = add_scaled(x.com_velocity_m_s, T(k.step * p.inverse_mass_1_kg), force);
   x.com_velocity_m_s.z -= k.step * k.gravity;
 
-  // new positions, with the new rates
   turn<+1>(p.left, x.left, m.stroke_left, m.rotation_left, k.per_step);
   turn<-1>(p.right, x.right, m.stroke_right, m.rotation_right, k.per_step);
   com_m = add_scaled(com_m, k.step, x.com_velocity_m_s);

@@ -1,5 +1,4 @@
-// Counter-based random numbers (Philox 4x32-10, Random123): a draw depends on its key alone, so it is the same for any number of threads and any
-// order of draws.
+// Counter-based random numbers (Philox 4x32-10, Random123): a draw depends on its key alone, not on order or threads.
 #pragma once
 
 #include <Random123/philox.h>

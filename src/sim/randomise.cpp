@@ -134,8 +134,7 @@ void Randomisation::check_reach(const io::Table& table, const Draw& draw,
   }
 }
 
-/// Refuses impossible inertias. Possible inertias are a convex set and the laws are linear, so the ends of a draw
-/// suffice.
+/// Refuses impossible inertias at the ends of a draw, which suffice: possible inertias are convex, the laws linear.
 void Randomisation::check_bodies(const io::Table& table, const Draw& draw) const {
   for (const double extreme : {-draw.cut_sd, 0.0, draw.cut_sd}) {
     model::Vehicle vehicle = nominal_;
@@ -196,8 +195,7 @@ model::Vehicle Randomisation::sample(RandomKey key) const {
 model::Vehicle Randomisation::from_posterior(std::vector<double> variates) const {
   model::Vehicle vehicle = nominal_;
   const std::vector<model::Parameter> parameters = model::parameters(vehicle);
-  // A draw with an impossible inertia is moved towards the mean, where it is possible: possible inertias are a convex
-  // set.
+  // impossible inertias move towards the possible mean; possible ones are a convex set
   for (int tries = 0; tries < 60; ++tries) {
     for (const Uncertain& u : posterior_) {
       double value = u.mean;

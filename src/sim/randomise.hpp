@@ -1,20 +1,19 @@
 // Randomised vehicles: a table of distributions over the parameters of a nominal vehicle.
 //
 //   [[randomise]]
-//   parameters = ["torso.mass_kg", "torso.inertia_kg_m2"]   # one draw for all; a table stands for all below it
 //   parameters = ["torso.mass_kg", "torso.inertia_kg_m2"]   # one draw for all; a table stands for all parameters in it
+//   law = "scale_normal"
 //   sd = 0.10
 //   cut_sd = 3.0                                            # draws farther out are drawn again
 //   minor = true                                            # small influence: a fit may treat it as linear
 //   each = true                                             # a separate draw for each of the parameters
 //
-// With n a normal draw and u a uniform one: scale_normal x (1 + sd n), scale_half_normal x (1 + |sd n|),
-// replace_normal mean + sd n, add_normal + sd n, scale_uniform x u, replace_uniform u in [low, high].
+// With n a normal draw and u a uniform one: scale_normal x (1 + sd n), scale_half_normal x (1 + |sd n|), replace_normal
+// mean + sd n, add_normal + sd n, scale_uniform x u, replace_uniform u in [low, high]. Minor draws come after all
+// others; sample() leaves them out, and they may give a body an impossible inertia to one side.
 //
-// Minor draws come after all others. sample() leaves them out, and they may give a body an impossible inertia to one side.
-//
-// Alternatively, the posterior of a vehicle file: its parameters are drawn jointly from one normal distribution, independently of their nominal
-// values, and clipped to their accepted ranges.
+// Alternatively, the posterior of a vehicle file: its parameters are drawn jointly from one normal distribution,
+// whatever their nominal values, and clipped to their accepted ranges.
 #pragma once
 
 #include <vector>
@@ -27,15 +26,13 @@ namespace flappy::sim {
 
 class Randomisation {
  public:
-  /// No randomisation: every vehicle is the nominal one.
   explicit Randomisation(model::Vehicle nominal) : nominal_(std::move(nominal)) { nominal_.posterior.reset(); }
 
   /// Reads the array `randomise` of a configuration. Throws io::InputError if a parameter is unknown, or if a draw
   /// could leave its accepted range or give a body an impossible inertia.
   Randomisation(model::Vehicle nominal, const io::Table& config);
 
-  /// Draws from the posterior of `vehicle`. Throws std::invalid_argument if it has none, or if its covariance is not
-  /// positive semidefinite.
+  /// Draws from the posterior of `vehicle`. std::invalid_argument without one, or if it is not positive semidefinite.
   static Randomisation of_posterior(model::Vehicle vehicle);
 
   const model::Vehicle& nominal() const { return nominal_; }
@@ -44,7 +41,6 @@ class Randomisation {
 
   /// Number of draws; each has one variate, standard normal or uniform in [-1, 1].
   std::size_t draws() const { return draws_.size() + posterior_.size(); }
-  /// Number of draws that are not minor.
   std::size_t majors() const { return majors_ + posterior_.size(); }
   /// Variates that at() uses for minor draws if none are given. A variate that makes an inertia impossible is reduced.
   void set_minors(const std::vector<double>& variates);
@@ -52,8 +48,7 @@ class Randomisation {
   bool is_uniform(std::size_t draw) const;
   /// Path of the first parameter of a draw.
   std::string name(std::size_t draw) const;
-  /// The vehicle with given variates, one for each draw, or for each draw that is not minor. For a half-normal law, the
-  /// variate keeps its sign.
+  /// The vehicle with a variate for each draw, or each that is not minor. For a half-normal law, it keeps its sign.
   model::Vehicle at(const std::vector<double>& variates) const;
 
  private:

@@ -15,7 +15,6 @@ constexpr std::size_t kWindows = kLanes<double>;
 /// Share of a step: a change this near to the end of a step counts as at its end.
 constexpr double kSameShare = 1e-6;
 
-/// Means of a script's voltages over consecutive steps.
 class StepVoltages {
  public:
   StepVoltages(const VoltageScript& script, double begin_s, double step_s)
@@ -69,7 +68,6 @@ void keep_wings(const FlapperState& from, FlapperState& x) {
   }
 }
 
-/// Moves strokes towards their recorded angles.
 void correct_strokes(const FlapperState& seen, double carried_s, double share, FlapperState& x) {
   for (int side = 0; side < 2; ++side) {
     const double off = seen.stroke_rad[side] - x.stroke_rad[side];
@@ -79,7 +77,6 @@ void correct_strokes(const FlapperState& seen, double carried_s, double share, F
   }
 }
 
-/// One block of lanes, reused for many windows.
 class ReplayBlock {
  public:
   ReplayBlock(const model::Vehicle& vehicle, const ReplayOptions& o)
@@ -142,8 +139,7 @@ class ReplayBlock {
 
   enum class Wings { recorded, at_rest, kept };
 
-  /// Puts every torso to its record `step` steps after its window's start; `carried`: steps since it was last put
-  /// there.
+  /// Puts torsos to their records `step` steps after the windows' starts; `carried`: steps since the last time.
   void put_back(const RecordedState& recorded, int step, Wings kind, Start start, int carried = 0) {
     for (std::size_t i = 0; i < kWindows; ++i) {
       FlapperState x = recorded(index_[i], start_s_[i] + step * options_.step_s);

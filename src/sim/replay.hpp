@@ -1,5 +1,5 @@
-// Windows of recorded flights, flown again: every window is a lane that starts from its own state and takes its own recorded voltages, without a
-// driver. The result of a window does not depend on other windows or the number of threads.
+// Windows of recorded flights, flown again: every window is a lane with its own start and recorded voltages, without a
+// driver. Its result does not depend on other windows or the number of threads.
 #pragma once
 
 #include <functional>
@@ -33,11 +33,10 @@ struct ReplayOptions {
   int threads = 0;  ///< 0: one for each processor
   World world;
   std::string instruction_set;  ///< as in BatchOptions
-  /// Spin-up, which brings the wings into phase: they start at rest this many steps before a window, and move with the
-  /// voltages of that time while the torso follows its recorded motion. Every `carry_steps` the torso is put back onto
-  /// its record, except its body rate, which is corrected only by the turn in excess of the record: no gyro resolves
-  /// how the rate jumps when wings meet their stops, so within `carry_steps` the flapper keeps its own motion. 0:
-  /// recorded wings.
+  /// Spin-up, which brings the wings into phase: they start at rest this many steps before a window and move with the
+  /// voltages of that time, while the torso follows its record. Every `carry_steps` it is put back onto it, except its
+  /// body rate, corrected only by the turn in excess of the record: no gyro resolves its jumps when wings meet their
+  /// stops. 0: recorded wings.
   int spin_up_steps = 0;
   int carry_steps = 10;  ///< 0: the torso stays welded at the window's first state, which leaves the wings wrong
   /// Share of a stroke's deviation from its record that is corrected whenever the torso is, where the record has the
@@ -46,16 +45,14 @@ struct ReplayOptions {
   double stroke_share = 0;
 };
 
-/// Result of a window.
 struct Replayed {
   std::vector<FlapperState> states;  ///< at the checkpoints
   std::uint32_t status = 0;          ///< bits of Status
 };
 
-/// Flies every window to its checkpoints: numbers of steps after its start, ascending. `recorded` is called from
-/// several threads, for the start of a window and for the times during spin-up. Every checkpoint rounds, as every call
-/// of Batch::step does. A voltage that changes within a step counts by its share of the step. Throws
-/// std::invalid_argument for invalid options or checkpoints.
+/// Flies every window to its checkpoints: steps after its start, ascending; each rounds, as a call of Batch::step does.
+/// `recorded` is called from several threads, for a window's start and its spin-up. A voltage that changes within a
+/// step counts by its share. Throws std::invalid_argument for invalid options or checkpoints.
 std::vector<Replayed> replay(const std::vector<ReplayWindow>& windows, const std::vector<int>& checkpoints,
                              const RecordedState& recorded, const ReplayOptions& options);
 

@@ -1,5 +1,4 @@
-// Conversion between rows of numbers, one for each member of a struct, and structs of lanes. Included by files that are compiled once for each
-// instruction set.
+// Rows of numbers, one for each member of a struct, to structs of lanes and back. Compiled once per instruction set.
 #pragma once
 
 #include "sim/lanes.hpp"

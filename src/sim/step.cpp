@@ -1,5 +1,5 @@
-// The main loop: the steps of one block of flappers from one control update to the next. Compiled once for each instruction set (FLAPPY_ISA); the
-// bits are the same on all of them.
+// The main loop: the steps of one block of flappers from one control update to the next. Compiled once for each
+// instruction set (FLAPPY_ISA); the bits are the same on all of them.
 #include "sim/step.hpp"
 
 #include <cstddef>
@@ -44,7 +44,6 @@ FLAPPY_INLINE Voltages<L> update_driver(Block<T>& block, const SideParameters<L>
   return next;
 }
 
-/// Reads the next recorded voltages.
 template <class T, class L>
 FLAPPY_INLINE Voltages<L> next_recorded(const T*& voltages_V, int first) {
   const Voltages<L> v{L::load(voltages_V + first), L::load(voltages_V + kLanes<T> + first)};
@@ -87,7 +86,6 @@ class EnergyMeter {
   L left_rad_, right_rad_;
 };
 
-/// Prefetches memory into the second-level cache, an equal share of every part with every step.
 class Prefetch {
  public:
   Prefetch(const Ahead& ahead, int steps) {
@@ -113,10 +111,9 @@ class Prefetch {
   int count_ = 0;
 };
 
-/// Shifts positions by half a step. Rows have positions and rates at the same time, but within a block positions lead
-/// by half a step: a step advances rates across its middle, where positions are, and positions with the new rates to
-/// the next middle (Verlet 1967, as leapfrog). The backward shift leaves a hinge on its stop there, so both shifts are
-/// exact inverses.
+/// Rows have positions and rates at the same time, but within a block positions lead by half a step: rates advance
+/// across its middle, positions with the new rates to the next middle (Verlet 1967, as leapfrog). Backward, a hinge on
+/// its stop stays there, so both shifts are exact inverses.
 template <bool with_effects, class L>
 FLAPPY_INLINE void shift_positions(const Parameters<L>& p, const L& reach_rad, const L& time_s, State<L>& x,
                                    Vec3<L>& com_m) {
@@ -161,7 +158,6 @@ FLAPPY_INLINE void forget_frozen(BlockEffects<T> effects, const Block<T>& block,
   }
 }
 
-/// Sets the status bits of contacts of the points.
 template <class T, class L>
 FLAPPY_INLINE void report_touched(const Touched<L>& touched, Block<T>& block, int first) {
   const auto mark = [&](const L& flag, std::uint32_t bit) {

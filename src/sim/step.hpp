@@ -8,7 +8,6 @@
 
 namespace flappy::sim {
 
-/// Data of vehicles with articulated wings (jointed_block.hpp).
 template <class T>
 struct JointedRows;
 
@@ -23,8 +22,7 @@ struct StepPlan {
   std::size_t shape_count;
 };
 
-/// Points of contact of the flappers in a block. All flappers have the same points, with their own constants and
-/// memory.
+/// All flappers of a block have the same points, with their own constants and memory.
 template <class T>
 struct ContactBlock {
   int points = 0;
@@ -34,7 +32,6 @@ struct ContactBlock {
   int stride = 0;                                 // distance of two rows
 };
 
-/// Energy meter of the motors of a block.
 template <class T>
 struct alignas(64) MotorRows {
   T rows[4][kLanes<T>];        // left, then right: 1 / R, and N K / R, the current of the back-EMF per stroke rate
@@ -56,9 +53,7 @@ struct BlockEffects {
   MotorRows<T>* motors = nullptr;
   /// Points of contact, if there are any. Requires `rows`, for any set.
   ContactBlock<T> contact;
-  /// Beat-averaged robots.
   BeatAveragedRows<T> beat_averaged;
-  /// Vehicles with articulated wings.
   const JointedRows<T>* jointed = nullptr;
 };
 

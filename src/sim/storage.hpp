@@ -39,7 +39,6 @@ std::uint64_t bits_of(T value) {
   else return std::bit_cast<std::uint64_t>(value);
 }
 
-/// Rows of beat-averaged robots.
 template <class T>
 struct BeatAveragedStorage {
   BeatAveragedProgram program;
@@ -88,7 +87,6 @@ struct BeatAveragedStorage {
   }
 };
 
-/// Rows of vehicles with articulated wings.
 template <class T>
 struct JointedVehicles {
   struct alignas(64) Row {
@@ -178,13 +176,11 @@ struct Batch<T>::Storage {
   T* memory_of_contact(std::size_t i) {
     return &contact_memory[i / kLanes<T> * points.size() * kContactMemory * kLanes<T> + i % kLanes<T>];
   }
-  /// Number of values of a block that points of contact remember.
   std::size_t contact_memory_size() const { return points.size() * kContactMemory * kLanes<T>; }
   /// Calls `use(number)` for each value that the points of contact of flapper `i` remember.
   void for_contact_memory(std::size_t i, const auto& use) {
     for (std::size_t k = 0; k < points.size() * kContactMemory; ++k) use(memory_of_contact(i)[k * kLanes<T>]);
   }
-  /// Number of values of a block that effects remember.
   std::size_t state_size() const { return static_cast<std::size_t>(model::state_rows(effects_kept)) * kLanes<T>; }
   /// Calls `use(number)` for each value that the effects in `set` remember of flapper `i`.
   void for_states(std::size_t i, std::uint64_t set, const auto& use) {
@@ -211,8 +207,7 @@ struct Batch<T>::Storage {
   /// Rows and memory of a beat-averaged robot, for put_beat_averaged() into any batch; empty for other vehicles.
   std::pair<std::vector<T>, std::vector<T>> get_beat_averaged(std::size_t i) const;
   void put_beat_averaged(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory);
-  /// Counterparts for articulated wings. Throws std::invalid_argument unless it shares the batch's modes, harmonics,
-  /// strips and modulations.
+  /// Throws std::invalid_argument unless the vehicle shares the batch's modes, harmonics, strips and modulations.
   void put_jointed(std::size_t i, const model::Vehicle& v);
   std::pair<std::vector<T>, std::vector<T>> get_jointed(std::size_t i) const;
   void put_jointed(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory);
@@ -222,8 +217,7 @@ struct Batch<T>::Storage {
   void clear_energy(std::size_t i);
   /// Throws std::invalid_argument if its points differ from those of the batch, or are too stiff for the step.
   void put_contact(std::size_t i, const model::Vehicle& v);
-  /// Constants and memory of the points of contact of flapper `i`, for put_contact() into any batch with the same
-  /// points.
+  /// Constants and memory of a flapper's points of contact, for put_contact() into any batch with the same points.
   std::pair<std::vector<T>, std::vector<T>> get_contact(std::size_t i);
   void put_contact(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory);
   void put_effects(std::size_t i, const model::Vehicle& v);
@@ -237,7 +231,6 @@ struct Batch<T>::Storage {
   void put_state(std::size_t i, const FlapperState& state, Start start);
 };
 
-/// Access to the storage of a Batch, for the project only: the header of Batch is installed.
 struct StorageAccess {
   template <class T>
   static auto& of(Batch<T>& batch) {

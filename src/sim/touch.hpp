@@ -1,5 +1,5 @@
-// Contact of a vehicle's points with the surfaces of the world: gaps, motion of the points, and loads on the vehicle. Included by files that are
-// compiled once for each instruction set; the contact law is model/contact.hpp.
+// Contact of a vehicle's points with the surfaces of the world: gaps, motion of the points, and loads on the vehicle.
+// Included by files that are compiled once for each instruction set; the contact law is model/contact.hpp.
 #pragma once
 
 #include "model/contact.hpp"
@@ -18,7 +18,6 @@ struct Touched {
   T ground{0.0}, ceiling{0.0}, wall{0.0}, shape{0.0}, now{0.0};
 };
 
-/// Gap between a point `p` in W and a shape.
 template <class T>
 FLAPPY_INLINE Gap<T> gap_to(const Shape& shape, const Vec3<T>& p) {
   const Vec3<T> centre{T(shape.centre_m[0]), T(shape.centre_m[1]), T(shape.centre_m[2])};
@@ -54,7 +53,6 @@ FLAPPY_INLINE Pressed<T> pressed_by(const StepPlan& world, const ContactConstant
   return pressed;
 }
 
-/// Pose and motion of a vehicle whose points touch.
 template <class T>
 struct TouchingVehicle {
   const Parameters<T>& p;
@@ -66,8 +64,7 @@ struct TouchingVehicle {
   Vec3<T> com_m;  // the vehicle's centre of mass from the torso origin, in B
 };
 
-/// Motion of a point of the torso, a wing or a leading edge: position from the torso origin and velocity, both in B;
-/// and the position from its shoulder, in L.
+/// Position of a point from the torso origin and velocity, in B; its position from the shoulder, in L.
 template <class T>
 struct PointMotion {
   Vec3<T> arm_B_m, velocity_B_m_s, arm_L_m;

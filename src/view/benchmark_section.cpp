@@ -1,4 +1,3 @@
-// The section of a scored blind benchmark: verdicts against true causes.
 #include <algorithm>
 #include <cmath>
 #include <map>

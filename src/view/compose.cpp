@@ -48,8 +48,7 @@ Kind recognised_json(const fs::path& path) {
   refuse(path, "is JSON of something else");
 }
 
-/// Replaces a folder of flight logs, as flappy-fly --log leaves it for several flights, by its first kMaxFlights logs, in the order of
-/// their names. `notes` reports those that are left out.
+/// Replaces a folder of flight logs (flappy-fly --log) by its first kMaxFlights by name; `notes` tells of the others.
 std::vector<fs::path> expanded(const std::vector<fs::path>& paths, std::string& notes) {
   std::vector<fs::path> all;
   for (const fs::path& path : paths) {

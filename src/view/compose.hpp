@@ -13,12 +13,12 @@ namespace flappy::view {
 
 enum class Kind { flight, run, evaluation, diagnosis, identification, benchmark };
 
-/// What a path holds: a flight log; a run folder or a folder of runs; results of flappy-eval, flappy-gap diagnose (or its folder),
-/// flappy-identify forces or flappy-blind score (its folder, or score.csv). Throws InputError where it is none of these.
+/// A flight log; a run folder or a folder of runs; results of flappy-eval, flappy-gap diagnose (or its folder),
+/// flappy-identify forces or flappy-blind score (its folder, or score.csv). Throws InputError for anything else.
 Kind recognised(const std::filesystem::path& path);
 
-/// The sections in the order of the paths; all flights share one section, at the place of the first. Of a folder of flight logs, the first
-/// kMaxFlights are taken. Throws io::InputError for a path that is given twice, and for whatever a section refuses.
+/// Sections in the order of the paths; all flights share one, at the place of the first. A folder of flight logs gives
+/// its first kMaxFlights. Throws io::InputError for a path that is given twice, and for whatever a section refuses.
 std::vector<Section> composed(const std::vector<std::filesystem::path>& given, const FlightOptions& options,
                               Packing& packing);
 

@@ -19,13 +19,11 @@ namespace {
 using io::format;
 
 constexpr std::size_t kBars = 10, kShownRows = 6, kMaxWhere = 20;
-/// Smallest probability that is drawn, and smallest that is listed in the text.
-constexpr double kMinShown = 5e-3, kMinListed = 0.05;
+constexpr double kMinShown = 5e-3, kMinListed = 0.05;  ///< smallest probabilities drawn, and listed
 /// A difference of evidence that no flights bring: it means that a hypothesis was ruled out.
 constexpr double kRuledOut_nats = 1e8;
 constexpr std::size_t kLongName = 45;
-/// Ratio of residual to noise from which on the shade is the darkest.
-constexpr double kDarkest = 10;
+constexpr double kDarkest = 10;  ///< residual over noise from which on the shade is the darkest
 
 const char* place_of(const std::string& effect) {
   constexpr const char* kPlaces[] = {"the body",          "motors, gears and springs",
@@ -41,7 +39,6 @@ const char* place_of(const std::string& effect) {
 
 double over_noise(const gap::ResidualLocation& l) { return l.noise_floor > 0 ? l.gap / l.noise_floor : 0; }
 
-/// A hypothesis with its words and its JSON pointer in diagnosis.json.
 struct Rival {
   std::string name;
   const gap::RankedHypothesis* hypothesis;
@@ -59,7 +56,6 @@ std::string rival_words(const std::string& name) {
   return words;
 }
 
-/// The hypotheses of a diagnosis, the most probable first.
 std::vector<Rival> rivals_of(const gap::Diagnosis& d) {
   std::vector<Rival> rivals;
   for (std::size_t i = 0; i < d.hypotheses.size(); ++i) {
@@ -74,7 +70,7 @@ std::vector<Rival> rivals_of(const gap::Diagnosis& d) {
   return rivals;
 }
 
-/// The words of a basis function: the product "right_flap velocity_y" -> "right flap × velocity y"; "cos heading" is one function.
+/// A basis function in words: "right_flap velocity_y" -> "right flap × velocity y"; "cos heading" is one function.
 std::string function_words(const std::string& function) {
   std::string words;
   for (std::size_t at = 0; at < function.size();) {
@@ -92,7 +88,6 @@ std::string third_words(const gap::Regime& r) {
   return r.quantity + kThirds[static_cast<int>(r.third)];
 }
 
-/// Composes the section.
 class DiagnosisSection {
  public:
   DiagnosisSection(const std::filesystem::path& file, const gap::Diagnosis& diagnosis)

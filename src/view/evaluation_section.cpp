@@ -1,4 +1,3 @@
-// The section of results of flappy-eval.
 #include <cmath>
 
 #include "io/text.hpp"
@@ -45,7 +44,6 @@ void add_success(Section& section, const std::vector<Flown>& flown) {
   section.add(f);
 }
 
-/// Adds the shares of flights that failed, by cause; nothing where no flight failed.
 void add_failures(Section& section, const std::vector<Flown>& flown) {
   Figure f{.id = "failures",
            .title = "Failures by cause",

@@ -1,4 +1,4 @@
-// A plot as data: drawn by Chart.js on a page (web/chart.js), by gnuplot as SVG or PDF for a paper. Both show the same numbers.
+// A plot as data, drawn by Chart.js on a page (web/chart.js), by gnuplot as SVG or PDF for a paper.
 #pragma once
 
 #include <filesystem>
@@ -9,12 +9,10 @@
 
 namespace flappy::view {
 
-/// How a series is drawn. band: area between low and high. interval: a point with a bar from low to high. bars: horizontal bars from
-/// the axis of the categories.
+/// band: area from low to high. interval: point with a bar from low to high. bars: horizontal, from the category axis.
 enum class Draw { line, points, bars, band, interval };
 
-/// Indices of kColours.
-enum class Colour { blue, vermillion, green, purple, black, grey };
+enum class Colour { blue, vermillion, green, purple, black, grey };  ///< indices of kColours
 
 /// A series of a figure; NaN means no value.
 struct Series {
@@ -45,17 +43,15 @@ struct Figure {
 double near_category(std::size_t k, std::size_t i = 0, std::size_t of = 1);
 inline constexpr double kBarWidth = 0.8;
 
-/// Colours by Okabe and Ito, "Color Universal Design", 2008, which remain distinct in all forms of colour blindness; only those with
-/// a contrast of at least 3 to 1 on white.
+/// Colours by Okabe and Ito, "Color Universal Design", 2008, which remain distinct in all forms of colour blindness;
+/// only those with a contrast of at least 3 to 1 on white.
 inline constexpr const char* kColours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#767676"};
 
-/// The JSON of a figure that web/chart.js draws.
-nlohmann::ordered_json json_of(const Figure& figure);
+nlohmann::ordered_json json_of(const Figure& figure);  ///< as web/chart.js draws it
 
 enum class Paper { svg, pdf };
 
-/// Writes folder/id.svg or .pdf, as wide as a column of 88 mm, with fonts embedded in a PDF. Throws InputError where gnuplot is
-/// missing or fails, or the file cannot be written.
+/// Writes folder/id.svg or .pdf, a column of 88 mm wide, a PDF with its fonts. Throws InputError where that fails.
 void draw_on_paper(const std::filesystem::path& folder, const Figure& figure, Paper paper);
 
 }  // namespace flappy::view

@@ -63,8 +63,7 @@ model::Vehicle vehicle_of(const fs::path& folder, const FlightLog& log, const fs
                        " in the folder; accepted: --vehicle FILE, in Python vehicle=FILE");
 }
 
-/// Simulates the strokes and rotations that the recorded voltages cause, with the torso held fixed: its motion changes the angles little, less
-/// than a picture shows.
+/// Strokes and rotations that the recorded voltages cause with the torso held fixed: its motion changes them little.
 flightlog::WingsStream derived_wings(const FlightLog& log, const model::Vehicle& vehicle) {
   const Column& t = log.command.t_s;
   const auto held = static_cast<std::size_t>(std::floor((t.back() - t.front()) / kHeld_s));
@@ -114,7 +113,7 @@ double step_of(const Column& values) {
   return most > 0 ? 1e-5 * std::pow(10, std::ceil(std::log10(most))) : 1;
 }
 
-/// Removes the poses with swapped markers from a log. Returns the begin and end of each stretch of them; null where there is none.
+/// Removes poses with swapped markers. Returns begin and end of each stretch of them; null where there is none.
 Json take_swapped(FlightLog& log, Packing& packing, Json& notes) {
   flightlog::MocapStream& m = log.mocap;
   std::vector<char> swapped = flightlog::swapped_poses(log);

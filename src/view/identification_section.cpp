@@ -1,4 +1,3 @@
-// The section of results of flappy-identify forces.
 #include <algorithm>
 #include <cmath>
 
@@ -11,7 +10,6 @@ namespace {
 
 using io::format;
 
-/// Adds the fitted parameters over the values of the vehicle file, with their intervals.
 void add_parameters(Section& section, const Json& parameters) {
   Figure f{
       .id = "parameters",
@@ -77,7 +75,7 @@ void add_channels(Section& section, const Json& channels) {
   section.add(table("", {"channel", "rms before", "rms after"}, std::move(rows)));
 }
 
-/// Adds the map of forces, a figure for each channel: simulated values, before and after the fit, over measured ones.
+/// A figure for each channel: simulated forces, before and after the fit, over measured ones.
 void add_map(Section& section, const Json& map) {
   const Json &measured = map.at("measured"), &after = map.at("after"), &before = map.at("before");
   for (const auto& [channel, values] : measured.items()) {

@@ -17,7 +17,7 @@ constexpr const char* kPolicy =
 constexpr const char* kLibraries[] = {"three.min.js", "chart.min.js"};
 constexpr std::string_view kEntry = "main.js", kStyle = "report.css";
 
-/// A script element. Its text cannot end it: JSON has no "<", nor has base64, and our own files have no "</script", which page_test checks.
+/// A script element. Its text cannot end it: JSON and base64 have no "<", our files no "</script" (page_test checks).
 std::string script(const std::string& attributes, std::string_view text) {
   return "<script" + attributes + ">\n" + std::string(text) + "\n</script>\n";
 }

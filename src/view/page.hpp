@@ -1,15 +1,13 @@
 // A report as one HTML file that needs no other file: it contains data, three.js, Chart.js and our own modules (web/).
 //
 // A page is a list of sections, a section a list of blocks, which web/ draws by their "kind":
-//   words       {"text", "style": "lead" | "plain" | "note"}
-//   figure      figure.hpp
-//   table       {"title", "head": [...], "rows": [[cell, ...]], "note"}       a cell is a text, or {"text", "at": JSON pointer}
-//   flights     flight_section.hpp
-//   anatomy     sections.hpp
-//   matrix      {"title", "rows", "columns", "values": [[number or null]], "texts", "marked", "least", "most", "tilted", "note"}
-//   heading     {"text"}
-//   cases       sections.hpp
-// Foreign text enters the page as JSON without any "<", and the page makes text nodes of it, so it is never interpreted as markup.
+//   words      {"text", "style": "lead" | "plain" | "note"}
+//   figure     figure.hpp
+//   table      {"title", "head": [...], "rows": [[cell, ...]], "note"}   cell: a text, or {"text", "at": JSON pointer}
+//   flights    flight_section.hpp; anatomy, cases: sections.hpp
+//   matrix     {"title", "rows", "columns", "values": [[x|null]], "texts", "marked", "least", "most", "tilted", "note"}
+//   heading    {"text"}
+// Foreign text enters as JSON without any "<", and the page makes text nodes of it, so it is never read as markup.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -28,9 +26,8 @@ class Section {
   Section(std::string kind, std::string title, std::string source);
 
   void say(const std::string& text, const char* style = "plain");
-  /// Adds a figure; does nothing where it has no point.
-  void add(const Figure& figure);
-  /// Adds a figure for paper only, because the page shows the same in another form.
+  void add(const Figure& figure);  ///< does nothing where it has no point
+  /// For paper only, because the page shows the same in another form.
   void add_on_paper(const Figure& figure) { figures_.push_back(figure); }
   void add(Json block) { blocks_.push_back(std::move(block)); }
 
@@ -49,7 +46,6 @@ class Section {
 Json cell(double value, const std::string& at, int digits = 3);
 Json table(const std::string& title, const std::vector<std::string>& head, Json rows, const std::string& note = "");
 
-/// The HTML text of a report.
 std::string page_text(const std::string& title, const std::vector<Section>& sections, const Packing& packing);
 
 /// JSON that is safe within <script>: "<", ">" and "&" become \u003c, \u003e, \u0026.

@@ -6,7 +6,6 @@
 
 namespace flappy::view {
 
-/// [file name] text of the file.
-extern const std::map<std::string_view, std::string_view> kPageFiles;
+extern const std::map<std::string_view, std::string_view> kPageFiles;  ///< [file name] text of the file
 
 }  // namespace flappy::view

@@ -14,7 +14,6 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-/// Words for channels that need no manual.
 const std::map<std::string, std::string> kChannelNames = {{"torque_x", "roll torque"},
                                                           {"torque_y", "pitch torque"},
                                                           {"torque_z", "yaw torque"},

@@ -1,4 +1,3 @@
-// The section of flappy-train: one run, or one run for each seed.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -8,30 +8,23 @@
 
 namespace flappy::view {
 
-/// The section of a diagnosis: where the gap lies, which effect causes it, how far it shrinks, what to fly next; words first, then the
-/// picture. `file`: diagnosis.json.
-///
-/// The block "anatomy": {"parts": [{"channel", "name", "short", "ratio", "text"}], "wings", "note"}: the ratio of each channel's residual
-/// to its noise, and whether the robot is drawn with wings.
+/// The section of a diagnosis: where the gap lies, which effect causes it, how far it shrinks, what to fly next; words
+/// first. `file`: diagnosis.json. The block "anatomy": {"parts": [{"channel", "name", "short", "ratio", "text"}],
+/// "wings", "note"}: the ratio of each channel's residual to its noise, and whether the robot is drawn with wings.
 Section diagnosis_section(const std::filesystem::path& file);
 
 /// Adds the validation of a diagnosis that has one: held-out flights, controls, and fits to single flights.
 void add_validation(Section& section, const gap::Diagnosis& diagnosis);
 
-/// The section of results of flappy-eval, with or without --effects.
-Section evaluation_section(const std::filesystem::path& file);
+Section evaluation_section(const std::filesystem::path& file);  ///< of flappy-eval, with or without --effects
 
-/// The section of results of flappy-identify forces.
-Section identification_section(const std::filesystem::path& file);
+Section identification_section(const std::filesystem::path& file);  ///< of flappy-identify forces
 
-/// The section of a run folder of flappy-train, or of a folder of several runs, as --seeds leaves it.
-Section run_section(const std::filesystem::path& folder);
+Section run_section(const std::filesystem::path& folder);  ///< a run of flappy-train, or several (--seeds)
 
-/// The section of a scored blind benchmark: its folder, or score.csv alone, such as docs/results/blind_reported.csv. Predictions and sealed labels
-/// are read where they lie next to it.
-///
-/// The block "cases": {"cases": [{"number", "part", "truth", "verdict", "named", "probability", "right", "details": [[name, text]],
-/// "rivals": [[name, probability]]}]}.
+/// A scored blind benchmark: its folder, or score.csv alone, such as docs/results/blind_reported.csv; reads predictions
+/// and sealed labels next to it. The block "cases": {"cases": [{"number", "part", "truth", "verdict", "named",
+/// "probability", "right", "details": [[name, text]], "rivals": [[name, probability]]}]}.
 Section benchmark_section(const std::filesystem::path& path);
 
 }  // namespace flappy::view

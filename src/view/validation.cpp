@@ -1,4 +1,3 @@
-// The validation of a diagnosis in words and figures: held-out errors, controls, and agreement of single flights.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -15,10 +14,8 @@ using io::format;
 
 constexpr Colour kColourOf[] = {Colour::blue,   Colour::vermillion, Colour::green,
                                 Colour::purple, Colour::black,      Colour::grey};
-/// Half width of a 90 % interval of the normal distribution, in standard deviations.
-constexpr double kHalf90 = 1.645;
-/// Magnitudes fitted to single flights agree unless their p-value is below this.
-constexpr double kOneNumber = 0.01;
+constexpr double kHalf90 = 1.645;    ///< half a 90 % interval of the normal distribution, in standard deviations
+constexpr double kOneNumber = 0.01;  ///< p-value below which fits to single flights disagree
 
 const char* unit_of(const std::string& channel) { return channel.starts_with("torque") ? "rad/s²" : "m/s²"; }
 

@@ -17,7 +17,6 @@ constexpr double kStandsOut = 2;
 /// Thresholds to choose from: least rms contribution of a column, in units of the noise.
 constexpr double kThresholds[] = {0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1};
 constexpr int kRounds = 10;
-/// Ridge on normalised columns, for columns may be nearly the same.
 constexpr double kRidge = 1e-6;
 
 /// Sums of squares of rows by group, in units of the noise variance, and the number of rows.
@@ -87,7 +86,6 @@ Baseline best_rmse(const gap::Flights& flights, const gap::Inference& d) {
   return b;
 }
 
-/// Least squares of the residual on the columns that are kept; 0 for the others.
 VectorXd solve(const MatrixXd& sums, const std::vector<char>& kept) {
   std::vector<Index> which;
   for (Index k = 0; k + 1 < sums.rows(); ++k)

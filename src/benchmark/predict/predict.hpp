@@ -11,7 +11,6 @@
 
 namespace flappy::benchmark {
 
-/// The answer of a baseline.
 struct Baseline {
   std::vector<std::string> named;    ///< effects; empty: the parameters explain the flights
   std::vector<std::string> ranking;  ///< all effects that it ranks, the most likely first
@@ -27,7 +26,7 @@ struct Prediction {
   std::string corrected;                      ///< text of the corrected vehicle file; empty: the data are faulty
   bool crashed = false;                       ///< the robot crashed in the flight to be diagnosed
 };
-/// Whether a verdict states no single answer as more probable than not: a group, or a probability below one half.
+/// Whether a verdict gives no single answer: it is a group, or its probability is below one half.
 bool abstains(const gap::Verdict& verdict);
 
 struct Question {

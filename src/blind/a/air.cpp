@@ -3,7 +3,8 @@
 //   alpha = theta + sgn(u) pi/2 - atan(w/u)
 //   F = 1/2 rho C_N(alpha) c U^2 dr, along the wing's x, at d_cp(alpha) c below the leading edge
 //   M_rd = -1/8 rho |thetadot| thetadot C_rd sum of c^4 dr, about y
-// C_N and d_cp: Fei et al., ICRA 2019 (arXiv 1902.09628). sin and cos of alpha follow from the velocity components without an atan.
+// C_N and d_cp: Fei et al., ICRA 2019 (arXiv 1902.09628). sin and cos of alpha follow from the velocity without an
+// atan.
 #include "blind/a/robot.hpp"
 
 namespace flappy::blind {
@@ -14,8 +15,7 @@ void Robot::blow() {
   const Vector3d &w = x_.torso.rate_rad_s, through_air = R_.transpose() * (x_.torso.velocity_m_s - x_.wind_m_s);
 
   if (const double magnitude = magnitudes_[Effect::clap_and_fling]; magnitude > 0) {
-    // wings that almost touch, behind or in front of the body, separate with extra circulation, which decays within
-    // some milliseconds
+    // wings that almost touch, behind or in front, separate with extra circulation, which decays in milliseconds
     const double gap_rad = kPi - std::abs(x_.side[0].wing.stroke_rad + x_.side[1].wing.stroke_rad);
     const double met = 0.5 * magnitude / (1 + exponential((gap_rad - 0.4) / 0.07));
     x_.fling = std::max(met, x_.fling * (1 - step_s_ / 4e-3));
@@ -60,9 +60,8 @@ void Robot::blow() {
       double f = pressure * s.kept[i] * c * normal * speed2;
       double arm = centre * c;
       if (rotational != 0) {
-        // circulation of the pitching strip, at half chord, limited at high rotation rates. On either stroke
-        // thetadot > 0 moves the flow at 3/4 chord towards a larger C_N (Sane and Dickinson 2002), so it adds to the
-        // force of a wing that pitches up
+        // circulation of the pitching strip at half chord, limited at high rates. On either stroke thetadot > 0 moves
+        // flow at 3/4 chord to a larger C_N (Sane and Dickinson 2002): pitching up adds force
         const double limited = 1 / (1 + std::abs(q.rotation_rad_s) * c / 40);
         const double extra = rotational * limited * s.kept[i] * s.strips.width_m * c * c / per_speed;
         arm = std::abs(f + extra) > 1e-9 ? (f * arm + extra * 0.5 * c) / (f + extra) : 0.5 * c;
@@ -98,8 +97,8 @@ void Robot::blow() {
   rhs_.segment<3>(3) += air_.force_N;
 }
 
-/// Added mass of each strip, rho pi/4 c^2 dr at half chord, times the rate of change of the normal velocity n.v. The part of n.a that
-/// is linear in the unknowns goes into the mass matrix; v.(rate x n) and the rest of n.a are known and go to the right-hand side.
+/// Added mass of a strip, rho pi/4 c^2 dr at half chord, times the rate of n.v. The part of n.a linear in the unknowns
+/// goes into the mass matrix; v.(rate x n) and the rest are known and go to the right-hand side.
 void Robot::add_added_mass(std::size_t k) {
   const Side& s = side_[k];
   const Pose& p = pose_[k];

@@ -75,7 +75,7 @@ double Robot::motor_torque(std::size_t k) {
   return contact;
 }
 
-/// Updates slow states of battery, windings and brushes; called each millisecond.
+/// Slow states of battery, windings and brushes; called each millisecond.
 void Robot::update_drive(double dt_s) {
   if (const double magnitude = magnitudes_[Effect::battery_sag]; magnitude > 0) {
     // Cells behind a series resistor and one RC element; their voltage falls by 5 % a minute at hover.

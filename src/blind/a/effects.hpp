@@ -1,5 +1,5 @@
-// Effects of family A: those of the catalogue, each by a law of this family's own, and others that are outside the catalogue
-// (outside_*). An effect has one parameter, its magnitude: 0 switches it off, 1 is typical of a 12 g vehicle.
+// Effects of family A: the catalogue's, by laws of this family's own, and others (outside_*). Each has one parameter,
+// its magnitude: 0 switches it off, 1 is typical of a 12 g vehicle.
 #pragma once
 
 #include <array>
@@ -9,7 +9,6 @@
 
 namespace flappy::blind {
 
-/// Identifiers of all effects; effect_names() gives them as text.
 #define FLAPPY_BLIND_EFFECTS                                                                                           \
   ground_effect, ceiling_effect, wall_effect, body_drag, added_mass, rotational_lift, wake_capture, clap_and_fling,    \
       wing_flexibility, wing_damage, wind, spring_hardening, gear_backlash, coulomb_friction, winding_heating,         \
@@ -21,7 +20,6 @@ namespace flappy::blind {
 enum class Effect : std::size_t { FLAPPY_BLIND_EFFECTS, count };
 inline constexpr std::size_t kBlindEffects = static_cast<std::size_t>(Effect::count);
 
-/// Identifiers in the order of Effect.
 const std::array<std::string, kBlindEffects>& effect_names();
 
 struct BlindEffect {
@@ -33,7 +31,7 @@ struct BlindEffect {
 class Magnitudes {
  public:
   Magnitudes() = default;
-  /// Throws io::InputError if an id is unknown or given twice, or a magnitude is not within 0 and 4.
+  /// Throws io::InputError for an id unknown or given twice, or a magnitude outside 0 to 4.
   explicit Magnitudes(const std::vector<BlindEffect>& effects);
   double operator[](Effect e) const { return magnitude_[static_cast<std::size_t>(e)]; }
   bool has(Effect e) const { return (*this)[e] > 0; }

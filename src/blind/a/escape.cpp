@@ -17,7 +17,6 @@ flight::Setpoint<double> hold(const Vector3d& position_m, double heading_rad) {
   return s;
 }
 
-/// Draws position and heading from the task's start range.
 Waypoint start_of(const flight::StartRange& range, std::uint64_t seed, std::size_t number) {
   Random random(seed, 100 * number + 171);
   const auto draw = [&](const flight::Spread& s) { return s.centre + s.half * (2 * random.uniform() - 1); };

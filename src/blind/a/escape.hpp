@@ -1,5 +1,5 @@
-// The blind robot flies a policy's manoeuvre. Observation, action, hand-back and the criterion of success are those of the policy's
-// training (flight/episode.hpp); physics, sensors and the view of the state are the robot's own.
+// The blind robot flies a policy's manoeuvre, judged as in training (flight/episode.hpp); physics, sensors and view are
+// its own.
 #pragma once
 
 #include <functional>
@@ -25,8 +25,8 @@ struct Escape {
   std::uint32_t ended = 0;            ///< bits of flight::Ended
 };
 
-/// Flies escape `number` of a case: hover at a start drawn from the task, raised by 1 m, then the manoeuvre from t = 0 of the log on.
-/// Returns the same bytes for the same arguments.
+/// Flies escape `number` of a case: hover at a start drawn from the task, raised by 1 m; the manoeuvre begins at t = 0
+/// of the log. Returns the same bytes for the same arguments.
 Escape escape(const Case& c, std::size_t number, const EscapeRules& rules);
 
 }  // namespace flappy::blind

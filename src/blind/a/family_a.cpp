@@ -7,7 +7,7 @@ namespace {
 
 using Words = std::vector<std::string>;
 
-/// All effects, in the order of Effect.
+/// In the order of Effect.
 const std::vector<FamilyEffect>& table() {
   const Words forces = {"force_x", "force_y", "force_z"}, torques = {"torque_x", "torque_y", "torque_z"};
   const Words wrench = {"force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z"};
@@ -76,7 +76,7 @@ const std::vector<FamilyEffect>& table() {
   return effects;
 }
 
-/// Standard deviation of a parameter about the file's value: a share of that value if `share`, else in the parameter's unit.
+/// About the file's value: a share of it if `share`, else in the parameter's unit.
 struct Spread {
   std::string_view ending;
   double sd;
@@ -112,7 +112,6 @@ double within_three(Random& random) {
   return n;
 }
 
-/// Draws every parameter of every body independently.
 void draw_parameters(model::Vehicle& v, std::uint64_t seed) {
   Random random(seed, 201);
   for (model::Parameter& p : model::parameters(v))
@@ -131,7 +130,7 @@ void draw_parameters(model::Vehicle& v, std::uint64_t seed) {
   }
 }
 
-/// Draws the sensors of another laboratory; rates, latencies and positions are declared exactly until misdeclare().
+/// Of another laboratory; rates, latencies and positions are exact until misdeclare().
 SensorSet drawn_sensors(const Assignment& a) {
   SensorSet s = sensors_of(a.seed, a.power, a.wings);
   Random random(a.seed, 202);
@@ -149,7 +148,7 @@ SensorSet drawn_sensors(const Assignment& a) {
   return s;
 }
 
-/// Adds errors to declarations that a laboratory knows less well: the IMU's position by 1 mm, noise by a factor.
+/// Declarations that a laboratory knows less well: the IMU's position by 1 mm, noise by a factor.
 void misdeclare(flightlog::FlightHeader& h, std::uint64_t seed) {
   Random random(seed, 203);
   for (double& x : h.imu.position_m) x += 1e-3 * within_three(random);
@@ -158,7 +157,7 @@ void misdeclare(flightlog::FlightHeader& h, std::uint64_t seed) {
     *noise *= random.between(0.7, 1.5);
 }
 
-/// Leads the torso along the flown path, and takes harmonics by beats of the accelerations that a free torso would have there.
+/// Leads the torso along the path; harmonics, by beats, of the accelerations that a free torso would have there.
 Contrast led(const Case& c, std::size_t flight, const std::vector<Torso>& path,
              const std::vector<std::array<double, 2>>& volts) {
   Robot robot(c.vehicle, flight_room(), c.magnitudes, c.seed, flight);

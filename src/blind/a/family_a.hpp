@@ -10,7 +10,7 @@ namespace flappy::blind {
 
 std::unique_ptr<Family> make_family_a();
 
-/// The case that an assignment stands for, with exact declarations. With `conventions`, Family::fly then changes some of those in the log.
+/// The case of an assignment, with exact declarations. With `conventions`, Family::fly then changes some in the log.
 Case case_of(const Assignment& a);
 
 }  // namespace flappy::blind

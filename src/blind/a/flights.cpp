@@ -125,7 +125,7 @@ RobotFlight fly(const Case& c, std::size_t flight, const Watch& watch) {
   const Plan plan(c.programme, flight, flight_room(), c.seed);
   RobotController pilot(c.vehicle.driver, c.seed, flight);
 
-  // The robot finds its trim at a height of 1 m in the first two fifths of kTrim_s, then moves to where the log begins.
+  // It trims at 1 m in the first two fifths of kTrim_s, then moves to where the log begins.
   const auto asked = [&](double t_s) { return c.proposed ? aim_of(*c.proposed, t_s) : plan.at(t_s); };
   const Vector3d home_m = asked(0).position_m;
   constexpr double kTrimHeight_m = 1;

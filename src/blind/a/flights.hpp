@@ -1,4 +1,3 @@
-// Whole flights of the blind robot, as logs.
 #pragma once
 
 #include <functional>
@@ -12,7 +11,6 @@
 
 namespace flappy::blind {
 
-/// One robot and what it flies.
 struct Case {
   model::Vehicle vehicle;  ///< the robot's true parameters, without effects
   double declared_density_kg_m3 = 0;
@@ -35,22 +33,20 @@ struct RobotFlight {
   double farthest_m = 0, most_tilt_rad = 0;  ///< largest distance from the target, largest tilt of the body's z axis
 };
 
-/// Room of all flights.
 Room flight_room();
 
-/// Called before each step, those of the trimming included, with the robot and the commanded voltages of the step (left, right).
+/// Called before each step, trimming included, with the commanded voltages (left, right).
 using Watch = std::function<void(const Robot& robot, const std::array<double, 2>& volts)>;
 
-/// Flies flight 0, 1 or 2 of a case, or the proposed flight: the robot finds its trim, then the log begins. Returns the same bytes
-/// for the same arguments.
+/// Flies flight 0, 1, 2 or the proposed one: the robot trims, then the log begins. Equal arguments give equal bytes.
 RobotFlight fly(const Case& c, std::size_t flight, const Watch& watch = {});
 
-/// Pilot, asked once in each control period from kTrim_s before the log begins. `t_s`: on the log's clock. `beat`: fraction of the
-/// beat in [0, 1).
+/// Pilot, asked each control period from kTrim_s before the log. `t_s`: the log's clock. `beat`: its fraction in [0,
+/// 1).
 using Steer = std::function<Inputs(double t_s, double beat, const Torso& torso)>;
 
-/// Flies for `duration_s` from `start` on. The robot has crashed when it touches a surface, flies away, or the world z component of
-/// its z axis falls below `least_upright`.
+/// Flies for `duration_s` from `start` on. The robot has crashed when it touches a surface, flies away, or the world z
+/// of its z axis falls below `least_upright`.
 RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double duration_s, double least_upright,
                 const Steer& steer, const Watch& watch = {});
 

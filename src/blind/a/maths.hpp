@@ -1,5 +1,5 @@
-// Elementary functions and random numbers of the blind robot. They give the same bits on every processor, which libm does not
-// promise, and share no code with the simulator under test. Absolute errors are below 1e-13 unless stated.
+// Elementary functions and random numbers with the same bits on every processor, unlike libm. They share no code with
+// the simulator under test. Absolute errors are below 1e-13 unless stated.
 #pragma once
 
 #include <Eigen/Core>
@@ -83,7 +83,6 @@ inline double hyperbolic_tangent(double x) {
   return 1 - 2 / (exponential(2 * x) + 1);
 }
 
-/// Quaternion of a rotation vector.
 inline Quaterniond turned_by(const Vector3d& angle_rad) {
   const double a = std::sqrt(angle_rad.squaredNorm());
   if (a < 1e-9) return Quaterniond(1, angle_rad.x() / 2, angle_rad.y() / 2, angle_rad.z() / 2).normalized();

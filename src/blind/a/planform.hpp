@@ -15,8 +15,8 @@ struct Strips {
   double width_m = 0;
 };
 
-/// Fits a cubic chord to the eight moments of the planform by least squares. The published moments are those of a trapezoid to 1e-4;
-/// 16 strips reproduce them to 2e-3.
+/// Fits a cubic chord to the eight moments of the planform by least squares. The published moments are those of a
+/// trapezoid to 1e-4; 16 strips reproduce them to 2e-3.
 Strips cut_into_strips(const model::Planform& planform);
 
 }  // namespace flappy::blind

@@ -113,7 +113,7 @@ void Robot::build_side(const model::Side& from, std::size_t s, std::uint64_t see
   to.stroke_stop = stop(to.stroke, about(to.wing, 2) + about(to.leading_edge, 2), 0, 1);
 }
 
-/// Removes the tip of a wing: at magnitude 1, 5 % of its area, and two thirds of this share of its mass.
+/// At magnitude 1: 5 % of its area at the tip, and two thirds of this share of its mass.
 void Robot::damage(Side& s) {
   const double magnitude = magnitudes_[Effect::wing_damage];
   if (!(magnitude > 0)) return;
@@ -157,7 +157,7 @@ void Robot::pose_sides() {
   }
 }
 
-/// Adds a body whose joints are the unknowns first, first + 1, ... `acceleration`: of its centre of mass at x = 0, in B.
+/// Joints are the unknowns first, first + 1, ... `acceleration`: of the centre of mass at x = 0, in B.
 template <int joints>
 void Robot::add_body(double m, const Matrix3d& I, const Vector3d& c, const Vector3d& rate, const Vector3d& turning,
                      const Vector3d& acceleration, const std::array<Column, 2>& column, int first) {
@@ -207,8 +207,7 @@ void Robot::assemble() {
   }
 }
 
-/// Adds a stop, a spring-damper that only pushes, with its torque at the end of the step:
-/// (M + h D + h^2 K) x = Q - K (d + h rate) - D rate.
+/// A spring-damper that only pushes, implicit: (M + h D + h^2 K) x = Q - K (d + h rate) - D rate.
 void Robot::add_stop(int joint, const Stop& stop, double angle, double rate) {
   const double beyond = angle > stop.upper_rad   ? angle - stop.upper_rad
                         : angle < stop.lower_rad ? angle - stop.lower_rad

@@ -1,11 +1,10 @@
-// The blind robot: a second simulator of the same vehicle, which replaces the real robot in tests of a diagnosis. It has five rigid
-// bodies (torso; on each side a leading edge and a wing) and ten degrees of freedom. It is written from the published parameters and
-// shares neither physics nor effects with the simulator under test.
-//
-// Unknowns x of a step: in B, angular acceleration of the torso and acceleration of its origin; accelerations of strokes and rotations:
+// The blind robot: a second simulator of the vehicle that replaces the real robot in tests of a diagnosis: five rigid
+// bodies (torso; on each side leading edge and wing), ten degrees of freedom. Written from published parameters; it
+// shares no physics or effects with the simulator under test. Unknowns x of a step, in B: accelerations of torso and
+// joints:
 //   sum of J^T (m, I) J  x = forces - J^T (forces that the bodies need at x = 0)      J: Jacobian of a body's motion
-// Wings are cut into strips (planform.hpp). The step is 20 us of semi-implicit Euler; only the wings' stops, springs with dampers, are
-// stiff at this step and are therefore integrated implicitly.
+// Wings are strips (planform.hpp). Semi-implicit Euler, 20 us; only the wings' stops are stiff at this step, and
+// implicit.
 #pragma once
 
 #include <array>
@@ -41,7 +40,6 @@ struct Wing {
   double stroke_rad = 0, rotation_rad = 0, stroke_rad_s = 0, rotation_rad_s = 0;
 };
 
-/// State of one side.
 struct RobotSideState {
   Wing wing;
   double rotor_rad = 0, rotor_rad_s = 0;         ///< of a motor with gear backlash, divided by the gear ratio
@@ -70,8 +68,7 @@ struct RobotState {
 
 class Robot {
  public:
-  /// `seed` draws what is fixed for a robot, as directions and signs of effects; with `flight`, what differs between
-  /// flights: gusts, jitter.
+  /// `seed` draws directions and signs of effects; with `flight`, what differs between flights: gusts, jitter.
   Robot(const model::Vehicle& vehicle, const Room& room, const Magnitudes& magnitudes, std::uint64_t seed,
         std::uint64_t flight = 0, double step_s = kRobotStep_s);
 

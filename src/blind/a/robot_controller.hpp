@@ -1,5 +1,4 @@
-// Pilot and flight plan of the blind robot: the project's cascaded PID on an imperfect view of the state follows waypoints, with
-// excitation added to its inputs.
+// The pilot: the project's cascaded PID follows waypoints on an imperfect view; excitation is added to its inputs.
 #pragma once
 
 #include <memory>
@@ -18,7 +17,6 @@ struct Inputs {
   double amplitude_V = 0, difference_V = 0, bias_V = 0, split_cycle = 0;
 };
 
-/// Clips inputs to the driver's limits.
 Inputs clipped(const Inputs& u, const model::Driver& d);
 
 struct Waypoint {
@@ -32,7 +30,7 @@ struct Aim {
   double heading_rad, heading_rad_s;
 };
 
-/// Target and excitation of one flight, on the clock of its log; before t = 0 the target is the first waypoint.
+/// Target and excitation of a flight, on the clock of its log; before t = 0 the target is the first waypoint.
 class Plan {
  public:
   Plan(Programme programme, std::size_t flight, const Room& room, std::uint64_t seed);
@@ -59,7 +57,6 @@ class RobotController {
  public:
   RobotController(const model::Driver& driver, std::uint64_t seed, std::uint64_t flight);
   ~RobotController();
-  /// Called once in each control period.
   Inputs steer(const Torso& torso, const Aim& aim, const Inputs& excitation);
   /// Voltage of one motor at the fraction `beat` of the beat, in [0, 1).
   static double voltage(const Inputs& inputs, std::size_t side, double beat, double limit_V);

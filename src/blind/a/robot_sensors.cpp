@@ -17,7 +17,7 @@ double bandwidth_hz(double interval_s, double low_pass_hz) {
 void declare_imu(SensorSet& s) {
   const double interval_s = 1 / s.imu.rate_hz;
   s.imu.bandwidth_hz = std::round(bandwidth_hz(interval_s, s.imu_low_pass_hz) * 10) / 10;
-  // a reader of the log models one low-pass of the declared bandwidth; the remaining delay is declared as latency
+  // a reader of the log models one low-pass of the declared bandwidth; other delay is declared as latency
   const double late_s = s.imu_transport_s + interval_s / 2 + 1 / (2 * kPi * s.imu_low_pass_hz);
   s.imu.latency_s = std::round((late_s - 1 / (2 * kPi * s.imu.bandwidth_hz)) * 1e7) / 1e7;
 }

@@ -1,7 +1,6 @@
-// Sensors of the blind robot: they turn its motion into rows of a flight log, on the clock of the flight.
-//
-// IMU: first-order low-pass, mean over the sampling interval, constant bias of the gyro, white noise, slow noise of a tenth of its sd.
-// Motion capture: pose of the torso origin with noise, latency and jitter of the arrival; short bursts are lost.
+// Sensors turn the robot's motion into rows of a flight log, on the flight's clock. IMU: first-order low-pass, mean
+// over the sampling interval, constant gyro bias, white noise, slow noise of a tenth of its sd. Motion capture: pose of
+// the torso origin with noise, latency, jitter of the arrival, and short lost bursts.
 #pragma once
 
 #include "blind/a/robot.hpp"
@@ -9,7 +8,6 @@
 
 namespace flappy::blind {
 
-/// Sensors of a robot: the headers that its log declares, and the true values behind them.
 struct SensorSet {
   flightlog::MocapHeader mocap;
   flightlog::ImuHeader imu;
@@ -33,7 +31,7 @@ class RobotImu {
     Vector3d gyro_rad_s, accel_m_s2;
   };
   RobotImu(const SensorSet& set, const Magnitudes& magnitudes, std::uint64_t seed, std::uint64_t flight, double step_s);
-  /// Called after each step; `t_s` is the step's end on the log's clock. Returns a sample if a sampling interval ended.
+  /// Called after each step, which ends at `t_s` of the log. Returns a sample if a sampling interval ended.
   std::optional<Sample> after_step(const Robot& robot, double t_s);
   const Vector3d& constant_bias_rad_s() const { return bias_; }
 

@@ -1,4 +1,3 @@
-// Draws robots until one flies all its flights without a crash.
 #pragma once
 
 #include <filesystem>
@@ -24,7 +23,6 @@ struct SampledRobot {
 /// The robot as its file declares it. Throws InputError if the file has effects.
 Case declared_case(const std::filesystem::path& vehicle_file);
 
-/// Thrown if all draws crash.
 class NeverFlies : public io::InputError {
  public:
   using InputError::InputError;
@@ -35,7 +33,7 @@ inline constexpr std::uint64_t kTries = 20;  ///< largest number of draws
 /// The case of one draw of a seed. `c`: the part that all draws share.
 Case sampled_case(Case c, const sim::Randomisation& randomisation, std::uint64_t seed, std::uint64_t draw);
 
-/// `c`: the part that all draws share. Returns the same bytes for the same seed. Throws NeverFlies after 20 draws.
+/// Draws robots until one flies all its flights. Equal seeds give equal bytes. Throws NeverFlies after 20 draws.
 SampledRobot fly_sampled(Case c, const sim::Randomisation& randomisation, std::uint64_t seed);
 
 }  // namespace flappy::blind

@@ -17,8 +17,7 @@ double Robot::place_gain(std::size_t k) const {
                           x_.torso.attitude * (s.shoulder_m + Vector3d(0, s.sign * 0.6 * s.planform.wing_length_m, 0));
   double gain = 1;
   if (const double magnitude = magnitudes_[Effect::ground_effect]; magnitude > 0) {
-    // Hayden 1976: thrust at constant power grows as (A + B (2R/h)^2)^(2/3), A = 0.99, B = 0.038; here 1 and 0.05,
-    // with an h that keeps it finite on the ground
+    // Hayden 1976: thrust grows as (A + B (2R/h)^2)^(2/3), A = 0.99, B = 0.038; here 1, 0.05 and an h finite on ground
     const double h2 = square(std::max(middle.z() - room_.ground_z_m, 0.0)) + square(0.05);
     gain *= power(1 + 0.05 * magnitude * square(2 * kHalfSpan_m) / h2, 2.0 / 3);
   }
@@ -73,7 +72,6 @@ void Robot::update_surroundings(double dt_s) {
   }
 }
 
-/// Adds the forces and torques of effects on the torso.
 void Robot::push() {
   const Torso& t = x_.torso;
   const double weight = mass_kg_ * room_.gravity_m_s2;
@@ -92,8 +90,7 @@ void Robot::push() {
     add_force(Vector3d::Zero(), R_.transpose() * Vector3d(-pull * wall.normal_x, -pull * wall.normal_y, 0));
   }
   if (const double magnitude = magnitudes_[Effect::tether]; magnitude > 0) {
-    // a catenary whose end lies on the ground: the lifted length is sqrt(z^2 + 2 z a),
-    // a = horizontal pull / weight per length
+    // catenary with its end on the ground: lifted length sqrt(z^2 + 2 z a), a = horizontal pull / weight per length
     constexpr double kLine_kg_m = 2e-4, kPull_m = 0.15, kSpring_N_m = 2e-3;
     const double z = std::max(t.position_m.z() - room_.ground_z_m, 0.0);
     const double line_N_m = kLine_kg_m * room_.gravity_m_s2;

@@ -1,5 +1,4 @@
-// The pilot's view of the state: the true state with the errors that a filter on motion capture and IMU would leave, namely white
-// noise, a bias of the gyro, and a position error that drifts by about 1 mm.
+// The pilot's view: the true state with white noise, gyro bias and 1 mm of position drift, as a filter would leave.
 #pragma once
 
 #include "blind/a/robot.hpp"

@@ -20,7 +20,7 @@ double beta_chord(double x) {
 
 }  // namespace
 
-// By symmetry lift is zero at 0 and 90 degrees, but the fits are not quite: two factors bring them to zero within some degrees.
+// By symmetry lift is zero at 0 and 90 degrees, but the fits are not quite: two factors correct this.
 double lift_coefficient(double alpha) {
   const double fit = 0.225 + 1.58 * std::sin(2.13 * alpha - 7.2 * kDegree);
   return fit * std::tanh(alpha / (3 * kDegree)) * std::tanh((kPi / 2 - alpha) / (6 * kDegree));
@@ -60,8 +60,8 @@ WingAir::WingAir(const RobotParameters& parameters, const EffectMagnitudes& effe
     strip.chord = s.mean_chord_m * beta_chord(strip.r / length_);
     area += strip.chord * width;
   }
-  // A small number of strips misses some of the area, so chords are stretched to give the file's area. Wing damage then
-  // cuts the tip: half of the lost area from the last strip, the rest from the two before.
+  // Few strips miss some area, so chords are stretched to give the file's. Damage cuts half of the lost area from the
+  // last strip, the rest from the two before.
   const double stretch = length_ * s.mean_chord_m / area;
   for (std::size_t i = 0; i < kStrips; ++i) {
     Strip& strip = strips_[i];

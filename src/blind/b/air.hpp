@@ -1,35 +1,33 @@
-// Aerodynamics of a wing: blade strips with measured lift and drag, and circulation that lags behind the quasi-steady value.
+// Aerodynamics of a wing: blade strips with measured lift and drag, and circulation that lags behind the quasi-steady
+// value. A strip at r from the shoulder, chord c, whose point on the hinge moves with (u_x, u_z) through the air (wing
+// frame: x its normal, z from trailing to leading edge), U^2 = u_x^2 + u_z^2, alpha = atan(|u_x| / |u_z|):
 //
-// A strip at r from the shoulder, chord c, whose point on the hinge moves with (u_x, u_z) through the air (wing frame: x its normal,
-// z from trailing to leading edge), U^2 = u_x^2 + u_z^2, alpha = atan(|u_x| / |u_z|):
-//
-//   lift   across (u_x, u_z), drag against it:  1/2 rho U^2 c dr C       C_L = 0.225 + 1.58 sin(2.13 alpha - 7.2 deg)
-//                                                                         C_D = 1.92 - 1.55 cos(2.04 alpha - 9.82 deg)     [1, 2]
-//   centre of pressure behind the edge that leads:  c (0.82 alpha / pi + 0.05)                                             [3]
+//   lift across (u_x, u_z), drag against it:  1/2 rho U^2 c dr C   C_L = 0.225 + 1.58 sin(2.13 alpha - 7.2 deg)
+//                                                                  C_D = 1.92 - 1.55 cos(2.04 alpha - 9.82 deg)  [1, 2]
+//   centre of pressure behind the edge that leads:  c (0.82 alpha / pi + 0.05)                                    [3]
 //   circulation  g = U C_L at the radius of the second moment; its lagging part,
-//                d = (A1 + A2) g - z1 - z2,   dz_i/dt = (2 U / c) b_i (A_i g - z_i),   is subtracted in proportion to r     [4, 5]
-//   rotation about the hinge with w_y:  1/2 rho C_D(90 deg) w_y |w_y| (c^3 / 3 on the normal force, c^4 / 4 on the hinge) dr
+//              d = (A1 + A2) g - z1 - z2,   dz_i/dt = (2 U / c) b_i (A_i g - z_i), subtracted in proportion to r [4, 5]
+//   rotation about the hinge with w_y:  1/2 rho C_D(90 deg) w_y |w_y| (c^3 / 3 normal, c^4 / 4 on the hinge) dr
 //
-// Chords follow a beta density over the span, as Ellington described insects' wings [6],
-// c = c_mean x^(p-1) (1-x)^(q-1) / B(p, q); p and q are this family's choice: mean 0.46, mean square 0.53^2.
-//
-// The coefficients were measured at a Reynolds number of 10^2. At 10^4 the ratio of lift to drag is higher [8]. One factor on lift,
-// kScale, is chosen so that the nominal robot carries its weight at about 10 V.
-//
-// Rotational circulation [2], added mass [7], wake, twist and nearby surfaces are effects; at magnitude 0 they contribute nothing.
-// Assumed: strips are independent of each other, spanwise flow exerts no force, one lag represents a wing. Valid while wings beat: the
-// model has no downwash of a gliding robot.
+// Chords follow a beta density over the span, as Ellington described insects' wings [6], c = c_mean x^(p-1) (1-x)^(q-1)
+// / B(p, q); p and q are this family's choice: mean 0.46, mean square 0.53^2.
+// Coefficients were measured at a Reynolds number of 10^2; at 10^4 lift over drag is higher [8]. kScale on lift makes
+// the nominal robot carry its weight at about 10 V. Rotational circulation [2], added mass [7], wake, twist and
+// surfaces are effects. Assumed: independent strips, no force by spanwise flow, one lag for a wing. Valid while wings
+// beat: there is no downwash of a gliding robot.
 //
 // 1 Dickinson, Lehmann, Sane, Wing rotation and the aerodynamic basis of insect flight, Science 284 (1999): both fits
-// 2 Sane, Dickinson, The aerodynamic effects of wing rotation and a revised quasi-steady model of flapping flight, J. Exp. Biol. 205
-//   (2002): the fits in blade strips; the rotational coefficient, pi (0.75 - x0) in theory, falls with angular velocity
-// 3 Ke, Zhang, Shi, Chen, The numerical solution for flapping wing hovering wingbeat dynamics, Aerosp. Sci. Technol. 110 (2021), its code
-// 4 A state-space formulation for the aerodynamics of flapping flight, Aerosp. Sci. Technol. 34 (2014), by Taha and others: Duhamel's
-//   principle on lift curves with a leading-edge vortex
+// 2 Sane, Dickinson, The aerodynamic effects of wing rotation and a revised quasi-steady model of flapping flight, J.
+// Exp. Biol. 205 (2002): fits in strips; the rotational coefficient, pi (0.75 - x0) in theory, falls with rate
+// 3 Ke, Zhang, Shi, Chen, The numerical solution for flapping wing hovering wingbeat dynamics, Aerosp. Sci. Technol.
+// 110 (2021), its code
+// 4 Taha and others, A state-space formulation for the aerodynamics of flapping flight, Aerosp. Sci. Technol. 34
+// (2014): Duhamel's principle on lift curves with a leading-edge vortex
 // 5 R. T. Jones's two exponentials of Wagner's function: A = 0.165, 0.335; b = 0.0455, 0.3
-// 6 Ellington, The aerodynamics of hovering insect flight (1984), as Usherwood and Ellington, J. Exp. Biol. 205 (2002), II, use it
-// 7 Sedov, Planar problems of hydrodynamics and aerodynamics (1966): a plate has pi/4 rho c^2 per length at mid-chord, and
-//   pi/128 rho c^4 about it
+// 6 Ellington, The aerodynamics of hovering insect flight (1984), as in Usherwood, Ellington, J. Exp. Biol. 205, II
+// (2002)
+// 7 Sedov, Planar problems of hydrodynamics and aerodynamics (1966): pi/4 rho c^2 per length at mid-chord, pi/128 rho
+// c^4 about it
 // 8 Altshuler, Dudley, Ellington, Aerodynamic forces of revolving hummingbird wings and wing models, J. Zool. (2004)
 #pragma once
 
@@ -68,7 +66,7 @@ struct Polar {
 double lift_coefficient(double alpha_rad);
 double drag_coefficient(double alpha_rad);
 
-/// Aerodynamic model of one wing. sign is 1 on the left and -1 on the right; the span runs along sign y of the wing's frame.
+/// Air of one wing. Its sign is 1 on the left, -1 on the right; the span runs along sign y of the wing's frame.
 class WingAir {
  public:
   WingAir(const RobotParameters& parameters, const EffectMagnitudes& effect_magnitudes, std::size_t side);

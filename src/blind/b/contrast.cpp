@@ -18,7 +18,7 @@ Vector3d at_imu(const Robot& robot, const Felt& felt, const Vector3d& place) {
   return force;
 }
 
-/// Harmonics, by beats, of a robot that is led along the path while its drivers get the sent inputs.
+/// The torso is led along the path while the drivers get the sent inputs.
 Contrast led(const Assignment& a, const Case& c, std::size_t flight, double trim_s, const Path& path,
              const std::vector<Beat>& sent) {
   Robot robot(c.parameters, c.effect_magnitudes, c.room, a.seed, flight);
@@ -50,8 +50,7 @@ Contrast led(const Assignment& a, const Case& c, std::size_t flight, double trim
         ++beat;
       }
       robot.led_step(path, at);
-      // Impacts at the stops last for a few steps, so every step is evaluated. A soft mount needs 0.1 s before the log
-      // to settle.
+      // Impacts at stops last a few steps, so every step counts. A soft mount settles in the 0.1 s before the log.
       const double left = static_cast<double>(beat) * beat_s - 1e-9 - time;
       if (left > 0.1) continue;
       const Felt felt = robot.felt_now();

@@ -59,8 +59,8 @@ double Plant::stroke_torque(const State& x, std::size_t side, double current_A, 
         n * s.motor.friction_Nm * smooth_sign(turning, kFrictionOver_rad_s) + s.motor.damping_Nm_s * n * n * turning;
   }
   if (a_.any(kCoulombFriction)) {
-    // Bristles of the LuGre model (1995), soft enough for the step. Their strength, Fc + (Fs - Fc) exp(-(v / vs)^2),
-    // falls from 1.4 to 1 times the motor's friction beyond the Stribeck speed.
+    // LuGre bristles (1995), soft enough for the step. Strength Fc + (Fs - Fc) exp(-(v / vs)^2), from 1.4 to 1 times
+    // the motor's friction beyond the Stribeck speed.
     constexpr double kReach_rad = 1.5 * std::numbers::pi / 180, kStribeck_rad_s = 30;
     const double v = turning / kStribeck_rad_s;
     const double strength = 1 + 0.4 * std::exp(-v * v);

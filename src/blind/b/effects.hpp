@@ -56,14 +56,12 @@ enum Effect : std::size_t {
   kEffects,
 };
 
-/// Descriptions of all effects.
 const std::vector<FamilyEffect>& family_effects();
 
-/// Number of an effect. Throws InputError, which suggests the nearest name, for an unknown id.
+/// Number of an effect. InputError, with the nearest name, for an unknown id.
 std::size_t effect_number(const std::string& id);
 
-/// Magnitudes of a robot's effects, 0 for those that it does not have, and the random properties of all effects, which do not depend on
-/// the magnitudes.
+/// Magnitudes of a robot's effects, 0 for those it lacks, and random properties, which do not depend on them.
 struct EffectMagnitudes {
   std::array<double, kEffects> magnitude{};
   double operator[](Effect e) const { return magnitude[e]; }
@@ -85,7 +83,7 @@ struct EffectMagnitudes {
   std::array<double, 2> cogging_phase_rad{}, gear_phase_rad{}, creep_sign{1, 1}, ageing{1, 1};
 };
 
-/// Throws InputError for an effect that is unknown or named twice, and for a magnitude below 0 or above 4.
+/// InputError for an effect unknown or named twice, or a magnitude outside 0 to 4.
 EffectMagnitudes effect_magnitudes_of(const std::vector<std::pair<std::string, double>>& effects, std::uint64_t seed);
 
 }  // namespace flappy::blind::b

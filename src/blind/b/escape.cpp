@@ -9,10 +9,10 @@
 namespace flappy::blind::b {
 namespace {
 
-/// The goal is in the middle of the room, far from all surfaces.
+/// In the middle of the room, far from all surfaces.
 const Vector3d kGoal_m(0, 0, 1);
 
-/// Observation by the parts' names in task files. Errors are relative to the goal, whose heading is 0.
+/// By the parts' names in task files, relative to the goal, whose heading is 0.
 std::vector<double> observed(const std::vector<std::string>& names, const View& view, double beat_phase, double time,
                              const Beat& trim, const std::array<double, 4>& added) {
   std::vector<double> out;

@@ -1,5 +1,5 @@
-// Family B: blade strips with lagging circulation, rigid bodies in reduced coordinates, Runge-Kutta at 50 us, its own models of
-// windings, friction and stops, sensors that jitter and swap markers. It shares nothing with other families.
+// Family B: blade strips with lagging circulation, rigid bodies in reduced coordinates, Runge-Kutta at 50 us, its own
+// models of windings, friction and stops, sensors that jitter and swap markers.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,3 @@
-// One flight of one robot, from its placement in the room to the log.
 #pragma once
 
 #include "blind/b/pilot.hpp"
@@ -10,7 +9,6 @@ namespace flappy::blind::b {
 
 inline constexpr double kTrim_s = 5;
 
-/// Robot of an assignment: its parameters, effects, room, sensors, and the header that declares them.
 struct Case {
   RobotParameters parameters;
   EffectMagnitudes effect_magnitudes;
@@ -20,7 +18,7 @@ struct Case {
 };
 Case make_case(const Assignment& a);
 
-/// Radio link: returns the sent inputs, or the last ones that arrived while packets are lost (command dropout).
+/// Radio link: returns the sent inputs or, while packets are lost (command dropout), the last that arrived.
 class Radio {
  public:
   Radio(std::uint64_t seed, std::uint64_t flight, double magnitude, double begins_s);
@@ -38,8 +36,7 @@ class Flight {
   Flight(const Assignment& a, const Case& c, std::uint64_t flight, const Vector3d& start_m, double heading_rad,
          double trim_s);
 
-  /// Flies one tick with the pilot's inputs, which are held between its periods. Returns how the robot crashed, or an
-  /// empty string.
+  /// Flies one tick; inputs are held between the pilot's periods. Returns how the robot crashed, or an empty string.
   std::string tick(const Beat& sent, bool may_tumble = false);
   double time_s() const { return static_cast<double>(ticks_) * kTick_s - trim_s_; }
   long ticks() const { return ticks_; }

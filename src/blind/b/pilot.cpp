@@ -40,7 +40,7 @@ void Observer::correct(const MocapSample& frame) {
   const View& then = past_[(ticks_ + past_.size() - std::min(late_ticks_, past_.size() - 1)) % past_.size()];
   const Vector3d away = frame.position_m - then.position_m;
   const Vector3d turned = rotation_of(then.attitude.conjugate() * frame.attitude);
-  // An outlier is rejected, up to 11 in a row: after that the estimate, not the frame, is assumed to be wrong.
+  // Up to 11 outliers in a row are rejected: after that the estimate is assumed to be wrong.
   if ((away.norm() > 0.025 || turned.norm() > 0.5) && ++refused_ < 12) return;
   refused_ = 0;
   const double position = 30 * period_s_, velocity = 350 * period_s_, attitude = 8 * period_s_, drift = 6 * period_s_;

@@ -1,9 +1,7 @@
-// Pilot of family B: an observer on the sensors' data, cascaded control loops, and the programme of a flight.
-//
-// The observer integrates position, velocity and attitude from the IMU. When a frame of motion capture arrives, it corrects them by the
-// difference between the frame and its own estimate at the time of the frame. The loops: position to velocity to acceleration to the
-// direction of thrust; attitude to the inputs of the wing beat. Notches remove the beat from rates and velocities. Integrators find the
-// trim.
+// The pilot: an observer on the sensors' data, cascaded loops, and the programme of a flight. The observer integrates
+// the IMU; a frame of motion capture corrects it by its difference from the estimate at the frame's time. Loops:
+// position, velocity, acceleration, direction of thrust; attitude to inputs. Notches remove the beat; integrators find
+// the trim.
 #pragma once
 
 #include <array>
@@ -14,7 +12,6 @@
 
 namespace flappy::blind::b {
 
-/// The pilot's estimate of the state.
 struct View {
   Vector3d position_m = Vector3d::Zero(), velocity_m_s = Vector3d::Zero(), rate_rad_s = Vector3d::Zero();
   Eigen::Quaterniond attitude = Eigen::Quaterniond::Identity();
@@ -24,7 +21,7 @@ class Observer {
  public:
   /// Starts from the pose at which the robot is placed, which is known exactly.
   Observer(const flightlog::FlightHeader& header, const Vector3d& position_m, double heading_rad);
-  /// Called every tick; takes the samples that have arrived.
+  /// Called every tick; takes arrived samples.
   void tick(Sensors& sensors, double now_s);
   const View& view() const { return view_; }
 
@@ -52,7 +49,6 @@ class Pilot {
   Beat steer(const View& view, const Target& target);
   /// Inputs that the integrators hold.
   Beat trim() const;
-  /// Period of the loops.
   static constexpr double kPeriod_s = 2 * kTick_s;
 
  private:
@@ -68,11 +64,10 @@ class Pilot {
   double roll_ = 0, pitch_ = 0, yaw_ = 0, lift_V_ = 10;
 };
 
-/// Path and heading of a flight, and the excitation that is added to the pilot's inputs.
+/// Path and heading of a flight, and the excitation added to the pilot's inputs.
 class Programme {
  public:
-  /// Flight 0 is near the ground, 1 near the ceiling, 2 along the wall; each also has legs in free air. Hover keeps its
-  /// place.
+  /// Flights 0 near the ground, 1 near the ceiling, 2 along the wall, with legs in free air. Hover stays.
   Programme(const Assignment& a, std::uint64_t flight, const RobotParameters& parameters, const Surroundings& room);
   Vector3d start_m() const { return legs_.front().to; }
   double start_heading_rad() const { return legs_.front().heading; }

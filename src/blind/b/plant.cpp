@@ -87,9 +87,8 @@ void Plant::place(const State& x, std::size_t side, SideNow& now) const {
 double Plant::near_gain(const Vector3d& shoulder_W, const Vector3d& tip_W, const Surroundings& room) const {
   double gain = 1;
   const double height = 0.5 * (shoulder_W.z() + tip_W.z());
-  // Exponential laws are finite at contact, unlike that of Cheeseman and Bennett. Ground:
-  // In-Ground-Effect Modeling ..., J. Dyn. Syst. Meas. Control 141, 071013; ground and ceiling: Modelling of Ground
-  // and Ceiling Effects (University of Bolzano).
+  // Exponential laws are finite at contact, unlike Cheeseman and Bennett's. In-Ground-Effect Modeling ..., J. Dyn.
+  // Syst. Meas. Control 141, 071013; Modelling of Ground and Ceiling Effects (University of Bolzano).
   if (a_.any(kGroundEffect)) gain += 0.14 * a_[kGroundEffect] * decay(height - room.ground_z_m, 0.075);
   if (a_.any(kCeilingEffect)) gain += 0.12 * a_[kCeilingEffect] * decay(room.ceiling_z_m - height, 0.06);
   if (a_.any(kWallEffect)) gain -= 0.05 * a_[kWallEffect] * decay(room.wall_y_m - tip_W.y(), 0.08);
@@ -115,9 +114,8 @@ Wrench Plant::on_torso(const State& x, const Matrix3d& R, const Slow& slow, cons
     sum = sum + at_point(Vector3d(0, 0, f_.above_m), R.transpose() * pull);
   }
   if (a_.any(kTether)) {
-    // A cable hangs from below the torso to a foot on the ground. Its hanging part pulls down by its weight. The
-    // horizontal pull is that of a shallow catenary, weight times distance over eight times the sag, with a sag of a
-    // third of the height.
+    // A cable from below the torso to the ground. Its hanging part pulls down by its weight; horizontally, a shallow
+    // catenary: weight times distance over eight times the sag, a third of the height.
     const double weight = 0.2e-3 * a_[kTether] * room.gravity_m_s2;
     const double height = std::max(position.z() - room.ground_z_m, 0.0);
     const Vector3d to_foot(a_.tether_foot_m.x() - position.x(), a_.tether_foot_m.y() - position.y(), 0);
@@ -212,8 +210,7 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
         flow.gain = near_gain(position + R * s.shoulder_m, position + R * (s.shoulder_m + span), room);
       }
       if (a_.any(kClapAndFling)) {
-        // Lehmann, Sane, Dickinson (2005): up to 17 % while wings are less than 10 to 12 degrees apart; more while they
-        // separate.
+        // Lehmann, Sane, Dickinson (2005): up to 17 % within 10 to 12 degrees; more while wings separate.
         const double sum = x[kStroke] + x[kStroke + 1];
         const double apart = std::numbers::pi - std::abs(sum);
         const double parting = 0.5 * (1 - smooth_sign(sum * (x[kStrokeRate] + x[kStrokeRate + 1]), 40));
@@ -233,8 +230,7 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
       rate[kLag + 2 * j] = on.lag_rate[0];
       rate[kLag + 2 * j + 1] = on.lag_rate[1];
       if (a_.any(kWingFlexibility)) {
-        // Twist that is linear along the span (Guan, Yu, Appl. Math. Mech. 35 (2014)) and proportional to the torque on
-        // the hinge.
+        // Twist linear along the span (Guan, Yu, Appl. Math. Mech. 35 (2014)), proportional to the hinge torque.
         constexpr double kFollows_s = 0.8e-3, kHover_Nm = 4e-4;
         rate[kTwist + j] =
             (8 * std::numbers::pi / 180 * a_[kWingFlexibility] * std::clamp(on.torque_Nm.y() / kHover_Nm, -3.0, 3.0) -

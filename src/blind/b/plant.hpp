@@ -1,25 +1,23 @@
-// Mechanics of one robot: bodies, wings and motors with their effects, and the time derivative of its state.
-//
-// Torso, and on each side leading edge and wing, in reduced coordinates: the torso's twist in B and four hinge rates are the
-// quasi-velocities. With S1, S2 the axes of a side as twists at the torso's origin, and bodies' inertias there (spatial.hpp):
-//
+// Mechanics of one robot: torso, and on each side leading edge and wing, in reduced coordinates; the torso's twist in B
+// and four hinge rates are quasi-velocities. With S1, S2 a side's axes as twists at the torso's origin, inertias there
+// (spatial.hpp):
 //   A1 = V0 x S1 psi',  A2 = A1 + V1 x S2 theta'           accelerations of the bodies while no quasi-velocity changes
 //   f  = I A + V x* I V                                     and the wrench that they need
 //   M  from composite inertias: [S1 S2]^T (I_edge + I_wing | I_wing) ...
 //   the hinges are eliminated first (2 x 2 for each side), then the torso is solved for (6 x 6)
+// Accelerations are relative to free fall: weight needs no term, and an accelerometer measures the torso's
+// acceleration.
 //
-// Accelerations are relative to free fall: weight then needs no term, and the torso's acceleration is what an accelerometer measures.
-//
-// Drive of a side, in the stroke hinge's axis; the rotor turns against the wing (one pair of gears), so its momentum counts:
+// Drive of a side, in the stroke hinge's axis; the rotor turns against the wing (one pair of gears), so its momentum
+// counts:
 //   T = N K i - (1 - eta) N K |i| tanh(psi' / w_g) - N f tanh(N psi' / w_f) - b N^2 psi',     inertia N^2 J
 //   L di/dt = V - R i - K N psi'
-// The gear's loss is a friction that grows with load. Unlike a factor on the torque, it dissipates power in both directions.
+// The gear's loss is friction that grows with load: unlike a factor on the torque, it dissipates in both directions.
 //
-// A stop follows Hunt and Crossley: k d^(3/2) (1 + 3/2 c d') with the depth of penetration d; it never pulls.
-//   Hunt, Crossley: Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42 (1975)
-//
-// Assumed, as no value is published: L 0.2 mH (small motors of this resistance have 0.1 to 0.4), friction regularised over 6 rad/s of
-// stroke, stops that an impact of a wing presses in by about 3 degrees.
+// A stop, k d^(3/2) (1 + 3/2 c d') with the depth of penetration d, never pulls (Hunt, Crossley, Coefficient of
+// restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42 (1975)).
+// Assumed, as unpublished: L 0.2 mH (small motors of this resistance: 0.1 to 0.4), friction regularised over 6 rad/s of
+// stroke, stops that a wing's impact presses in by about 3 degrees.
 #pragma once
 
 #include <Eigen/Dense>
@@ -36,12 +34,11 @@ namespace flappy::blind::b {
 inline constexpr double kInductance_H = 0.2e-3;
 inline constexpr double kFrictionOver_rad_s = 6;                 ///< hinge rate over which dry friction is smoothed
 inline constexpr double kRotationStop = 2.0, kStrokeStop = 8.0;  ///< stiffness, Nm/rad^1.5
-/// c of the stops, s/rad: the restitution is e = 1 - c d'. At a third of this value wings rebound differently in each beat.
+/// c of the stops, s/rad: the restitution is e = 1 - c d'. At a third of it, wings rebound differently in each beat.
 inline constexpr double kStopLoss = 1e-2;
 
 inline double smooth_sign(double x, double over) { return std::tanh(x / over); }
 
-/// Indices of the quantities in a State.
 enum Place : std::size_t {
   kPosition = 0,    // of the torso's origin in W
   kQuaternion = 3,  // w, x, y, z
@@ -77,7 +74,6 @@ struct Surroundings {
   double gravity_m_s2 = kGravity_m_s2;
 };
 
-/// Prescribed motion of the torso.
 struct Prescribed {
   Twist acceleration;  ///< relative to free fall, components in B
 };
@@ -101,7 +97,7 @@ class Plant {
   Plant(RobotParameters parameters, const EffectMagnitudes& effect_magnitudes);
 
   /// Time derivative of a state at the given motor currents. With `prescribed`, only the hinges are solved for. `felt`
-  /// must hold the acceleration of the previous call, which drives a loose screw.
+  /// must hold the previous call's acceleration, which drives a loose screw.
   void rates(const State& x, const std::array<double, 2>& current_A, const Slow& slow, const Surroundings& room,
              const Prescribed* prescribed, State& rate, Felt& felt) const;
 

@@ -1,5 +1,5 @@
-// Random numbers of this family: each seed, flight and stream has its own Mersenne twister. Normals are made by Box and Muller, because
-// std::normal_distribution gives different numbers in different standard libraries.
+// Random numbers: each seed, flight and stream has its own Mersenne twister. Normals are made by Box and Muller,
+// because std::normal_distribution differs between standard libraries.
 #pragma once
 
 #include <cmath>
@@ -9,7 +9,6 @@
 
 namespace flappy::blind::b {
 
-/// Purposes of the streams.
 enum class Stream : std::uint64_t {
   kParameters = 1,
   kSensors,
@@ -31,7 +30,6 @@ class Random {
   /// Uniform in [0, 1).
   double uniform() { return static_cast<double>(engine_() >> 11U) * 0x1p-53; }
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
-  /// Normal with mean 0 and variance 1.
   double normal() {
     if (has_second_) {
       has_second_ = false;
@@ -50,7 +48,6 @@ class Random {
     return x;
   }
   std::size_t below(std::size_t count) { return static_cast<std::size_t>(engine_() % count); }
-  /// 1 or -1 with equal probability.
   double sign() { return uniform() < 0.5 ? -1.0 : 1.0; }
 
  private:

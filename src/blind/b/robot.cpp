@@ -67,8 +67,7 @@ void Robot::advance_slow() {
     }
   }
   if (a.any(kBatterySag)) {
-    // Thevenin circuit, as for cells of model aircraft (Suti, Di Rito, Mattei, Energies 15 (2022)): charge, resistance,
-    // one relaxation.
+    // Thevenin circuit as in Suti, Di Rito, Mattei, Energies 15 (2022): charge, resistance, one relaxation.
     constexpr double kHover_A = 0.5, kRelaxes_s = 1.5;
     const double load = load_As_ / kTick_s;
     charge_As_ += load_As_;

@@ -1,11 +1,11 @@
-// A robot in motion: integrates its state, and models its drivers and slow states.
+// Integrates a robot's state, and models its drivers and slow states. Classical Runge-Kutta at 50 us. Windings are
+// faster (L / R = 16 us), so currents are exact, as in exponential integrators, for a back voltage linear over a (half)
+// step:
 //
-// The mechanics are integrated by the classical Runge-Kutta method at 50 us. Windings are faster (L / R = 16 us). Their currents are
-// therefore solved exactly, as in exponential integrators, for a back voltage that is linear over a step or half a step:
+//   i(c h) = i e + V/R (1 - e) - N K / R (u_0 (1 - e) + (u_1 - u_0) (1 - (1 - e) tau / (c h)))
+//   e = exp(-c h / tau), tau = L / R
 //
-//   i(c h) = i e + V/R (1 - e) - N K / R (u_0 (1 - e) + (u_1 - u_0) (1 - (1 - e) tau / (c h))),   e = exp(-c h / tau), tau = L / R
-//
-// Halving the step from 50 us changes the position of a free robot after four beats by a few micrometres; the test has the values.
+// Half the step moves a free robot by a few micrometres after four beats; the test has the values.
 #pragma once
 
 #include <array>
@@ -22,13 +22,12 @@ inline constexpr int kStepsPerTick = 20;
 inline constexpr double kTick_s = 1e-3;  ///< period of the drivers' updates
 inline constexpr double kStep_s = kTick_s / kStepsPerTick;
 
-/// Inputs of the wing beat.
 struct Beat {
   double amplitude_V = 0, difference_V = 0, bias_V = 0, split_cycle = 0;
 };
 
-/// Voltages of the drivers (left, right) at a time since the start of any beat: the two half periods of a cosine, whose durations
-/// differ by the split cycle.
+/// Voltages of the drivers (left, right) at a time since the start of any beat: two half periods of a cosine, whose
+/// durations differ by the split cycle.
 std::array<double, 2> waveform(const RobotParameters& parameters, const Beat& beat, double time_s);
 
 /// Motion of the torso at the start of each step.
@@ -46,7 +45,6 @@ class Robot {
   void put(const Vector3d& position_m, double heading_rad);
   /// Begins a tick and commands the drivers' voltages (V; left, right).
   void drive(const std::array<double, 2>& voltage_V);
-  /// Advances one step within the tick.
   void step(double h = kStep_s);
   /// Advances one step with the torso led along a path; `at`: index of the step in the path.
   void led_step(const Path& path, std::size_t at);
@@ -68,7 +66,7 @@ class Robot {
   }
   /// Supply voltage over its nominal value.
   double supply() const { return supply_; }
-  /// Voltage at a motor during the last step.
+  /// Voltages at the motors during the last step.
   const std::array<double, 2>& voltage_V() const { return applied_; }
   /// How the robot crashed; empty while it flies.
   std::string crash(bool may_tumble) const;

@@ -70,8 +70,7 @@ void draw_link(Random& random, Link& link, double inertia_sd) {
   link.mass_kg *= factor(random, 0.03);
   for (double& x : link.com_m) x += 0.3e-3 * random.normal_within_three();
   const Matrix3d declared = link.inertia_kg_m2;
-  // The inertia of a flat wing is at the limit of what is physical, so about half of the draws are not physical and are
-  // repeated.
+  // A flat wing's inertia is at the limit of what is physical, so about half of the draws are repeated.
   do {
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j <= i; ++j)

@@ -1,4 +1,4 @@
-// Parameters of one robot: the values of the declared vehicle file, or values drawn independently about them.
+// Parameters of one robot: values of the declared vehicle file, or drawn independently about them.
 #pragma once
 
 #include <Eigen/Dense>
@@ -56,12 +56,12 @@ inline constexpr double kGravity_m_s2 = 9.81, kPi = std::numbers::pi, kDegree = 
 /// Reads a vehicle file. Throws InputError if a parameter is missing or out of range.
 RobotParameters read_parameters(const std::filesystem::path& file);
 
-/// Draws the parameters of each body independently, also left and right: sd of masses 3 %, inertias 7 %, centres and hinges 0.3 mm,
-/// springs 5 %, rest angles 1 deg, stops 2 deg, resistance 7 %, torque constant 3 %, friction 30 %, aerodynamic coefficients 5 %;
-/// redrawn beyond 3 sd.
+/// Draws each body and side independently: sd of masses 3 %, inertias 7 %, centres and hinges 0.3 mm, springs 5 %, rest
+/// angles 1 deg, stops 2 deg, resistance 7 %, torque constant 3 %, friction 30 %, air coefficients 5 %; redrawn beyond
+/// 3 sd.
 void draw_parameters(std::uint64_t seed, RobotParameters& parameters);
 
-/// Whether a mass distribution can have this inertia: it is positive and no principal moment exceeds the sum of the others, to 1 in 1e3.
+/// Whether it is positive and no principal moment exceeds the sum of the others, to 1 in 1e3.
 bool is_inertia(const Matrix3d& inertia);
 
 }  // namespace flappy::blind::b

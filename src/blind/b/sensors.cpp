@@ -86,8 +86,7 @@ SensorTruth draw_sensors(const Assignment& a, double battery_nominal_V, flightlo
   t.sample = kind == 0 ? Sample::kInstant : kind == 1 ? Sample::kMean : Sample::kHeld;
   t.averaging_s = averaging;
   t.own_clock_hz = own_clock;
-  // By the log format, latency is the mean delay from the measured instant: it includes half of the averaging or
-  // holding time.
+  // By the log format, latency is the mean delay from the measured instant, half of averaging or holding included.
   if (with_interval && t.sample == Sample::kMean) header.imu.latency_s += averaging / 2;
   if (with_interval && t.sample == Sample::kHeld) header.imu.latency_s += 0.5 / own_clock;
   t.imu_rate_hz *= imu_rate;
@@ -232,7 +231,7 @@ void Sensors::mocap_step(const Robot& robot, double time) {
   attitude.normalize();
   if (attitude.dot(last_attitude_) < 0) attitude.coeffs() *= -1;
   last_attitude_ = attitude;
-  // Waiting for the network adds exponential jitter, whose mean is removed so that the mean latency is the declared one.
+  // Waiting for the network: exponential jitter, less its mean, so that the declared mean latency holds.
   const double late_s =
       std::max(2e-4, truth_.mocap_late_s + 5e-3 * effect_magnitudes_[kMocapDelay] * effect_magnitudes_.delay_sign);
   const double jitter = 0.5 * std::min(1e-3 * -std::log(1 - late) - 1e-3, 5e-3);
@@ -263,7 +262,7 @@ void Sensors::after_step(const Robot& robot, double time, int step) {
   mocap_step(robot, time);
   if (power_ && step == truth_.power_step && time >= next_power_s_ - 1e-7) {
     next_power_s_ += 1 / truth_.power_rate_hz;
-    // A converter that the driver triggers reports the time of the trigger; one in the middle of a tick reports its own.
+    // A converter triggered by the driver reports the trigger's time; one in mid-tick its own.
     power_sample(robot, truth_.power_step == kStepsPerTick / 2 ? time : time - truth_.power_step * kStep_s);
   }
   if (wings_ && time >= next_wings_s_) {

@@ -1,11 +1,8 @@
-// Sensors of a robot, and what its log declares about them.
-//
-// IMU: specific force and rate at its position and in its orientation; its effects; a first-order low-pass; samples with jitter, which
-// are instantaneous, means over an averaging time, or held from its own clock; bias with thermal drift, noise, range, resolution.
-// Motion capture: noise, bursts of lost frames, frames with swapped markers, arrival with jitter. Currents: instantaneous values, taken
-// in the middle of a driver's tick, or just before or just after its switching. Wings: an encoder of 4096 steps a turn.
-//
-// Declarations are exact, or drawn within the habits of laboratories. Times are on the log's clock, which is 0 at its start.
+// Sensors, and what the log declares about them. IMU: specific force and rate at its place and axes; effects;
+// first-order low-pass; samples with jitter, instantaneous, averaged or held from its own clock; bias with thermal
+// drift, noise, range, resolution. Motion capture: noise, lost bursts, swapped markers, arrival with jitter. Currents:
+// instantaneous, in mid-tick, or just before or after the driver's switching. Wings: an encoder of 4096 steps a turn.
+// Declarations are exact, or within the habits of laboratories. The log's clock is 0 at its start.
 #pragma once
 
 #include <deque>
@@ -45,7 +42,7 @@ struct SensorTruth {
   double imu_clock = 1, mocap_clock = 1, power_clock = 1;  ///< relative speed of each stream's clock
 };
 
-/// Draws the robot's sensors and their declarations. Fills the header except for the vehicle and the surroundings.
+/// Draws the sensors and their declarations; fills the header except for vehicle and surroundings.
 SensorTruth draw_sensors(const Assignment& a, double battery_nominal_V, flightlog::FlightHeader& header);
 
 struct ImuSample {
@@ -64,7 +61,7 @@ class Sensors {
   Sensors(const Assignment& a, const SensorTruth& truth, const Robot& robot, std::uint64_t flight, double trim_s,
           bool power, bool wings);
 
-  /// Called after each step of the robot. `time_s`: end of the step. `step`: its number within the tick, from 1 on.
+  /// Called after each step. `time_s`: end of the step; `step`: its number within the tick, from 1 on.
   void after_step(const Robot& robot, double time_s, int step);
   /// Called before the driver switches.
   void before_tick(const Robot& robot, double time_s);
@@ -87,7 +84,6 @@ class Sensors {
   double trim_s_;
   bool power_, wings_;
   Random imu_random_, mocap_random_, power_random_, wings_random_, drift_random_;
-  // IMU
   Vector3d gyro_bias_, accel_bias_, warming_, wandering_ = Vector3d::Zero();
   Matrix3d accel_turn_;
   Vector3d gyro_felt_ = Vector3d::Zero(), accel_felt_ = Vector3d::Zero();

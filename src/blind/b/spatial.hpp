@@ -1,10 +1,8 @@
-// Twists, wrenches and inertias of rigid bodies, all at one reference point, the torso's origin, with components in B.
-//
+// Twists, wrenches and inertias at one reference point, the torso's origin, in B:
 //   momentum of a body        h = I V:  n = J w + c x v,  f = m v - c x w      c = m r, J about the point
 //   rate of a moving vector   dS/dt = V x S:  (w x Sw, w x Sv + v x Sw)
 //   rate of a moving wrench   dF/dt = V x* F: (w x n + v x f, w x f)
-//
-// These are the Newton-Euler equations about a point that need neither be fixed nor be the centre of mass.
+// Newton-Euler about a point that need neither be fixed nor be the centre of mass.
 #pragma once
 
 #include <Eigen/Dense>

@@ -1,11 +1,10 @@
-// References:
-// [1] He et al., In-ground-effect modeling and nonlinear-disturbance observer for multirotor UAV control, ASME J. Dyn. Syst. Meas.
-//     Control 141(7), 071013 (2019): thrust grows by C_a exp(-C_b z/R), which is finite at the ground.
-// [2] Tu et al., Acting is seeing: navigating tight space using flapping wings, ICRA 2019: ground and walls change the wing loads of
-//     this robot.
-// [3] Lehmann, Sane, Dickinson, The aerodynamic effects of wing-wing interaction in flapping insect wings, J. Exp. Biol. 208, 3075
-//     (2005): up to 17 % more force over a beat, less with the angle between the wings.
-// The laws for ceiling, wall, wake and downwash are our own; their strengths are like the catalogue's.
+// [1] He et al., In-ground-effect modeling and nonlinear-disturbance observer for multirotor UAV control, ASME J. Dyn.
+// Syst. Meas. Control 141(7), 071013 (2019): thrust grows by C_a exp(-C_b z/R), finite at the ground.
+// [2] Tu et al., Acting is seeing: navigating tight space using flapping wings, ICRA 2019: surfaces change this robot's
+// loads.
+// [3] Lehmann, Sane, Dickinson, The aerodynamic effects of wing-wing interaction in flapping insect wings, J. Exp.
+// Biol. 208, 3075 (2005): up to 17 % more force over a beat, less with the angle between the wings.
+// Laws for ceiling, wall, wake and downwash are our own, as strong as the catalogue's.
 #include "blind/c/air.hpp"
 
 #include <algorithm>

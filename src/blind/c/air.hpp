@@ -1,5 +1,5 @@
-// Aerodynamic effects that MuJoCo's fluid model lacks: room, wind and the wings' own wake. Most of them are a factor on the fluid force
-// of each ellipsoid, for which MuJoCo has a parameter.
+// Effects that MuJoCo's fluid model lacks: room, wind, the wings' own wake. Most are a factor on each ellipsoid's fluid
+// force.
 #pragma once
 
 #include "blind/c/drive.hpp"

@@ -1,6 +1,6 @@
-// The flight is flown once. Its voltages are then applied twice more, with and without the effect, while the torso repeats the flown
-// motion. Both runs record the acceleration that the torso would have if it were free in this step; wings and other moving parts follow
-// the torso's true acceleration. Effects that act on sensors alone give no contrast.
+// The flight is flown once; its voltages are applied twice more, with and without the effect, while the torso repeats
+// the motion. Both runs record the torso's acceleration if free in this step; other parts follow the true one. Effects
+// on sensors alone give no contrast.
 #include "blind/c/contrast.hpp"
 
 namespace flappy::blind::c {
@@ -8,7 +8,7 @@ namespace {
 
 using Six = Eigen::Matrix<double, 6, 1>;
 
-/// Sums for mean, cosine and sine of the first and of the second harmonic of each beat.
+/// Mean, cosine and sine of two harmonics of each beat.
 struct Beats {
   std::vector<std::array<double, 30>> sums;
   std::vector<double> counts;

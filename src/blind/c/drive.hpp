@@ -1,8 +1,6 @@
-// The drive from the commanded voltages to the stroke hinges: driver, battery, wiring, windings and gears.
-//
-//   i = (V - K N psidot) / R,  torque behind the gear = N eta K i;  friction, damping and inertia are part of the hinge
-//
-// The windings' inductance is neglected: with about 0.1 mH the current settles within 10 us.
+// The drive, from commanded voltages to the stroke hinges: driver, battery, wiring, windings, gears. Inductance is
+// neglected (0.1 mH settle within 10 us); friction, damping and inertia are part of the hinge:
+//   i = (V - K N psidot) / R,  torque behind the gear = N eta K i
 #pragma once
 
 #include <array>
@@ -14,7 +12,6 @@
 
 namespace flappy::blind::c {
 
-/// Inputs to the wing beat.
 struct Inputs {
   double amplitude_V = 0, difference_V = 0, bias_V = 0, split_cycle = 0;
 };
@@ -32,7 +29,7 @@ class Drive {
 
   /// Hands the driver new voltages (V; left, right), which act after its delay and jitter.
   void command(double now_s, const std::array<double, 2>& voltages);
-  /// Torques behind the gears (Nm) for the next step, at the stroke angles and rates of left and right.
+  /// Torques behind the gears (Nm; left, right) for the next step, at these stroke angles and rates.
   std::array<double, 2> torques(double now_s, double step_s, const std::array<double, 2>& angles,
                                 const std::array<double, 2>& rates);
   const std::array<double, 2>& currents() const { return currents_; }

@@ -1,4 +1,3 @@
-// Effects of family C, and their magnitudes in one robot.
 #pragma once
 
 #include <array>
@@ -10,7 +9,7 @@
 
 namespace flappy::blind::c {
 
-/// All effects; the table in effects.cpp has the same order.
+/// The table in effects.cpp has the same order.
 enum class Effect : std::size_t {
   kGround,
   kCeiling,
@@ -61,7 +60,7 @@ const std::vector<FamilyEffect>& effect_table();
 /// Magnitude of each effect; 0: absent.
 class Magnitudes {
  public:
-  /// Throws InputError for an unknown id, a repeated id, and a magnitude outside 0 to 4.
+  /// InputError for an id unknown or repeated, or a magnitude outside 0 to 4.
   explicit Magnitudes(const std::vector<std::pair<std::string, double>>& effects);
   double operator[](Effect effect) const { return magnitudes_[static_cast<std::size_t>(effect)]; }
 

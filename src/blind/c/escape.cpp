@@ -1,15 +1,12 @@
-// The goal is the origin of the task's world, with heading 0. It is in the middle of the room, so the ground is at z = -1 in that world.
-//
-// The robot finds its trim in hover, is moved to the start of the episode, and holds this trim while the policy adds to it. The policy
-// observes the pilot's view, by names:
+// The goal is the task world's origin, heading 0, in mid-room, so the ground is at z = -1 there. The robot trims in
+// hover, is moved to the episode's start, and holds this trim while the policy adds to it. Names of what the policy
+// observes, in the pilot's view:
 //   goal_rotation      body to the goal's heading frame; equals rotation_matrix, as the goal's heading is 0
-//   rotation_matrix    body to world, row by row
-//   position_error     position minus goal, W
-//   velocity           W            body_rate        B
+//   rotation_matrix    body to world, row by row         position_error   position minus goal, W
+//   velocity           W                                 body_rate        B
 //   heading_error      heading minus the goal's: sine and cosine, as for beat_phase
-//   beat_phase
 //   time               since the start of the episode
-//   trim               V, V, V, split cycle           previous_action  in these units too
+//   trim               V, V, V, split cycle              previous_action  in these units too
 #include "blind/c/escape.hpp"
 
 namespace flappy::blind::c {

@@ -1,4 +1,4 @@
-// Family C: robots in MuJoCo's engine with MuJoCo's fluid model. Effects, sensors, conventions and pilot are this family's own.
+// Family C: MuJoCo's engine and fluid model. Effects, sensors, conventions and pilot are this family's own.
 #pragma once
 
 #include <memory>

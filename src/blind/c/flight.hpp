@@ -1,4 +1,3 @@
-// One flight of a robot of family C, from its release on.
 #pragma once
 
 #include "blind/c/programme.hpp"
@@ -7,7 +6,7 @@
 
 namespace flappy::blind::c {
 
-/// Durations: of the trimming before the log, and of the log.
+/// Durations of the trimming before the log, and of the log.
 struct Length {
   double trim_s = 5, flight_s = Family::kFlight_s;
 };
@@ -22,10 +21,9 @@ Flown fly_one(const Assignment& a, std::size_t flight, bool keep_path = false, L
 
 /// Phase of the beat from 0 to 1; a beat begins at t = 0.
 double beat_phase(double t_s, double flapping_Hz);
-/// Appends a row to the log's commands.
 void add_command(flightlog::CommandStream& commands, double t_s, const std::array<double, 2>& voltages,
                  const Inputs& inputs, double phase);
-/// Cause of a crash: contact, divergence, leaving the room, or, unless `may_tumble`, turning over. Empty if there is none.
+/// Cause of a crash: contact, divergence, leaving the room or, unless `may_tumble`, turning over; empty if none.
 std::string trouble(const Robot& robot, bool may_tumble);
 
 }  // namespace flappy::blind::c

@@ -123,7 +123,7 @@ void Mechanism::step(const std::array<double, 2>& motor_Nm, const std::array<dou
     d->qfrc_applied[drive_v_[side]] += motor_Nm[side];
     d->qfrc_applied[stroke_v_[side]] += spring_Nm[side];
   }
-  // the free joint takes forces at the torso's origin in W, and torques in B
+  // forces at the torso's origin in W, but torques in B
   vector_at(d->qfrc_applied) = wrench.force_W;
   Eigen::Matrix3d R_WB;
   mju_quat2Mat(R_WB.data(), d->qpos + 3);  // MuJoCo writes row by row, Eigen reads columns: this is the transpose
@@ -132,7 +132,7 @@ void Mechanism::step(const std::array<double, 2>& motor_Nm, const std::array<dou
   if (held != nullptr) hold_torso(*held);
 }
 
-// M += J^T (m_A, I_A) J for the virtual masses and moments of each ellipsoid: the terms in the acceleration, treated implicitly.
+// M += J^T (m_A, I_A) J, virtual masses and moments of each ellipsoid, implicitly.
 void Mechanism::add_virtual_mass() {
   mjModel* m = model_.get();
   mjData* d = data_.get();
@@ -159,7 +159,7 @@ void Mechanism::add_virtual_mass() {
   mj_factorM(m, d);
 }
 
-// Corrects the accelerations of all other coordinates w for the prescribed acceleration of the torso t: M_ww da_w = -M_wt da_t.
+// For a prescribed torso t, all other coordinates w change by M_ww da_w = -M_wt da_t.
 void Mechanism::hold_torso(const Motion& held) {
   mjModel* m = model_.get();
   mjData* d = data_.get();

@@ -1,12 +1,10 @@
-// Bodies, hinges and air of one robot in MuJoCo: an MJCF text made from its parameters, one mjModel and one mjData.
-//
-// Each wing has two ellipsoids of MuJoCo's fluid model [1]. Their positions along the span and their areas are the nodes and weights of
-// the Gauss quadrature for the planform's moments r00, r11, r22 and r33. Force and its moment about the shoulder are then those of the
-// whole planform wherever they are of second degree in the radius. The chord is that of an ellipse with the wing's length and area; its
-// middle is 0.55 mean chords behind the leading edge. MuJoCo omits the force of the virtual mass under acceleration [1]; only the effect
-// added_mass adds it.
-//
-// [1] MuJoCo documentation, Computation, Fluid forces: ellipsoid model; after Andersen, Pesavento, Wang, J. Fluid Mech. 541 (2005).
+// One robot in MuJoCo: an MJCF text of its parameters, one mjModel and one mjData. A wing has two ellipsoids of the
+// fluid model [1], at nodes and with areas of the Gauss quadrature for the planform's moments r00, r11, r22, r33: force
+// and moment about the shoulder are the whole planform's where of second degree in the radius. Chord: of an ellipse of
+// the wing's length and area, its middle 0.55 mean chords behind the leading edge. MuJoCo omits the force of the
+// virtual mass under acceleration [1]; only the effect added_mass adds it.
+// [1] MuJoCo documentation, Computation, Fluid forces: ellipsoid model; after Andersen, Pesavento, Wang, J. Fluid Mech.
+// 541 (2005).
 #pragma once
 
 #include <mujoco/mujoco.h>
@@ -36,7 +34,6 @@ struct Wrench {
   Eigen::Vector3d force_W = Eigen::Vector3d::Zero(), torque_W = Eigen::Vector3d::Zero();
 };
 
-/// Pose, velocity and acceleration of the torso.
 struct Motion {
   Eigen::Vector3d position_W = Eigen::Vector3d::Zero();
   Eigen::Matrix3d R_WB = Eigen::Matrix3d::Identity();
@@ -48,11 +45,11 @@ struct Motion {
 
 class Mechanism {
  public:
-  /// Semi-implicit Euler, of first order. In hover with the torso held, against a quarter of this step: mean thrust
+  /// Semi-implicit Euler, first order. Errors against a quarter of this step, in hover with the torso held: mean thrust
   /// 0.2 % of the weight, first harmonics 1 %, stroke 0.06 %.
   static constexpr double kStep_s = 5e-5;
   static constexpr double kGravity_m_s2 = 9.81;
-  /// Number of ellipsoids of a wing; index 0 is the one nearest to the shoulder.
+  /// Ellipsoids of a wing; 0 is nearest to the shoulder.
   static constexpr std::size_t kStrips = 2;
 
   Mechanism(const RobotParameters& parameters, const Build& build, double step_s = kStep_s);
@@ -69,7 +66,7 @@ class Mechanism {
   /// Angle and rate of the rotor, behind the gear.
   double drive_angle(std::size_t side) const { return data_->qpos[drive_q_[side]]; }
   double drive_rate(std::size_t side) const { return data_->qvel[drive_v_[side]]; }
-  /// Torque of all passive forces about the rotation hinge in the previous step; the air causes almost all of it.
+  /// Torque of all passive forces, almost all of the air, about the rotation hinge in the previous step.
   double hinge_torque(std::size_t side) const { return data_->qfrc_passive[rotation_v_[side]]; }
   Eigen::Vector3d strip_position(std::size_t side, std::size_t strip) const;
   bool is_finite() const;
@@ -77,14 +74,13 @@ class Mechanism {
   void place(const Eigen::Vector3d& position_W, const Eigen::Quaterniond& q_WB);
   void move_torso(const Motion& motion);
   void set_wind(const Eigen::Vector3d& wind_W);
-  /// Sets the factor on all aerodynamic forces of one ellipsoid.
   void scale_air(std::size_t side, std::size_t strip, double factor);
   /// Rotates the outermost ellipsoid about the span.
   void twist(std::size_t side, double angle_rad);
   void set_friction(std::size_t side, double torque_Nm);
 
-  /// Advances one step under torques of motors (behind the gear) and springs, and a wrench on the torso at its origin.
-  /// `held`: prescribes the torso's acceleration; motion() still returns the acceleration that a free torso would have.
+  /// Advances one step. Motor torques are behind the gear; `wrench` acts on the torso at its origin. `held` prescribes
+  /// the torso's acceleration; motion() still returns that of a free torso.
   void step(const std::array<double, 2>& motor_Nm, const std::array<double, 2>& spring_Nm, const Wrench& wrench,
             const Motion* held = nullptr);
 

@@ -7,8 +7,8 @@ namespace {
 
 constexpr double kViscosity_Pa_s = 1.82e-5;  // air at 20 degC
 constexpr double kThickness_m = 0.2e-3;      // half thickness of the ellipsoids; it only affects their edge-on area
-// MuJoCo sets constraints by a time constant, so the stiffness of a stop grows with the inertia that hits it. The rotation stop of the
-// nominal robot yields by about 2 deg in mid-stroke.
+// Constraints have a time constant, so a stop stiffens with the inertia that hits it. The nominal robot's rotation stop
+// yields by about 2 deg in mid-stroke.
 constexpr double kStopTime_s = 0.5e-3, kStopDamping = 0.7, kStopImpedance = 0.8;
 
 std::string numbers(std::initializer_list<double> values) {
@@ -33,7 +33,7 @@ std::string inertial(const RigidBody& body) {
          numbers({q.w(), q.x(), q.y(), q.z()}) + "\" diaginertia=\"" + numbers(principal.eigenvalues()) + "\"/>\n";
 }
 
-/// An ellipsoid without mass; without air, too, if its coefficients are zero. It keeps MuJoCo from using the inertia box of the body.
+/// No mass, and no air if coefficients are zero. Keeps MuJoCo from using the body's inertia box.
 std::string ellipsoid(const std::string& name, const Eigen::Vector3d& at, const Eigen::Vector3d& axes,
                       const FluidCoefficients& fluid) {
   return "<geom name=\"" + name + "\" type=\"ellipsoid\" mass=\"0\" pos=\"" + numbers(at) + "\" size=\"" +

@@ -1,4 +1,3 @@
-// Writes the MJCF text of a robot.
 #pragma once
 
 #include <string>

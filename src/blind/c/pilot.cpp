@@ -80,7 +80,6 @@ void Pilot::carry(const Eigen::Vector3d& about_W, double turn_rad, const Eigen::
 }
 
 Inputs Pilot::fly(const Target& target, double tick_s) {
-  // position -> velocity -> acceleration
   Eigen::Vector3d speed = target.velocity_W + kPlace_1_s * (target.position_W - view_.position_W);
   speed.z() = target.velocity_W.z() + kHeight_1_s * (target.position_W.z() - view_.position_W.z());
   const double level = speed.head<2>().norm();
@@ -97,7 +96,6 @@ Inputs Pilot::fly(const Target& target, double tick_s) {
   }
   climb_V_ = std::clamp(climb_V_ + kClimb_V_s2_m * kClimbHold_1_s2 * error.z() * tick_s, -3.0, 5.0);
 
-  // acceleration -> attitude
   const Eigen::Vector3d up = (wanted + Eigen::Vector3d(0, 0, Mechanism::kGravity_m_s2)).normalized();
   const Eigen::Vector3d nose(std::cos(target.heading_rad), std::sin(target.heading_rad), 0);
   Eigen::Matrix3d R;
@@ -107,7 +105,6 @@ Inputs Pilot::fly(const Target& target, double tick_s) {
   Eigen::Vector3d turn = rotation_between(view_.R_WB, R);
   turn = turn.cwiseMax(-0.7).cwiseMin(0.7);
 
-  // attitude -> inputs
   const Eigen::Vector3d rate = view_.rate_B;
   hold_turn_ = (hold_turn_ + kTurnHold.cwiseProduct(turn) * tick_s).cwiseMax(-kTurnHoldLimit).cwiseMin(kTurnHoldLimit);
   const Eigen::Vector3d out = kTurn.cwiseProduct(turn) - kTurnRate.cwiseProduct(rate) + hold_turn_;

@@ -1,5 +1,4 @@
-// The pilot of family C: cascaded loops from position to tilt to the inputs of the wing beat. Its view of the state is delayed, noisy and
-// averaged over one beat.
+// The pilot: cascaded loops from position to tilt to inputs, on a delayed, noisy view averaged over one beat.
 #pragma once
 
 #include "blind/c/robot.hpp"
@@ -12,7 +11,6 @@ struct Target {
   double heading_rad = 0;
 };
 
-/// The state as the pilot sees it.
 struct View {
   Eigen::Vector3d position_W = Eigen::Vector3d::Zero(), velocity_W = Eigen::Vector3d::Zero(),
                   rate_B = Eigen::Vector3d::Zero();
@@ -25,8 +23,7 @@ class Pilot {
 
   /// To be called once per tick, with the true motion.
   void look(const Motion& now, double tick_s);
-  /// Transforms the pilot's memory after a displacement of the robot: a turn about the world's z through `about_W`,
-  /// then a shift.
+  /// Moves the pilot's memory with a displaced robot: a turn about the world's z through `about_W`, then a shift.
   void carry(const Eigen::Vector3d& about_W, double turn_rad, const Eigen::Vector3d& shift_m);
   const View& view() const { return view_; }
   Inputs fly(const Target& target, double tick_s);

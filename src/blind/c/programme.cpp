@@ -1,5 +1,5 @@
-// Each rich flight visits one surface (flight 0 the ground, 1 the ceiling, 2 the wall) between legs through free air. The excitation is a
-// piecewise constant signal of random levels, 0.2 s each, plus two tones below the beat's frequency.
+// Rich flights visit one surface (0 ground, 1 ceiling, 2 wall) between legs through free air. Excitation: random levels
+// of 0.2 s each, plus two tones below the beat's frequency.
 #include "blind/c/programme.hpp"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// Random numbers of family C: a Mersenne twister, whose output the C++ standard fixes, and an own Box-Muller transform, as the standard
-// leaves the algorithm of std::normal_distribution to the library.
+// Random numbers: a Mersenne twister, whose output the C++ standard fixes, and an own Box-Muller transform, because
+// std::normal_distribution differs between libraries.
 #pragma once
 
 #include <Eigen/Dense>
@@ -12,7 +12,7 @@ namespace flappy::blind::c {
 
 class Random {
  public:
-  /// Each combination of seed, purpose and number has an independent stream.
+  /// Independent streams for each seed, purpose and number.
   Random(std::uint64_t seed, std::string_view purpose, std::uint64_t number = 0) {
     std::uint64_t hash = 0xcbf29ce484222325ULL;  // FNV-1a
     for (const char letter : purpose) hash = (hash ^ static_cast<unsigned char>(letter)) * 0x100000001b3ULL;
@@ -25,7 +25,6 @@ class Random {
   std::size_t below(std::size_t count) { return static_cast<std::size_t>(uniform() * static_cast<double>(count)); }
   double sign() { return uniform() < 0.5 ? -1.0 : 1.0; }
 
-  /// Standard normal number.
   double normal() {
     if (kept_) {
       kept_ = false;
@@ -36,7 +35,7 @@ class Random {
     kept_ = true;
     return radius * std::cos(angle);
   }
-  /// Standard normal number, rejected if beyond three standard deviations.
+  /// Standard normal number, redrawn beyond three standard deviations.
   double cut_normal() {
     for (;;) {
       const double value = normal();

@@ -3,7 +3,7 @@
 namespace flappy::blind::c {
 namespace {
 
-/// Applies the effects that only change parameters.
+/// Effects that only change parameters.
 RobotParameters faulty(RobotParameters f, const Magnitudes& magnitudes, std::uint64_t seed) {
   Random random(seed, "faults");
   const double heading = random.uniform(0, 2 * M_PI), sign = random.sign(), other = random.sign(), wing = random.sign();

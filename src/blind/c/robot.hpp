@@ -1,4 +1,3 @@
-// One robot: its parameters, its effects, and its motion from tick to tick of the driver.
 #pragma once
 
 #include <algorithm>
@@ -26,10 +25,9 @@ class Robot {
   std::size_t steps_per_tick() const { return steps_; }
   bool is_finite() const { return mechanism_->is_finite(); }
 
-  /// Commands voltages to the driver, which holds them for a tick; calls `after` at the end of each step.
+  /// Commands voltages, which the driver holds for a tick; calls `after` at the end of each step.
   void tick(const std::array<double, 2>& voltages, const std::function<void()>& after);
-  /// A tick in which the torso follows a recorded motion: `held` has it at the start of each step and after the last.
-  /// Null: free.
+  /// A tick in which the torso follows `held`: its motion at the start of each step and after the last. Null: free.
   void tick_held(const std::array<double, 2>& voltages, const Motion* held, const std::function<void()>& after);
 
  private:

@@ -6,8 +6,8 @@
 namespace flappy::blind::c {
 namespace {
 
-// Blunt, slender and angular drag, Kutta and Magnus lift of a fruit fly whose wings, one ellipsoid each, carry its weight
-// (Vaxenburg et al., Whole-body physics simulation of fruit fly locomotion, Nature 643, 2025; its model of a fly).
+// Blunt, slender and angular drag, Kutta and Magnus lift of a fruit fly with one ellipsoid a wing that carry its weight
+// (Vaxenburg et al., Whole-body physics simulation of fruit fly locomotion, Nature 643, 2025; its fly).
 constexpr FluidCoefficients kFly = {1.0, 0.5, 1.5, 1.7, 1.0};
 // The only tuned factor. It scales lift so that the nominal robot carries its weight at about 10 V.
 constexpr double kLift = 1.18;
@@ -62,7 +62,7 @@ Side read_side(const io::Table& root, const char* key) {
   return side;
 }
 
-/// Draws until the inertia is physical. Moments vary by 7 %, products by 7 % of themselves plus about 1 % of the moments, as many are zero.
+/// Drawn until physical. Moments vary by 7 %, products by 7 % plus about 1 % of the moments, as many are zero.
 Eigen::Matrix3d drawn_inertia(const Eigen::Matrix3d& nominal, double mass_factor, Random& random) {
   for (;;) {
     Eigen::Matrix3d drawn = nominal * mass_factor;

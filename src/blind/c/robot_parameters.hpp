@@ -1,4 +1,3 @@
-// All parameters of one robot of family C: values of the vehicle file, or values drawn about them.
 #pragma once
 
 #include <Eigen/Dense>
@@ -35,7 +34,7 @@ struct Planform {
   double length_m = 0, chord_m = 0, r33 = 0, r22 = 0, r11 = 0, r00 = 0;
 };
 
-/// Coefficients of MuJoCo's ellipsoid model: blunt, slender and angular drag, Kutta and Magnus lift.
+/// Blunt, slender and angular drag, Kutta and Magnus lift, in MuJoCo's ellipsoid model.
 using FluidCoefficients = std::array<double, 5>;
 
 struct Side {
@@ -61,10 +60,10 @@ struct RobotParameters {
 /// Throws InputError if the file is not a valid vehicle file.
 RobotParameters read_parameters(const std::filesystem::path& vehicle_file);
 
-/// Draws the parameters of bodies, hinges, springs, motors and fluid coefficients independently about `nominal`.
+/// Draws bodies, hinges, springs, motors and fluid coefficients independently about `nominal`.
 RobotParameters drawn_parameters(const RobotParameters& nominal, std::uint64_t seed);
 
-/// Whether an inertia is physical: moments are positive, and the largest is below the sum of the two others.
+/// Whether the moments are positive and the largest is below the sum of the others.
 bool is_physical(const Eigen::Matrix3d& inertia);
 /// Returns a physical inertia unchanged; otherwise reduces the largest principal moment to the physical limit.
 Eigen::Matrix3d made_physical(const Eigen::Matrix3d& inertia);

@@ -9,7 +9,7 @@ Eigen::Matrix3d turned(const Eigen::Vector3d& by) {
   return by.norm() > 0 ? Eigen::AngleAxisd(by.norm(), by.normalized()).toRotationMatrix() : Eigen::Matrix3d::Identity();
 }
 
-/// Axes of a sensor with errors of 0.2 % in scale and orthogonality.
+/// Errors of 0.2 % in scale and orthogonality.
 Eigen::Matrix3d imperfect_axes(Random& random) {
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
   for (int i = 0; i < 3; ++i)
@@ -17,7 +17,7 @@ Eigen::Matrix3d imperfect_axes(Random& random) {
   return axes;
 }
 
-/// Standard deviations of position (m) and attitude (rad) of a pose fitted to the markers, to first order in their noise, rms over the axes.
+/// Position (m), attitude (rad) of a fit to the markers, to first order in their noise, rms over the axes.
 std::pair<double, double> pose_noise(const SensorParameters::Mocap& m) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& marker : m.markers_m) mean += marker / 4;
@@ -36,14 +36,13 @@ std::pair<double, double> pose_noise(const SensorParameters::Mocap& m) {
 
 double rounded(double rate_hz) { return rate_hz > 400 ? 10 * std::round(rate_hz / 10) : 5 * std::round(rate_hz / 5); }
 
-/// Makes the declarations inexact. It has its own random numbers, so draws of the true values do not depend on it.
+/// Makes declarations inexact. It has its own random numbers, so draws of true values do not depend on it.
 void declare_loosely(SensorParameters& f, const Robot& robot, Random random) {
   flightlog::FlightHeader& h = f.declared;
   const double interval_s = static_cast<double>(f.imu.steps) * robot.step_s();
   const std::array<Sampling, 3> kinds = {Sampling::kInstant, Sampling::kMean, Sampling::kHeld};
   f.imu.sampling = kinds[random.below(3)];
-  // a mean, and on average a held sample, is half an interval late; this is declared or not, but the error stays within
-  // 0.5 ms
+  // a mean, and on average a held sample, is half an interval late; declared or not, the error is within 0.5 ms
   const double half_s = f.imu.sampling == Sampling::kInstant ? 0 : interval_s / 2;
   const bool counted = random.uniform() < 0.5;
   h.imu.latency_s =

@@ -54,7 +54,7 @@ void Sensors::after_step(const Robot& robot, double t_s) {
   if (wings_ && count_ % f_.wings.steps == 0) wings(robot, t_s);
 }
 
-// Signal chain: position, mount, misalignment, rectification, axes, low-pass; for each sample then bias, noise and resolution.
+// Signal chain: position, mount, misalignment, rectification, axes, low-pass; then bias, noise and resolution.
 void Sensors::imu(const Robot& robot, double t_s) {
   const Motion now = robot.mechanism().motion();
   const double step_s = robot.step_s();
@@ -176,7 +176,7 @@ void Sensors::finish(flightlog::FlightLog& log, double end_s) const {
   log.imu = imu_;
   if (power_) log.power = power_log_;
   if (wings_) log.wings = wings_log_;
-  // drops samples that arrive after the end of the recording
+  // arrived after the end of the recording
   const auto cut = [end_s](std::vector<flightlog::Column*> columns) {
     while (!columns[0]->empty() && columns[0]->back() > end_s)
       for (flightlog::Column* column : columns) column->pop_back();

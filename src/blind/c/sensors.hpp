@@ -1,10 +1,8 @@
-// A laboratory's record of a robot of family C, and its declarations. Sensors: an inertial unit, cameras that see markers, a converter for
-// currents, Hall sensors for the wings' angles.
-//
-// Declarations are exact in the sense of the log format. In an assignment with conventions each departs from the truth, as those of real
-// laboratories do, within these bounds: latencies by up to 0.5 ms (half an averaging interval counted or not), rates rounded, position
-// of the IMU by up to 2 mm, its mounting rotated by up to 1 deg, noise 0.7 to 1.5 times the truth, the clock of one stream up to 50 ppm
-// fast; IMU samples instantaneous, averaged or held; currents measured on the battery's side of the bridge.
+// A laboratory's record and declarations. Sensors: an inertial unit, cameras that see markers, a converter for
+// currents, Hall sensors for wing angles. Declarations are exact or, with conventions, depart as those of real
+// laboratories: latencies by up to 0.5 ms (half an averaging interval counted or not), rates rounded, IMU position by
+// up to 2 mm, mounting by 1 deg, noise 0.7 to 1.5 times the truth, one stream's clock up to 50 ppm fast; IMU samples
+// instantaneous, averaged or held; currents on the battery's side of the bridge.
 #pragma once
 
 #include "blind/c/robot.hpp"
@@ -13,7 +11,7 @@ namespace flappy::blind::c {
 
 enum class Sampling { kInstant, kMean, kHeld };
 
-/// Properties of a robot's sensors, drawn once: the true values and the declaration.
+/// Properties of a robot's sensors, drawn once: true values and declaration.
 struct SensorParameters {
   struct Imu {
     std::size_t steps = 10;  ///< steps of the robot between samples
@@ -65,7 +63,6 @@ class Sensors {
   SensorParameters f_;
   bool power_, wings_;
   Random imu_noise_, mocap_noise_, power_noise_, wing_noise_, walk_;
-  // effects
   double bias_magnitude_, rectification_, g_sensitivity_, delay_s_;
   Eigen::Vector3d warm_ = Eigen::Vector3d::Zero(), walked_ = Eigen::Vector3d::Zero(),
                   marker_offset_ = Eigen::Vector3d::Zero();

@@ -1,4 +1,3 @@
-// Writes pieces of C source.
 #pragma once
 
 #include <cstdint>
@@ -23,14 +22,12 @@ std::string c_array(const std::string& declaration, std::span<const N> numbers) 
 extern template std::string c_row(std::span<const float>);
 extern template std::string c_row(std::span<const std::int32_t>);
 
-/// A text as one C comment.
 std::string c_comment(const std::string& text);
 
-/// The end of a header that began with "#ifndef FLAPPY_NAME_H". Including a second header of the same name with another `crc` is a compile
-/// error instead of being skipped silently.
+/// The end of a header that began with "#ifndef FLAPPY_NAME_H". Including a second header of the same name with another
+/// `crc` is a compile error.
 std::string end_of_header(const std::string& name, std::uint32_t crc);
 
-/// A C string literal.
 std::string c_string(const std::string& text);
 
 /// CRC-32 (IEEE 802.3) of the numbers' four bytes each, lowest first. `crc` is the CRC of preceding numbers, or 0.

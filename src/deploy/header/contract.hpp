@@ -1,5 +1,4 @@
-// The contract of an exported header, as text for its opening comment, and as a checksum by which headers of the same contract
-// recognise each other.
+// The contract of an exported header, as text and as a checksum by which headers recognise each other.
 #pragma once
 
 #include "policy/run_info.hpp"
@@ -9,16 +8,16 @@ namespace flappy::deploy {
 
 inline constexpr int kHeaderFormat = 1;
 
-/// The periods of the controller, the policy and the driver in microseconds. Throws io::InputError where one is not a whole number.
+/// The periods of controller, policy, driver in microseconds. io::InputError where one is not a whole number.
 struct Periods {
   long control_us, policy_us, driver_us;
 };
 Periods periods_of(const rollout::FlyConfig& config);
 
-/// The text of the header's opening comment, without comment marks: origin, periods, frames, every observation and action.
+/// The header's opening comment without marks: origin, periods, frames, every observation and action.
 std::string contract_text(const rollout::FlyConfig& config, const policy::RunInfo& run);
 
-/// CRC-32 of format, task, periods, and of names, units and frames in their order: equal where two headers fit together.
+/// CRC-32 of format, task, periods, names, units and frames in order: equal where two headers fit together.
 std::uint32_t contract_crc32(const rollout::FlyConfig& config);
 
 /// The macros PREFIX_...: format, contract, task, hashes, periods, wing-beat frequency.

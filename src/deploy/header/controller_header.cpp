@@ -33,8 +33,7 @@ class Constants {
     crc_ = crc32(crc_, words);
     text_ << c_array<std::int32_t>("static const int32_t flappy_controller_" + name + "[" + count + "]", words);
   }
-  /// Adds a struct of named members, with braces where a member has several numbers; the first member is itself a
-  /// struct.
+  /// Adds a struct, with braces where a member has several numbers; the first member is itself a struct.
   void add_struct(const std::string& declaration, const std::string& first, const Members& members_of_first,
                   const Members& members) {
     text_ << declaration << " = {\n    {\n";
@@ -63,7 +62,6 @@ class Constants {
   std::uint32_t crc_ = 0;
 };
 
-/// The members of flappy_feedback_constants.
 template <class C>
 Members feedback_of(const flight::FlightConstants& all) {
   Members list;
@@ -77,7 +75,6 @@ Members feedback_of(const flight::FlightConstants& all) {
   return list;
 }
 
-/// Adds the members of flappy_controller_constants.
 template <class C>
 void add_constants(const rollout::FlyConfig& config, Constants& to) {
   const flight::FlightConstants all = flight::flight_constants(config.fleet);

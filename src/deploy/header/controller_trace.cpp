@@ -47,7 +47,6 @@ void copy(const auto& from, float* to) {
   for (const auto x : from) *to++ = static_cast<float>(x);
 }
 
-/// The sum of the samples in [first, last).
 ControllerTrace::Increment gathered(const std::vector<ControllerTrace::Imu>& samples, std::size_t first,
                                     std::size_t last) {
   flight::Increment<Lane> sum{{0, 0, 0}, {0, 0, 0}};

@@ -1,4 +1,4 @@
-// A recording of what the exported feedback controller sees and does around a hand-back in simulation; its self-test repeats it.
+// What the exported controller sees and does around a hand-back in simulation, for its self-test to repeat.
 #pragma once
 
 #include <cstdint>
@@ -35,8 +35,7 @@ struct ControllerTrace {
   std::uint32_t tick = 0, phase = 0;
   std::int32_t handed_back = 0;
   std::int32_t horizon_us = 0, present_us = 0, last_imu_us = 0;
-  std::vector<Increment> ring;  // arrived increments, oldest first: after the horizon, and always the newest
-  // the recording
+  std::vector<Increment> ring;       // arrived increments, oldest first: after the horizon, and always the newest
   std::int32_t first_update_us = 0;  // time of the driver's first update
   std::vector<Imu> imu;
   std::vector<Frame> frames;
@@ -44,9 +43,9 @@ struct ControllerTrace {
   std::vector<Update> updates;
 };
 
-/// Records a flight of the configuration's nominal vehicle under its actor. As on board, the hand-back is decided by the estimate, and the
-/// IMU's latency is a whole number of control periods. The result is the same to the byte for any number of threads and on any processor. `begin`:
-/// number of control periods before the recording; -1: chosen so that the hand-back is in the middle of the `periods` recorded ones.
+/// Records the nominal vehicle under its actor. As on board, the estimate decides the hand-back, and the IMU's latency
+/// is a whole number of control periods. The same to the byte for any number of threads and any processor. `begin`:
+/// control periods before the recording; -1: the hand-back is in the middle of the `periods` recorded ones.
 ControllerTrace record_controller(const rollout::FlyConfig& given, int periods = 50, int begin = -1);
 
 }  // namespace flappy::deploy

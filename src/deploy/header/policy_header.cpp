@@ -36,7 +36,7 @@ std::string signals(const std::string& name, const char* count, const std::vecto
   return text + "};\n";
 }
 
-/// The numbers of a network: their declarations, CRC-32 and bytes, in the order in which the C code computes the checksum.
+/// The network's numbers: declarations, CRC-32 and bytes, in the order in which C computes the checksum.
 class Numbers {
  public:
   template <class N>

@@ -6,7 +6,7 @@
 
 namespace flappy::deploy {
 
-/// The text of flappy_policy.h, which is the same to the byte for the same arguments. `vectors`: test vectors of its self-test.
+/// The text of flappy_policy.h, the same to the byte for the same arguments. `vectors`: for its self-test.
 std::string policy_header(const rollout::FlyConfig& config, const policy::RunInfo& run,
                           const policy::PolicyNetwork& network, const policy::PolicyVectors& vectors);
 std::string policy_header(const rollout::FlyConfig& config, const policy::RunInfo& run, const QuantisedNetwork& network,

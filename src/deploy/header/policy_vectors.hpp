@@ -15,13 +15,12 @@ std::vector<float> evaluate(const policy::PolicyNetwork& network, const std::vec
 /// First flapper for roll_out(). The last quarter of the random streams is flown neither in training nor in evaluation.
 inline constexpr std::uint32_t kRolloutFlappers = std::uint32_t{3} << 30;
 
-/// Flies `count` randomised vehicles by the actor, in single precision, until hand-back or end, and returns their observations and actions
-/// in the order of flights. `first`: number of the first vehicle.
+/// Flies `count` randomised vehicles by the actor, from number `first` on, in single precision, until hand-back or end,
+/// and returns their observations and actions.
 policy::PolicyVectors roll_out(const rollout::FlyConfig& given, std::size_t first, std::size_t count);
 
 /// At most `count` rows, evenly spaced.
 policy::PolicyVectors some_of(const policy::PolicyVectors& all, std::size_t count);
-/// Appends rows of the same widths.
 void append(policy::PolicyVectors& to, const policy::PolicyVectors& more);
 
 /// Observations at and beyond the limits of their ranges, where inputs are clipped and outputs saturate.

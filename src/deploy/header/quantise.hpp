@@ -1,5 +1,5 @@
-// A policy in integer arithmetic: weights of 8 bits with a scale for each output (symmetric), activations of 8 bits with one scale
-// for each layer, sums of 32 bits.
+// A policy in integers: weights of 8 bits, scaled per output (symmetric), activations of 8 bits, scaled per layer,
+// 32-bit sums.
 //
 //   q0 = round(clamp((observation - mean) scale, +-127))            scale: the values seen in flight fill the range
 //   sum = bias + W q         y = sum multiplier                     for each output of a layer
@@ -26,9 +26,8 @@ struct QuantisedNetwork {
   int outputs() const { return widths.back(); }
 };
 
-/// Fits the scales to `observation`, float[n][inputs]: those of inputs to the largest values seen, those of hidden activations to the
-/// smallest mean square error of rounding and clipping. Throws std::invalid_argument for layer norm, a linear output, or activations other
-/// than relu and tanh.
+/// Scales fit `observation`, float[n][inputs]: inputs the largest values seen, activations the least mean square error.
+/// Throws std::invalid_argument for layer norm, a linear output, or activations other than relu and tanh.
 QuantisedNetwork quantise(const policy::PolicyNetwork& network, const std::vector<float>& observation);
 
 /// Evaluates the network exactly as the exported C does, to the bit.

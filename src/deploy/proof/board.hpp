@@ -18,13 +18,12 @@ struct CrossCompiler {
 CrossCompiler arm_compiler();
 CrossCompiler riscv_compiler();
 
-/// in_path(): whether PATH has a program of this name. versions_in_path(): the programs `stem` and `stem-12`, the former first.
+/// in_path(): whether PATH has it. versions_in_path(): the programs `stem` and `stem-12`, the former first.
 bool in_path(const std::string& name);
 std::vector<std::string> versions_in_path(const std::string& stem);
 
 /// Compiler options under which the exported headers must give no warning, with `folders` as include folders.
 std::vector<std::string> strict_options(const std::vector<std::filesystem::path>& folders);
-/// The first error in a compiler's output, without the folders of file names.
 std::string first_complaint(const std::string& output);
 /// io::run() with a limit of one minute; exit code 124 at the limit.
 io::Finished run_limited(std::vector<std::string> command, std::string_view input = {});
@@ -40,8 +39,8 @@ std::vector<std::string> board_machine();
 std::vector<std::string> board_build(const std::filesystem::path& folder,
                                      const std::vector<std::filesystem::path>& sources,
                                      const std::vector<std::string>& options, const std::filesystem::path& program);
-/// The command that runs it: the board's serial line is stdin and stdout; the exit code is that of its main(), or 3 after a
-/// fault. `count`: the board's clock counts instructions, one per nanosecond, instead of following the time of this machine.
+/// The command that runs it: the serial line is stdin and stdout, the exit code main()'s, or 3 after a fault. `count`:
+/// the board's clock counts instructions, one per nanosecond, instead of following this machine's time.
 std::vector<std::string> board_run(const std::filesystem::path& program, bool count);
 
 }  // namespace flappy::deploy

@@ -1,4 +1,3 @@
-// Footprints: sizes by the linker, stacks by the compiler's call graph.
 #include <algorithm>
 #include <map>
 #include <optional>
@@ -31,7 +30,7 @@ std::vector<Target> targets() {
           {"RV32IMAFC", riscv, {"-march=rv32imafc", "-mabi=ilp32f"}}};
 }
 
-/// Call graph with frame sizes in bytes, parsed from gcc's -fcallgraph-info=su, which has a line for each node and edge.
+/// Call graph with frame sizes in bytes, from gcc's -fcallgraph-info=su, a line for each node and edge.
 class CallGraph {
  public:
   explicit CallGraph(const std::string& text) {
@@ -48,8 +47,8 @@ class CallGraph {
     }
   }
 
-  /// Stack of the deepest path from the function of this name (the title of a static function ends with ":name"), in
-  /// bytes; nothing for recursion or an unknown name. Functions compiled elsewhere count as 0.
+  /// Bytes of the deepest path from a function (a static one's title ends with ":name"); nothing for recursion or an
+  /// unknown name. Functions compiled elsewhere count as 0.
   std::optional<long> deepest(const std::string& name) const {
     for (const auto& [title, bytes] : frame_)
       if (title == name || title.ends_with(":" + name)) return below(title, {});

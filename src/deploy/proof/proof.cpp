@@ -22,7 +22,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxVectors = 30'000, kInferences = 1'000;
 
-/// The inputs of a proof: the headers, the vectors, and a folder to compile in.
 struct Bench {
   const fs::path& headers;
   const policy::PolicyVectors& vectors;
@@ -91,7 +90,6 @@ void compare(Parity& row, std::span<const float> expected, const char* found) {
   }
 }
 
-/// Compiles and runs prove.c, and reads its output into `row`.
 void try_out(Parity& row, const Bench& bench, const std::vector<std::string>& build,
              const std::vector<std::string>& start, bool count) {
   const io::Finished built = run_limited(build);

@@ -1,4 +1,4 @@
-// Proves the exported C: results, sizes and stack on compilers and processors other than those of the training.
+// Proves the exported C on compilers and processors other than those of the training.
 #pragma once
 
 #include <cstddef>
@@ -30,9 +30,8 @@ enum class Reach {
   everywhere  ///< every gcc and clang in PATH, g++, and a Cortex-M4F
 };
 
-/// Compiles `folder`/flappy_policy.h, and flappy_controller.h where it exists, and runs them on 1 to 30,000 vectors, whose actions must
-/// match to the bit. A missing tool, a header that does not compile and a program that crashes are reported as rows. Throws io::InputError
-/// where there is no header.
+/// Compiles flappy_policy.h, and flappy_controller.h if any, and runs them on 1 to 30,000 vectors, whose actions must
+/// match to the bit. Missing tools, compile errors and crashes are rows. io::InputError without a header.
 std::vector<Parity> prove(const std::filesystem::path& folder, const policy::PolicyVectors& vectors, Reach reach);
 
 /// The memory that one function takes on one microcontroller.
@@ -47,8 +46,8 @@ struct Footprint {
   bool failed() const { return available && !why_not.empty(); }
 };
 
-/// Footprints of `folder`/`header`, flappy_policy.h or flappy_controller.h: of its step (all work of a control period) and of its self-test.
-/// Observation and action belong to the caller and are not counted; padding between sections of RISC-V is counted.
+/// Footprints of flappy_policy.h or flappy_controller.h: of the step (a control period's work) and the self-test. They
+/// exclude the caller's observation and action and include padding between sections of RISC-V.
 std::vector<Footprint> footprints(const std::filesystem::path& folder, const std::string& header);
 
 /// A text table for a terminal of 100 columns.

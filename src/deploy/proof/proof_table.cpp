@@ -1,4 +1,3 @@
-// Writes proofs as text and as JSON.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -60,7 +59,6 @@ std::string table_of(const std::vector<Parity>& rows) {
   std::string counted;
   for (const auto& row : rows) {
     const std::string compiler = row.compiler + (row.version.empty() ? "" : " " + row.version);
-    // leave out "-std=" to save space
     const std::string options = row.options.starts_with("-std=") ? row.options.substr(5) : row.options;
     if (!row.why_not.empty()) {
       lines.push_back({{compiler, row.target, options}, row.why_not});

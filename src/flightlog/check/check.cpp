@@ -16,8 +16,7 @@ void check_stream(const StreamStatistics& s, double flapping_Hz, Findings& findi
   if (!s.declared_hz) return;
   const std::size_t before = findings.size();
   const double interval = 1 / s.rate_hz;
-  // Crystals agree to 1e-4, and a mean rate is exact to 1 / samples: a deviation of 5 % means another rate or another
-  // unit.
+  // Crystals agree to 1e-4, a mean rate to 1 / samples: 5 % means another rate or another unit.
   if (std::abs(s.rate_hz / *s.declared_hz - 1) > 0.05)
     warn(format("%.4g samples/s, %.4g declared: thinned out, repeated, or t_s not in seconds", s.rate_hz,
                 *s.declared_hz));
@@ -52,8 +51,7 @@ void check_repeats(const std::string& name, const std::vector<const Column*>& co
 }
 
 void check_latencies(const FlightHeader& h, Findings& findings) {
-  // Cameras and radio links need some 0.01 s. With 0.1 s the controller would lag by three beats; no flapper can fly
-  // so.
+  // Cameras and radio links need some 0.01 s; 0.1 s would be three beats of lag, with which no flapper can fly.
   constexpr double kLargest_s = 0.1;
   std::string wrong;
   const auto look = [&](const char* key, double value) {

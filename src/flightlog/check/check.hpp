@@ -1,5 +1,5 @@
-// Checks whether a flight log agrees with its own header: rates, dropouts, clocks, axes and units. The checks use the log alone, no
-// model of the vehicle and no diagnosis.
+// Checks whether a flight log agrees with its own header: rates, dropouts, clocks, axes and units. The checks use the
+// log alone, no model of the vehicle and no diagnosis.
 #pragma once
 
 #include <string>
@@ -35,8 +35,7 @@ struct CheckReport {
 
 CheckReport check_flight(const FlightLog& log);
 
-/// Checks several flights of one robot, one report for each, and compares the declared inputs of the flights with one
-/// another.
+/// One report for each flight of one robot; also compares their declared inputs with one another.
 std::vector<CheckReport> check_flights(const std::vector<FlightLog>& logs);
 
 }  // namespace flappy::flightlog

@@ -1,4 +1,3 @@
-// Checks of surroundings, voltages, currents and wings.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -11,8 +10,7 @@ namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
 
-/// Two crystals and a median of interpolated crossings agree far better than this; a deviation of 2 % is another
-/// frequency.
+/// Two crystals and a median of interpolated crossings agree far better than 2 %.
 constexpr double kFrequencyTolerance = 0.02;
 
 double rms(const Column& values) {

@@ -1,5 +1,4 @@
-// In every vehicle, vibration, currents and strokes have the beat frequency of the voltages. A stream with another frequency has a wrong
-// clock.
+// Vibration, currents and strokes have the beat frequency of the voltages; a stream with another one has a wrong clock.
 #include <cmath>
 #include <complex>
 #include <numbers>
@@ -32,8 +31,7 @@ std::vector<Phasor> phasors(const Column& t_s, const Column& values, double turn
   return list;
 }
 
-/// Angular frequency of the columns' common wave beyond `turn_rad_s`, from the phase change between stretches; `steady`
-/// is 1 without noise.
+/// Angular frequency of the columns' common wave beyond `turn_rad_s`; `steady` is 1 without noise.
 struct PhasorTurn {
   double rad_s = 0, steady = 0;
 };
@@ -49,7 +47,6 @@ PhasorTurn turn_of(const Column& t_s, const std::vector<const Column*>& columns,
   return {std::arg(sum) * turn_rad_s / (2 * std::numbers::pi * kBeats), size > 0 ? std::abs(sum) / size : 0};
 }
 
-/// Compares the beat frequency of one stream with that of the voltages, turn_rad_s + volts_rad_s.
 Finding compare(const std::string& name, const Column& t_s, const std::vector<const Column*>& columns,
                 double turn_rad_s, double volts_rad_s) {
   // Changing inputs move the phase of the measured wave by tenths of a radian once in a flight: allow 0.18 beats.
@@ -82,8 +79,7 @@ void check_beat(const FlightLog& log, Findings& findings) {
       findings.push_back({name, Verdict::not_tested, "fewer than five beats in the voltages, or not steady", {}});
     else findings.push_back(compare(name, t_s, columns, turn_rad_s, volts.rad_s));
   };
-  // Gyro and accelerometer oscillate by similar numbers of rad/s and m/s^2, so they can be mixed; a wrong unit keeps
-  // the phases.
+  // Gyro and accelerometer oscillate by similar numbers, so they can be mixed; a wrong unit keeps the phases.
   const ImuStream& s = log.imu;
   look("imu beat", s.t_s,
        {&s.gyro_x_rad_s, &s.gyro_y_rad_s, &s.gyro_z_rad_s, &s.accel_x_m_s2, &s.accel_y_m_s2, &s.accel_z_m_s2});

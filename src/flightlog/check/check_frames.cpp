@@ -1,5 +1,5 @@
-// Compares attitude, accelerometer and positions with one another and with a second estimator's attitude, for logs with declared inputs:
-// such robots often have neither a gyro nor a model that would determine the convention of an angle.
+// For declared inputs: compares attitude, accelerometer and positions with one another and with a second estimator.
+// Such robots often have neither a gyro nor a model that determines an angle's convention.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -32,8 +32,7 @@ struct Frames {
   Matrix3d accel = Matrix3d::Identity();
 };
 
-/// The declared convention first, then common mistakes, the likelier ones first; index `accel` begins those of the
-/// accelerometer.
+/// The declared convention first, then mistakes, likelier ones first; from `accel` on, the accelerometer's.
 struct Hypotheses {
   std::vector<Frames> all;
   std::size_t accel;
@@ -94,7 +93,6 @@ Hypotheses hypotheses() {
 
 // ---- by accelerations
 
-/// Acceleration from positions over some time, and the samples of the IMU in that time.
 struct Shove {
   Vector3d force_m_s2;  ///< mean specific force in W: acceleration less gravity
   std::vector<std::size_t> samples;
@@ -106,8 +104,7 @@ struct Shoves {
   std::vector<Quaterniond> attitude;  ///< as logged, at each sample of the IMU
 };
 
-/// Second differences of the position over span_s equal the mean acceleration with triangular weights of width 2
-/// span_s.
+/// Second differences over span_s equal the mean acceleration with triangular weights of width 2 span_s.
 Shoves shoves_of(const Context& c) {
   const FlightHeader& h = c.log.header;
   const double span_s = h.flapping_Hz > 0 ? std::max(std::round(0.2 * h.flapping_Hz), 1.0) / h.flapping_Hz : 0.2;
@@ -158,8 +155,7 @@ double remainder(const Context& c, const Shoves& shoves, const Frames& frames, d
   return squares - mean.squaredNorm();
 }
 
-/// Finds the convention of the attitude and the axes of the accelerometer; sets accel_axes. Returns the convention
-/// where it is not the declared one, else null.
+/// Finds the convention of the attitude and sets accel_axes. Returns the convention if it is not the declared one.
 const Frames* check_axes(Context& c, const Hypotheses& h) {
   const auto not_tested = [&](const std::string& why) {
     c.add_finding("axes", Verdict::not_tested, why);
@@ -220,8 +216,7 @@ std::vector<Pair> pairs_of(const FlightLog& log, const Frames& meant) {
   return pairs;
 }
 
-/// Median angle between the up directions of both estimators in the body, less the constant angle of a mounting. It
-/// does not depend on a yaw offset.
+/// Median angle between both up directions, less a mounting's constant angle; independent of a yaw offset.
 double usual_difference(const std::vector<Pair>& pairs) {
   std::array<std::vector<double>, 3> offset;
   std::vector<Vector3d> differences;
@@ -251,8 +246,7 @@ bool check_second(Context& c, const Hypotheses& h, const Frames* meant, bool moc
     if (const double d = usual_difference(pairs_of(c.log, h.all[i])); d < 0.999 * least) best = i, least = d;
   const Values values = {{"tilt_difference_rad", usual}};
   const std::string seen = format("tilt usually differs by %.2g deg from attitude.csv", usual / kDegree);
-  // With some degrees of tilt, two estimators of one motion agree far better as declared than with one of them
-  // mirrored.
+  // With some degrees of tilt, two estimators agree far better as declared than with one mirrored.
   constexpr double kMin_rad = 2 * kDegree;
   const bool mirrored = least < 0.5 * usual && usual > kMin_rad, apart = usual > 10 * kDegree;
   if (mirrored)

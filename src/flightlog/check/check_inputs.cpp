@@ -1,4 +1,4 @@
-// Checks of declared inputs. Their meaning is unknown, but it must be the same during a flight and in all flights of a robot.
+// Checks of declared inputs: their meaning, though unknown, must be the same in a flight and in all flights of a robot.
 #include <algorithm>
 #include <cmath>
 
@@ -17,7 +17,6 @@ Level level_of(const Column& values) {
   return {io::median(values), io::quantile(values, 0.95) - io::quantile(values, 0.05)};
 }
 
-/// Level of an input in the whole flight and in each of kParts equal parts of its samples.
 struct Levels {
   Level all;
   std::vector<Level> parts;
@@ -36,12 +35,11 @@ Levels levels_of(const Column& values) {
   return levels;
 }
 
-/// Largest plausible ratios: of a flight's level, of a part's level, of the spread. A robot of constant weight needs
-/// about the same inputs in all flights; battery, wear and wind change the level somewhat, and manoeuvres change it in
-/// a part. Another unit changes it more. Inputs about 0 have no level, and their spread varies more between flights.
+/// Largest plausible ratios of a flight's level, a part's level, the spread. A robot of constant weight needs about the
+/// same inputs in all flights; battery, wear, wind and manoeuvres change them somewhat, another unit changes them more.
+/// Inputs about 0 have no level, and their spread varies more between flights.
 constexpr double kOtherLevel = 1.5, kOtherPart = 2, kOtherSpread = 5;
 
-/// Whether the median exceeds the spread, so that it shows the scale of the input.
 bool has_level(const Level& usual) { return std::abs(usual.middle) > usual.spread; }
 
 double ratio(double value, double usual) { return usual != 0 ? value / usual : value != 0 ? INFINITY : 1; }
@@ -104,8 +102,7 @@ double correlation(const Column& a, const Column& b) {
   return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : 0;
 }
 
-/// Largest plausible difference of a correlation from the median of the flights. Correlations depend on the manoeuvres,
-/// but less.
+/// Largest plausible difference of a correlation from the flights' median; manoeuvres change correlations less.
 constexpr double kOtherCorrelation = 0.8;
 
 Finding dead(const std::string& input, double value) {

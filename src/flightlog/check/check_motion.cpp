@@ -1,5 +1,4 @@
-// Compares gyro, attitude, accelerometer and position: they measured one motion, so they must agree within the declared noise. Mistakes
-// of axes, units or clocks are much larger.
+// Gyro, attitude, accelerometer and position must agree within noise; wrong axes, units or clocks exceed it by far.
 #include "flightlog/check/check_motion.hpp"
 
 #include <algorithm>
@@ -10,8 +9,7 @@
 namespace flappy::flightlog {
 namespace {
 
-/// Replaces the beat frequency for a robot without wings: windows of 0.2 s, in which it turns by more than motion
-/// capture drifts.
+/// Replaces the beat frequency without wings: windows of 0.2 s, in which a robot turns more than mocap drifts.
 constexpr double kUnflapped_Hz = 5;
 
 /// The motion without poses whose markers were swapped, where a second estimator can show that.
@@ -33,8 +31,7 @@ SensorMotion motion_of(const FlightLog& log) {
 
 void check_motion(const FlightLog& log, Findings& findings) {
   const FlightHeader& h = log.header;
-  // Windows of whole beats, in which the oscillation of the beat averages out: about 50 ms, and at least 2.5 intervals
-  // of mocap.
+  // Windows of whole beats, in which the beat averages out: about 50 ms, at least 2.5 intervals of mocap.
   const double per_s = h.flapping_Hz > 0 ? h.flapping_Hz : kUnflapped_Hz;
   const double window_s = std::max(std::round(0.05 * per_s), std::ceil(2.5 / h.mocap.rate_hz * per_s)) / per_s;
   Context c{log, findings, motion_of(log), {}, std::max(window_s, 1 / per_s), 0, 0, {}, {}};
@@ -42,9 +39,8 @@ void check_motion(const FlightLog& log, Findings& findings) {
   double squares = 0;
   for (const BeatWindow& w : c.windows)
     squares += w.rate_rad_s[0].squaredNorm() / static_cast<double>(c.windows.size());
-  // Noise of a window's rate: noise of two attitudes; turning of the body during the jitter of arrival times; and the
-  // error of interpolating between two samples. That is a quarter of the error across a third sample (roughness_rad()),
-  // which also contains noise of sqrt(1.5) times that of one attitude.
+  // Noise of a window's rate: two attitudes; turning during the jitter of arrival times; interpolation between two
+  // samples. The latter is a quarter of roughness_rad(), which also contains sqrt(1.5) times an attitude's noise.
   const auto jitter_of = [](const Column& t_s) {
     return t_s.empty() ? 0 : stream_statistics("", t_s, std::nullopt).jitter_s;
   };

@@ -1,4 +1,4 @@
-// The parts of check_motion(), and the context in which each part leaves results for the next.
+// The parts of check_motion(), and the context in which each leaves results for the next.
 #pragma once
 
 #include <numbers>
@@ -19,8 +19,8 @@ struct Context {
   SensorMotion motion;
   std::vector<BeatWindow> windows;
   double window_s;
-  double rate_noise;  ///< standard deviation of a window's mean rate from mocap, rad/s
-  double gyro_noise;  ///< standard deviation of a window's mean rate from the gyro, rad/s
+  double rate_noise;  ///< sd of a window's mean rate from mocap, rad/s
+  double gyro_noise;  ///< sd of a window's mean rate from the gyro, rad/s
   SensorFrame frame;  ///< the frame found; the declared one where it fits or none was found
   Lag lag;
   Matrix3d accel_axes = Matrix3d::Identity();  ///< axes found for the accelerometer: columns to body
@@ -31,8 +31,8 @@ struct Context {
   }
 };
 
-/// For logs with declared inputs: compares attitude, accelerometer, positions and a second estimator with one another;
-/// sets accel_axes. Returns false where the attitude follows another convention than declared.
+/// For declared inputs: compares attitude, accelerometer, positions and a second estimator; sets accel_axes. False
+/// where the attitude's convention is not the declared one.
 bool check_frames(Context& c);
 /// Compares the gyro and its clock with the attitude; sets frame and lag.
 void check_rotation(Context& c);

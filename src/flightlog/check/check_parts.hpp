@@ -40,8 +40,8 @@ void check_inputs_apart(const FlightLog& log, Findings& findings);
 void compare_inputs(const std::vector<const FlightLog*>& logs, const std::vector<Findings*>& findings);
 /// Compares the correlations between inputs across three flights or more; changes the same findings.
 void compare_correlations(const std::vector<const FlightLog*>& logs, const std::vector<Findings*>& findings);
-/// The middle of the window that follows the one at `middle_s`; windows adjoin and last `span_s`. A gap in `t_s` of
-/// more than a thousand windows is skipped in one step, so that the work does not grow with the length of a gap.
+/// Middle of the window after that at `middle_s`; windows last `span_s` and adjoin. A gap of more than a thousand
+/// windows is skipped in one step, so the work does not grow with it.
 double next_window(const Column& t_s, double middle_s, double span_s);
 void check_power(const FlightLog& log, Findings& findings);
 void check_wings(const FlightLog& log, Findings& findings);

@@ -41,7 +41,7 @@ std::string describe_axes(const std::string& sensor, const Matrix3d& axes) {
 
 /// Delays up to this are an effect that a diagnosis finds (mocap_delay, 0.02 s); beyond it the clocks are wrong.
 constexpr double kLargestDelay_s = 0.03;
-/// Largest delay for logs with declared inputs: a diagnosis uses only beat-averaged motion of some Hz, which tolerates more.
+/// Largest delay for declared inputs: a diagnosis uses only beat-averaged motion of some Hz, which tolerates more.
 constexpr double kLargestSlowDelay_s = 0.1;
 /// Crystals agree to 1e-4; a clock with ten times that drift is wrong.
 constexpr double kLargestDrift = 1e-3;
@@ -63,7 +63,6 @@ bool check_clock(Context& c) {
   if (c.windows.size() < 20) return not_tested("too short, or too many gaps");
   const Pairs here = pair_up(c.motion, c.windows, Order::wxyz, {});
   if (here.mocap.size() < 20) return not_tested("mocap and gyro have too little time in common");
-  // Rotation is visible if its spread exceeds three times the noise of one window.
   const double mocap = spread(here.mocap), gyro = spread(here.gyro);
   const bool mocap_turns = mocap > 3 * std::sqrt(3.0) * c.rate_noise,
              gyro_turns = gyro > 3 * std::sqrt(3.0) * c.gyro_noise;
@@ -75,8 +74,7 @@ bool check_clock(Context& c) {
   const std::vector<BeatWindow> end(c.windows.end() - static_cast<std::ptrdiff_t>(third), c.windows.end());
   auto sync = find_lag(c.motion, c.windows);
   auto early = find_lag(c.motion, beginning), late = find_lag(c.motion, end);
-  // Noise reduces the correlation of mocap and gyro to this value even if they see one motion; a further quarter allows
-  // for a lag that changes in the flight.
+  // Noise reduces the correlation to this even for one motion; a further quarter is for a lag that changes.
   const double noise_share = 3 * c.rate_noise * c.rate_noise / (mocap * mocap);
   const double least = 0.75 * std::sqrt(std::max(1 - noise_share, 0.1));
   const auto alike = [&](const std::optional<Sync>& s) { return s && s->correlation >= least; };
@@ -102,8 +100,7 @@ bool check_clock(Context& c) {
                end_s = c.windows[c.windows.size() - 1 - third / 2].middle_s();
   const auto noticed_s = [&] { return 1e-3 + kSigmas * std::hypot(first->sd, last->sd); };
   const bool drifts = first && last && std::abs(last->value - first->value) > noticed_s();
-  // Fit a line through the lags of the first and last third, then refine both: a lag that changes within a third blurs
-  // it.
+  // A line through the lags of the first and last third; both refined: a lag that changes within a third blurs it.
   for (int pass = 0; pass < 2 && drifts; ++pass) {
     c.lag = {begin_s, first->value, (last->value - first->value) / (end_s - begin_s)};
     const auto nearer = refine_from(c, beginning, c.lag), nearer_last = refine_from(c, end, c.lag);
@@ -115,9 +112,8 @@ bool check_clock(Context& c) {
   if (!lag || (lag->sd > 0.0025 && !drifts)) return not_tested("too little rotation");
   if (!drifts) c.lag = {0, lag->value, 0};
 
-  // A first-order low-pass delays slow motion by 1 / (2 pi bandwidth). The log does not say whether the declared
-  // latency includes this delay nor which order the filter has, so 0 to twice the delay is accepted, and 0.5 ms for the
-  // way samples are stamped.
+  // A first-order low-pass delays slow motion by 1 / (2 pi bandwidth). The log does not say whether the latency
+  // includes this nor the filter's order: accept 0 to twice it, and 0.5 ms for the way samples are stamped.
   const double filter_s = 1 / (2 * std::numbers::pi * imu.bandwidth_hz),
                allowed_s = filter_s + kSigmas * lag->sd + 5e-4;
   const double declared_s = imu.latency_s - c.log.header.mocap.latency_s;
@@ -201,8 +197,7 @@ std::pair<std::string, LogPlace> find_mistake(Context& c) {
     total = remainder(pairs, Matrix3d::Identity(), 0);
     noise = 3 * static_cast<double>(pairs.mocap.size()) * c.rate_noise * c.rate_noise;
   }
-  // Some mistakes look alike near level flight. Among those that noise does not tell apart, the likelier one is
-  // reported.
+  // Some mistakes look alike near level flight: of those that noise does not tell apart, report the likelier.
   const double least = *std::ranges::min_element(left);
   const auto near = [&](double r) { return r <= 2 * least + 2 * noise; };
   const double declared = remainder(pair_up(c.motion, c.windows, Order::wxyz, c.lag), Matrix3d::Identity(), 1);
@@ -228,8 +223,7 @@ void check_gyro(Context& c) {
     const Vector3d error = fit.gain.col(j) - Vector3d::Unit(j);
     good &= error.cwiseAbs().maxCoeff() <= 0.1 + kSigmas * fit.gain_sd(j);
   }
-  // Expected residual: noise of both, and a twentieth of the rotation for errors that a constant gain does not
-  // describe.
+  // Expected residual: noise of both, and a twentieth of the rotation for errors beyond a constant gain.
   Vector3d expected;
   for (int i = 0; i < 3; ++i) expected(i) = std::hypot(c.rate_noise, c.gyro_noise, 0.05 * fit.spread.norm());
   std::string odd;
@@ -248,14 +242,12 @@ void check_gyro(Context& c) {
                       j == 0 ? values : Values{});
       else c.add_finding(name, Verdict::not_tested, "too little rotation");
     }
-    // The bias is the difference of the means, in which noise averages out.
     Vector3d bias = Vector3d::Zero(), rate = Vector3d::Zero(), coning = Vector3d::Zero();
     const double n = static_cast<double>(pairs.mocap.size());
     for (std::size_t i = 0; i < pairs.mocap.size(); ++i)
       bias += (pairs.gyro[i] - pairs.mocap[i]) / n, rate += pairs.mocap[i] / n,
           coning += (pairs.gyro[i] - means.gyro[i]) / n;
-    // Share of the coning of the beat's rates, at once and twice the beat frequency, that a first-order low-pass
-    // removes.
+    // Share of the beat's coning, at once and twice its frequency, that a first-order low-pass removes.
     const double beat = 1.5 * c.log.header.flapping_Hz / c.log.header.imu.bandwidth_hz, hidden = beat * beat;
     std::string wrong;
     for (int i = 0; i < 3; ++i) {

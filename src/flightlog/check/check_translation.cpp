@@ -14,8 +14,7 @@ std::string axis_name(const Vector3d& v) {
   return std::string(v(i) > 0 ? "+" : "-") + kAxes[i];
 }
 
-/// Finds the matrix (axes and unit) that turns the accelerometer's columns into a specific force in B; nothing where it
-/// is unknown.
+/// Axes and unit that turn the accelerometer's columns into a specific force in B; nothing where unknown.
 std::optional<Matrix3d> check_gravity(Context& c) {
   const double gravity = c.log.header.gravity_m_s2;
   const auto not_tested = [&](const char* why) {
@@ -48,8 +47,8 @@ std::optional<Matrix3d> check_gravity(Context& c) {
   const Vector3d up = mean_with(one), weight(0, 0, gravity);
   Vector3d body = Vector3d::Zero();
   for (const Vector3d& f : felt) body += f / n;
-  // Accelerations average out, except 3 / duration for a velocity that changes by 3 m/s in the flight; noise averages
-  // to sd / sqrt(n). A fifth of gravity allows for bias and vibration rectification, which no log declares.
+  // Accelerations average out, except 3 / duration for a velocity that changes by 3 m/s; noise to sd / sqrt(n). A fifth
+  // of gravity allows for bias and vibration rectification, which no log declares.
   const double allowed =
       0.2 * gravity + 3 / (end_s - begin_s) + kSigmas * c.log.header.imu.accel_noise_m_s2 / std::sqrt(n);
   const Values values = {{"mean_x_m_s2", up(0)}, {"mean_y_m_s2", up(1)}, {"mean_z_m_s2", up(2)}};
@@ -80,8 +79,7 @@ std::optional<Matrix3d> check_gravity(Context& c) {
     return Matrix3d(-one * gravity);
   }
   if (body.norm() <= allowed && up.norm() <= allowed && body.norm() < 0.5 * gravity) {
-    // An accelerometer in g would also read about a tenth of gravity, in any direction; above that was excluded for the
-    // vertical only.
+    // An accelerometer in g also reads about a tenth, in any direction; so far excluded for the vertical only.
     warn("gravity is missing: acceleration instead of specific force");
     return one;
   }
@@ -104,8 +102,7 @@ void check_scale(Context& c, const std::optional<Matrix3d>& correction) {
   const auto not_tested = [&](const std::string& why) { c.add_finding("position scale", Verdict::not_tested, why); };
   if (!correction) return not_tested("needs an accelerometer that is understood");
   const FlightHeader& h = c.log.header;
-  // Second differences of the position over span_s equal the acceleration integrated with triangular weights of width 2
-  // span_s.
+  // Second differences over span_s equal the acceleration with triangular weights of width 2 span_s.
   const double span_s = h.flapping_Hz > 0 ? std::max(std::round(0.2 * h.flapping_Hz), 1.0) / h.flapping_Hz : 0.2;
   const std::vector<double>& t = c.motion.imu_t_s();
   const Vector3d arm(h.imu.position_m[0], h.imu.position_m[1], h.imu.position_m[2]);

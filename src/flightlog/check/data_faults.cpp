@@ -25,8 +25,7 @@ struct DeclaredStream {
 /// Rate of the commands, missing ones included; no header declares it.
 double command_rate_hz(const Column& t_s) { return stream_statistics(kCommand, t_s, 1).rate_hz; }
 
-/// All streams: first those that every diagnosis needs (commands, motion capture and, in a flight with voltages, IMU),
-/// then the others.
+/// First those that every diagnosis needs (commands, mocap and, with voltages, IMU), then the others.
 std::vector<DeclaredStream> streams_of(const FlightLog& log) {
   const MocapStream& m = log.mocap;
   const ImuStream& s = log.imu;
@@ -52,8 +51,7 @@ bool repeats(const DeclaredStream& s, std::size_t i) {
          std::ranges::all_of(s.measured, [&](const Column* c) { return (*c)[i] == (*c)[i - 1]; });
 }
 
-/// Begin and end of the flight, s: medians over the first three streams, so that one faulty stream does not change
-/// them.
+/// Begin and end, s: medians over the first three streams, so that one faulty stream does not change them.
 std::pair<double, double> flight_of(const std::vector<DeclaredStream>& streams) {
   std::vector<double> begins, ends;
   for (std::size_t k = 0; k < std::min<std::size_t>(3, streams.size()); ++k)
@@ -133,8 +131,7 @@ std::vector<DataFault> wrong_clocks(const FlightLog& log, const CheckReport& rep
     const double ratio = value(*imu, "ratio");
     const Finding *frequency = find(report, "flapping frequency"), *power = find(report, "power beat"),
                   *wings = find(report, "wings beat");
-    // A third stream decides whether the clock of the commands or of the IMU is wrong; without one, the declared
-    // frequency does.
+    // A third stream decides whether the commands' or the IMU's clock is wrong; else the declared frequency does.
     bool of_command = off(power) || off(wings) || (against_mocap && !mocap_off);
     if (!of_command && !against_mocap && !power && !wings && frequency) {
       const double driven = value(*frequency, "frequency_Hz") / log.header.flapping_Hz;

@@ -1,4 +1,4 @@
-// Faults of the data that forbid a diagnosis, because no vehicle and no effect explains them. They are found before any fit.
+// Faults of the data that forbid a diagnosis, because no vehicle and no effect explains them. Found before any fit.
 #pragma once
 
 #include <filesystem>
@@ -10,15 +10,14 @@
 
 namespace flappy::flightlog {
 
-/// Shortest time that command, motion capture and IMU must have in common (command and motion capture alone where
-/// inputs are declared). Ten beats let the wings settle, and fifty tell mean, harmonics and noise apart. In less than
-/// kMinTime_s the accelerometer does not show gravity clearly enough.
+/// Shortest time common to command, mocap and (with voltages) IMU. Ten beats let the wings settle, fifty tell mean,
+/// harmonics and noise apart. Under kMinTime_s the accelerometer does not show gravity clearly.
 inline constexpr double kMinBeats = 60, kMinTime_s = 2;
 
-/// The faults of a log, empty where it can be diagnosed. Missing samples come first, then flights that are too short,
-/// then all others, one for each file. `report`: check_flight() of the log; `folder`: the place that DataFault::file
-/// names. Sensor effects within their priors are no fault, with one exception: a vibration rectification of several
-/// times its typical magnitude, which changes the mean force like a wrong attitude.
+/// The faults of a log, empty where it can be diagnosed: missing samples first, then too short flights, then the rest,
+/// one for each file. `report`: check_flight() of the log; `folder`: named by DataFault::file. Sensor effects within
+/// their priors are no fault, except a vibration rectification of several times its typical magnitude, which changes
+/// the mean force like a wrong attitude.
 std::vector<DataFault> data_faults(const FlightLog& log, const CheckReport& report,
                                    const std::filesystem::path& folder);
 inline std::vector<DataFault> data_faults(const FlightLog& log, const std::filesystem::path& folder) {

@@ -23,7 +23,6 @@ Vector3d mean_of(const std::vector<Vector3d>& values) {
   return sum / static_cast<double>(values.size());
 }
 
-/// Centred sums over the pairs that all hypotheses about frames need.
 struct Moments {
   Matrix3d cross = Matrix3d::Zero();  ///< mocap x gyro
   double mocap = 0, gyro = 0;
@@ -137,8 +136,7 @@ std::optional<Vector3d> SensorMotion::mean_turn(double begin_s, double end_s) co
   for (std::size_t k = index_before(imu_t_s_, begin_s); from_s < end_s; ++k) {
     const double to_s = std::min(end_s, imu_t_s_[k + 1]), dt = to_s - from_s;
     const Vector3d first = gyro_at(k, from_s), last = gyro_at(k, to_s);
-    // Rotation vector for a linear rate, coning within the interval included: Savage, J. Guidance, Control and Dynamics
-    // 21 (1998).
+    // Coning within the interval included (linear rate): Savage, J. Guidance, Control and Dynamics 21 (1998).
     turn = turn * exponential((first + last) * (dt / 2) + first.cross(last) * (dt * dt / 12));
     from_s = to_s;
   }
@@ -211,8 +209,7 @@ Pairs with_turns(const SensorMotion& motion, const std::vector<BeatWindow>& wind
 
 std::optional<Sync> find_lag(const SensorMotion& motion, const std::vector<BeatWindow>& windows) {
   constexpr double kRange_s = 1, kStep_s = 0.005;
-  // In nearly periodic motion several lags and frames match: these penalties prefer the smaller lag and the declared
-  // frame.
+  // In nearly periodic motion several lags and frames match: prefer the smaller lag and the declared frame.
   constexpr double kPenalty_per_s = 0.1, kOtherFrame = 0.01;
   std::optional<Sync> best;
   double best_score = 0;
@@ -278,8 +275,7 @@ double remainder(const Pairs& pairs, const Matrix3d& axes, double scale) {
 }
 
 Gains fit_gains(const Pairs& pairs, double mocap_noise, double gyro_noise) {
-  // A gain with a standard deviation of 1/20 reveals every mistake of axes or units; noise of a tenth of the gyro's
-  // spread biases it by 1/100.
+  // A gain with sd 1/20 reveals every mistake of axes or units; noise of a tenth of the spread biases it by 1/100.
   constexpr double kLargestSd = 0.05, kMinSpread = 10;
   const double n = static_cast<double>(pairs.mocap.size());
   const Vector3d m0 = mean_of(pairs.mocap), g0 = mean_of(pairs.gyro);
@@ -295,7 +291,6 @@ Gains fit_gains(const Pairs& pairs, double mocap_noise, double gyro_noise) {
   for (int i = 0; i < 3; ++i) {
     if (fit.spread(i) > kMinSpread * gyro_noise && fit.spread(i) > 0) axes.push_back(i);
   }
-  // Drop the axis with the largest standard deviation until all are below the limit.
   Eigen::MatrixXd inverse;
   while (!axes.empty()) {
     inverse = Eigen::MatrixXd(square(axes, axes)).inverse();

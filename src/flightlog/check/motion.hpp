@@ -1,5 +1,4 @@
-// The motion as gyro, accelerometer and mocap measured it: samples at their measured instants, means over windows of whole
-// beats, the lag between the two clocks, and the frames in which a log may be by mistake.
+// The motion as gyro, accelerometer and mocap measured it, the lag between their clocks, and mistaken frames.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -24,7 +23,7 @@ inline constexpr std::array kOrders = {Order::wxyz, Order::xyzw, Order::wxyz_inv
 const std::vector<Matrix3d>& signed_permutations();
 
 /// Samples of IMU and mocap. Times are less the declared latencies and count from the first mocap sample. Lost and
-/// swapped poses are left out (pose_readings()).
+/// swapped poses are left out.
 class SensorMotion {
  public:
   explicit SensorMotion(const FlightLog& log);
@@ -40,8 +39,7 @@ class SensorMotion {
   double roughness_rad() const;
   /// Mean of the gyro over an interval; nothing across a gap or outside.
   std::optional<Vector3d> mean_rate(double begin_s, double end_s) const;
-  /// Rotation over an interval, integrated from the gyro, as a rotation vector divided by the time; nothing across a
-  /// gap or outside.
+  /// Rotation vector integrated from the gyro, divided by the time; nothing across a gap or outside.
   std::optional<Vector3d> mean_turn(double begin_s, double end_s) const;
 
  private:
@@ -57,8 +55,7 @@ class SensorMotion {
   std::vector<std::size_t> gaps_before_;  ///< number of gaps of the IMU up to each sample
 };
 
-/// A window of whole beats. Oscillations at the beat frequency cancel in its mean; they are periodic and would match at
-/// wrong lags.
+/// A window of whole beats, in whose mean oscillations at the beat frequency cancel; they would match at wrong lags.
 struct BeatWindow {
   double begin_s, end_s;
   std::array<Vector3d, 4> rate_rad_s;  ///< mean from mocap, in B, for each Order
@@ -96,29 +93,27 @@ struct Sync {
 
 /// `pairs` with the gyro's mean_turn() in place of its mean rates.
 //
-// Coning: a body that oscillates about two axes out of phase also turns about the third, although its mean rate there is 0.
-// The rotation vector p of a rate w has p' = w + p x w / 2 + ... (Bortz, IEEE Trans. AES-7, 1971). Rates a cos and b sin
-// about two axes at the beat frequency f add a mean of a b / (2 x 2 pi f) to the third: 0.1 rad/s for 7 rad/s at 34 Hz.
+// Coning: a body that oscillates about two axes out of phase also turns about the third, at mean rate 0. A rotation
+// vector p has p' = w + p x w / 2 + ... (Bortz, IEEE Trans. AES-7, 1971): rates a cos and b sin at the beat frequency f
+// add a mean of a b / (2 x 2 pi f), 0.1 rad/s for 7 rad/s at 34 Hz.
 Pairs with_turns(const SensorMotion& motion, const std::vector<BeatWindow>& windows, const Pairs& pairs,
                  const Lag& lag);
 
-/// The lag, within one second, and the frame at which the rates of mocap and gyro agree best; nothing with fewer than
-/// ten common windows.
+/// The lag, within one second, and the frame at which mocap and gyro agree best; nothing under ten common windows.
 std::optional<Sync> find_lag(const SensorMotion& motion, const std::vector<BeatWindow>& windows);
 
 struct LagEstimate {
   double value = 0, sd = 0;
 };
-/// Correction to the lag `start`, to a fraction of a sample, by least squares. `noise`: standard deviation of a
-/// window's mean rate from mocap. Nothing where the rates do not determine a lag.
+/// Correction to the lag `start`, by least squares; nothing where the rates determine no lag. `noise`: sd of a window's
+/// mean rate from mocap.
 std::optional<LagEstimate> refine_lag(const SensorMotion& motion, const std::vector<BeatWindow>& windows,
                                       const SensorFrame& frame, Lag start, double noise);
 
 /// Sum of squares of mocap's rates less `scale x axes x gyro` and less a constant.
 double remainder(const Pairs& pairs, const Matrix3d& axes, double scale);
 
-/// mocap = gain x gyro + offset, by least squares. A gyro axis with too little rotation is not tested: its gain is
-/// fixed to 1.
+/// mocap = gain x gyro + offset, by least squares. An axis with too little rotation is untested, gain 1.
 struct Gains {
   Matrix3d gain = Matrix3d::Zero();
   Vector3d gain_sd = Vector3d::Zero();  ///< for each column of `gain`

@@ -75,8 +75,7 @@ std::string unit_for(double value, double least_s, double most_s) {
   s.table.fail(key, what, unit.empty() ? "times of a flight" : "time_unit = \"" + unit + "\"");
 }
 
-/// InputError where times are implausible in the declared unit: after the year 2100, or with a sampling interval that
-/// no robot has, as where microseconds are declared as seconds.
+/// InputError for times that show another unit than declared: after the year 2100, or at intervals that no robot has.
 void require_unit(const Channel& channel, const StreamMapping& s) {
   constexpr double kLatest_s = 4.1e9;                    // the year 2100
   constexpr double kLongest_s = 10, kShortest_s = 1e-6;  // mean interval of samples
@@ -112,7 +111,6 @@ std::vector<std::int64_t> raw_times(const Channel& channel, const StreamMapping&
   return field_times(channel, s);
 }
 
-/// Stamp and time of receipt of each row that has both.
 std::vector<StampedReceipt> stamped_receipts(const Channel& channel, const StreamMapping& s) {
   std::vector<StampedReceipt> pairs;
   const std::vector<std::int64_t> stamps = raw_times(channel, s);
@@ -126,8 +124,7 @@ bool all_missing(const std::vector<std::int64_t>& times) {
   return std::ranges::all_of(times, [](std::int64_t t) { return t == kNoTime; });
 }
 
-/// The clock lines of a recording. All streams of one clock give one line, because the quickest message of all bounds
-/// it.
+/// The clock lines of a recording: one for all streams of a clock, because the quickest message of all bounds it.
 class Clocks {
  public:
   Clocks(const Channels& channels, const Mapping& mapping) : mapping_(mapping) {
@@ -183,7 +180,6 @@ class Clocks {
   std::vector<ClockReport> reports_;
 };
 
-/// A channel and the times of its rows.
 struct Timed {
   const Channel* channel;
   std::vector<std::int64_t> t_ns;  ///< on the receiver's clock
@@ -198,8 +194,7 @@ Timed timed(const Channel& channel, const StreamMapping& s, const Clocks& clocks
   return timed;
 }
 
-/// For each of `times`, the index of the last of the times `held` that is not after it; held.size() where there is
-/// none.
+/// For each of `times`, the index of the last of `held` that is not after it; held.size() where there is none.
 std::vector<std::size_t> last_rows(const std::vector<std::int64_t>& times, const std::vector<std::int64_t>& held) {
   std::vector<std::size_t> order(held.size()), rows;
   std::iota(order.begin(), order.end(), 0);
@@ -220,7 +215,6 @@ struct Quaternion {
   }
 };
 
-/// Samples of a stream and their times on the receiver's clock.
 struct Stream {
   const StreamMapping& mapping;
   std::vector<std::int64_t> t_ns;
@@ -251,7 +245,6 @@ struct Stream {
   }
 };
 
-/// The finite value with the largest absolute value.
 double farthest(const Column& values) {
   double most = 0;
   for (const double v : values)
@@ -333,11 +326,10 @@ std::string fault_of(const Stream& s, std::size_t i, const Span& span) {
   return std::abs(length - 1) <= kQuaternionTolerance ? "" : "quaternion of another length than 1";
 }
 
-/// Drops unusable samples, sorts and counts those out of order, drops samples at the time of another, and counts lost
-/// ones. `sequence`: counts of the samples, or null. `shared`: whether other streams use the same channel.
+/// Drops unusable samples and those at the time of another; sorts; counts reordered and lost ones. `sequence`: counts
+/// of the samples, or null. `shared`: whether other streams use the channel.
 void tidy(Stream& s, const std::vector<double>* sequence, const Span& span, bool shared) {
-  // Many rows without any number of this stream belong to another stream of the channel. A few such rows are faulty
-  // samples.
+  // Many rows without any number belong to another stream of the channel; a few are faulty samples.
   constexpr double kOthersShare = 0.1;
   std::size_t none = 0;
   for (std::size_t i = 0; i < s.t_ns.size(); ++i) none += has_none(s, i);
@@ -383,8 +375,7 @@ void tidy(Stream& s, const std::vector<double>* sequence, const Span& span, bool
       s.report.lost += static_cast<std::size_t>(steps) - 1;
 }
 
-/// Computes delays relative to the quickest message of the clock, and counts late samples relative to the quickest of
-/// the stream, because some sensors always take longer.
+/// Delays are relative to the clock's quickest message, lateness to the stream's: some sensors always take longer.
 void count_delays(Stream& s, const Channel& channel, const ClockLine& quickest) {
   const std::vector<StampedReceipt> pairs = without_outliers(stamped_receipts(channel, s.mapping));
   if (pairs.empty()) return;

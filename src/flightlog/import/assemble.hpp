@@ -1,4 +1,4 @@
-// Makes a flight log from channels by a mapping, and reports what happened to the samples.
+// Makes a flight log from channels by a mapping.
 #pragma once
 
 #include <cstdint>
@@ -48,12 +48,11 @@ struct Imported {
   ImportReport report;
 };
 
-/// InputError, at the line of the mapping, for a channel or field that was not recorded and for times that cannot be
-/// determined. The log is not validated here: write_flight_log() does that.
+/// InputError, at the mapping's line, for a channel or field not recorded and for undeterminable times. Validates
+/// nothing else: write_flight_log() does.
 Imported assemble(const Channels& channels, const Mapping& mapping);
 
-/// Reads the files of one recording (sources.hpp), logs the warnings and writes the flight log to `out`. Where it
-/// throws InputError, nothing was written.
+/// Reads a recording's files (sources.hpp), logs warnings and writes the log to `out`; after InputError, nothing.
 Imported import_recording(const std::vector<std::filesystem::path>& files, const Mapping& mapping,
                           const std::filesystem::path& out);
 

@@ -9,7 +9,6 @@ namespace {
 /// Suffix of the first instance of a PX4 topic, which is often the only one and may be left out in a mapping.
 const std::string kFirst = "[0]";
 
-/// The time, or kNoTime where it exceeds kLatest_ns.
 std::int64_t checked(std::int64_t t_ns) { return std::abs(static_cast<double>(t_ns)) <= kLatest_ns ? t_ns : kNoTime; }
 
 }  // namespace

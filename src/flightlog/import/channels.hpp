@@ -1,5 +1,4 @@
-// The content of a recording in any format: named channels of rows, each row with named numbers, the time at which it was received
-// and, where the row has one, its stamp. Importers and recorders fill it row by row.
+// A recording in any format: named channels of rows with named numbers, time of receipt and, if any, stamp.
 #pragma once
 
 #include <cstdint>
@@ -66,8 +65,7 @@ class Channels {
   /// Registers a channel and its fields even if no row of it ever comes. Empty field names are ignored.
   void add(const std::string& channel, const std::vector<std::string>& fields = {});
   void add(const std::string& channel, std::int64_t received_ns, std::int64_t stamp_ns, const Row& row);
-  /// The channel `name`, or else `name`[0]. kOnlyChannel finds the channel of a recording that has only one. Null where
-  /// there is none.
+  /// The channel `name`, else `name`[0]; kOnlyChannel finds a recording's only channel. Null where there is none.
   const Channel* find(const std::string& name) const;
   std::vector<std::string> names() const;
 

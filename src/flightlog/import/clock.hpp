@@ -1,9 +1,9 @@
-// Offset and drift between the clock of stamps and the clock of the receiver, from the times at which stamped messages were received.
+// Offset and drift between the clock of stamps and that of the receiver, from times of stamped messages.
 //
-// received - stamp = offset of the clocks + delay. Delays vary but have a minimum, so all points (stamp, received - stamp) lie above a
-// line: offset + least delay. Of all lines below the points, the nearest to them is the edge of their lower convex hull below the mean
-// of the stamps (Moon, Skelly, Towsley, INFOCOM 1999). Its slope is the drift. The least delay itself cannot be determined from such
-// pairs of times, so it counts as offset.
+// received - stamp = offset of the clocks + delay. Delays have a minimum, so all points (stamp, received - stamp) lie
+// above the line offset + least delay. The nearest line below them is the edge of their lower convex hull below the
+// mean stamp (Moon, Skelly, Towsley, INFOCOM 1999). Its slope is the drift. The least delay is undeterminable and
+// counts as offset.
 #pragma once
 
 #include <cstdint>
@@ -19,10 +19,8 @@ using StampedReceipt = std::pair<std::int64_t, std::int64_t>;
 /// A linear map from stamps to the receiver's clock.
 class ClockLine {
  public:
-  /// A constant offset without drift.
   explicit ClockLine(std::int64_t offset_ns = 0) : base_ns_(offset_ns) {}
-  /// The line below `pairs`, at least one. Its drift is 0 where the pairs span less than kMinSpan_s or the slope would
-  /// exceed kMaxDrift.
+  /// The line below all `pairs`, at least one; drift 0 for a span below kMinSpan_s or a slope beyond kMaxDrift.
   static ClockLine below(std::vector<StampedReceipt> pairs);
 
   static constexpr double kMinSpan_s = 20, kMaxDrift = 1e-3;
@@ -43,13 +41,11 @@ struct TimeRange {
   bool contains(std::int64_t t_ns) const { return t_ns >= from_ns && t_ns <= to_ns; }
 };
 
-/// The range in which most of the times lie. The times are cut where they are more than kLongestGap_s apart; the part
-/// with most times wins. Without times: the range that contains everything. Times outside were stamped before the clock
-/// was set or after it rolled over.
+/// The range in which most of the times lie: they are cut where more than kLongestGap_s apart; the part with most times
+/// wins; without times, everything. Times outside were stamped before the clock was set or after it rolled over.
 TimeRange main_range(std::vector<std::int64_t> times_ns);
 
-/// The pairs whose difference lies in the main_range() of all differences: a single time of a wrong clock would tilt
-/// the line.
+/// The pairs whose difference lies in the main_range() of all: one time of a wrong clock would tilt the line.
 std::vector<StampedReceipt> without_outliers(std::vector<StampedReceipt> pairs);
 
 }  // namespace flappy::flightlog

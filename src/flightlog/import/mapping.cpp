@@ -50,8 +50,7 @@ const std::vector<StreamKeys> kStreams = {
 };
 const Names kAngles = {"roll_rad", "pitch_rad", "yaw_rad"};
 
-/// The keys of a stream, reduced or replaced as its table says: declared inputs, no gyro, no currents, angles instead
-/// of a quaternion.
+/// A stream's keys, reduced or replaced as its table says: declared inputs, no gyro, no currents, angles.
 StreamKeys narrowed(StreamKeys keys, const io::Table& table, bool declared_inputs) {
   const auto drop = [](Names& names, std::string_view part) {
     std::erase_if(names, [&](const std::string& name) { return name.find(part) != std::string::npos; });

@@ -1,7 +1,7 @@
 // MAPPING.toml: how the channels of a recording become the streams of a flight log. A complete one, with every key:
 //
 //   schema = 1
-//   vehicle = "hummingbird_nominal.toml"     # this, [ambient] and the declared values of each stream: as in flight.toml
+//   vehicle = "hummingbird_nominal.toml"     # this, [ambient] and each stream's declared values: as in flight.toml
 //   vehicle_sha256 = "..."                   # optional
 //   flapping_Hz = 34.0
 //   gravity_m_s2 = 9.81
@@ -17,14 +17,14 @@
 //   offset_s = 0.0                           # optional: the receiver's time less this clock's
 //
 //   [command]
-//   channel = "/wing_input"                  # a topic; of a CSV, the stem of the file's name; "*": the only channel of the recording
-//   inputs = ["left_flap", "tail"]           # optional: columns in place of voltages; [imu] and flapping_Hz are then optional
+//   channel = "/wing_input"                  # a topic; of a CSV, its file's stem; "*": the only channel
+//   inputs = ["left_flap", "tail"]           # optional: columns in place of voltages; then [imu], flapping_Hz optional
 //   time = "stamp"                           # default; "received", or "field"
-//   time_field = "timestamp"                 # with time = "field": the field of the time,
-//   time_unit = "us"                         # ... and its unit: "s" (default), "ms", "us", "ns"
-//   clock = "robot"                          # the clock of the stamps; "receiver" (default): the clock of the times of receipt
-//   late_s = 0.02                            # default; a sample counts as late if its delay exceeds the stream's least delay by more
-//   sequence = "tick"                        # optional: a field that counts samples; without it, lost samples are estimated from the rate
+//   time_field = "timestamp"                 # the field of the time, with time = "field"
+//   time_unit = "us"                         # its unit: "s" (default), "ms", "us", "ns"
+//   clock = "robot"                          # the clock of the stamps; "receiver" (default): of times of receipt
+//   late_s = 0.02                            # default; late: delayed by more than this beyond the stream's least
+//   sequence = "tick"                        # optional: field that counts samples; else the rate gives the lost ones
 //   [command.columns]                        # the field for each column of command.csv
 //   left_voltage_V = "left_voltage_v"
 //   right_voltage_V = "right_voltage_v"
@@ -39,18 +39,17 @@
 //   field = "thrust"                         # ... this field of the channel is
 //   above = 0.0                              # ... above this value
 //
-//   [mocap]                                  # channel, time and columns as above; roll_rad, pitch_rad, yaw_rad replace qw to qz where
-//                                            # the recording has angles
+//   [mocap]                                  # keys as above; roll_rad, pitch_rad, yaw_rad may replace qw to qz
 //   world = "enu"                            # default; or "ned": frame of position and attitude; turned to z up
 //   frame = "flu"                            # default; or "frd": frame of the body; turned to x forward, y left, z up
 //   rate_hz = 200                            # optional in every stream; measured if missing
-//   latency_s = 0.0                          # from the measured instant to the time used here: 0 if the stamp is that instant
+//   latency_s = 0.0                          # time used less measured instant; 0 if the stamp is that instant
 //   position_noise_m = 1e-4
 //   attitude_noise_rad = 2e-3
 //
 //   [imu]                                    # frame as above; columns are specific force and rate
 //   latency_s, bandwidth_hz, position_m, gyro_noise_rad_s, gyro_bias_sd_rad_s, accel_noise_m_s2
-//   gyro = true                              # default; false, with declared inputs only: no gyro, no noise and bias of it
+//   gyro = true                              # default; false, with declared inputs only: no gyro, noise, bias
 //   [power]                                  # optional
 //   battery_nominal_V, latency_s, voltage_noise_V, current_noise_A
 //   currents = true                          # default; false, with declared inputs only: battery_V alone
@@ -61,11 +60,11 @@
 //
 //   [dds]                                    # for flappy-record: io/dds_config.hpp
 //
-// Angles turn W to B about z by yaw, then about the new y by pitch, then about the new x by roll (Diebel, Representing Attitude, 2006,
-// sequence 1-2-3). As y points left, pitch > 0 is nose down. An angle in degrees, nose up, needs the scale
+// Angles turn W to B about z by yaw, then the new y by pitch, then the new x by roll (Diebel, Representing Attitude,
+// 2006, sequence 1-2-3). As y points left, pitch > 0 is nose down; degrees, nose up, need the scale
 // pitch_rad = -0.017453292519943295. With world = "ned" and frame = "frd" angles are as in aviation, nose up.
 //
-// Fields of named elements: "position[left_stroke]" of a joint, "transforms[torso].transform.translation.x" of a transform.
+// Fields of named elements: "position[left_stroke]" (joint), "transforms[torso].transform.translation.x" (transform).
 #pragma once
 
 #include <filesystem>
@@ -114,7 +113,6 @@ struct Mapping {
   io::DdsConfig dds;                        ///< how a recorder reaches the robot
   std::vector<StreamMapping> streams;       ///< command, mocap, and imu, power, wings and attitude where mapped
 
-  /// The channels and fields to read from a recording.
   Wanted wanted() const;
 };
 

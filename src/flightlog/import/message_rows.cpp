@@ -46,7 +46,6 @@ const Row& MessageRows::read(std::string_view bytes) {
       stamp_ns_ = static_cast<std::int64_t>(sec) * kSecond_ns + static_cast<std::int64_t>(number);
       open_stamp = false;
     }
-    // reuse the memory of the previous row
     if (count == row_.size()) row_.emplace_back();
     row_[count].name = path;
     row_[count++].value = number;

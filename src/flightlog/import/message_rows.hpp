@@ -1,4 +1,3 @@
-// Turns messages of ROS 2 into rows.
 #pragma once
 
 #include <memory>
@@ -11,9 +10,9 @@
 
 namespace flappy::flightlog {
 
-/// Reads messages of one type. The field of a number is its path, "pose.position.x". Names replace indices: where a
-/// message has a sequence "name" (JointState), element i of every other sequence becomes "position[left_stroke]"; where
-/// elements of a sequence have a member name or child_frame_id (TFMessage), they become
+/// Turns ROS 2 messages of one type into rows. A number's field is its path, "pose.position.x". Names replace indices:
+/// where a message has a sequence "name" (JointState), element i of every other one becomes "position[left_stroke]";
+/// where elements have a member name or child_frame_id (TFMessage), they become
 /// "transforms[torso].transform.translation.x".
 class MessageRows {
  public:

@@ -73,7 +73,6 @@ struct Line {
   std::size_t number = 0;  ///< from 1
 };
 
-/// Iterates over the lines of a text.
 class Lines {
  public:
   explicit Lines(std::string_view text) : rest_(text) {}
@@ -96,7 +95,6 @@ bool is_comment(std::string_view line) {
   return line.substr(std::min(line.find_first_not_of(" \t"), line.size())).starts_with('#');
 }
 
-/// The text of a comment after its '#'.
 std::string_view uncommented(std::string_view line) {
   line.remove_prefix(std::min(line.find_first_not_of("# \t"), line.size()));
   return line;
@@ -179,7 +177,6 @@ Header header_of(std::string_view text, const std::string& name) {
                        "; accepted: a line of column names, then rows of numbers");
 }
 
-/// Number of omissions of one kind, and the first case.
 struct LeftOut {
   std::size_t count = 0, first_line = 0;
   std::string first;
@@ -238,8 +235,7 @@ class TableReader {
   }
 
  private:
-  /// Treats each of these lines as a row of its own, because one opens quotes that are never closed; leaves that one
-  /// out.
+  /// Treats each line as a row of its own, because one opens quotes that are never closed; leaves that one out.
   void split_apart(RowSplitter& splitter, std::vector<Line>& lines) {
     splitter.end_row();
     for (const Line& line : lines) {

@@ -74,12 +74,10 @@ struct Layout {
   }
 };
 
-/// Whether all bytes are printable ASCII.
 bool is_text(std::string_view bytes) {
   return std::ranges::all_of(bytes, [](char c) { return c >= 0x20 && c < 0x7f; });
 }
 
-/// Whether the bytes can be the name of a topic.
 bool is_name(std::string_view bytes) {
   return !bytes.empty() && std::ranges::all_of(bytes, [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '_' || c == '/' || c == '-';
@@ -121,7 +119,7 @@ class UlogReader {
   // ---- finding messages in a file that may be damaged
 
   /// End of the part of the file that contains `at`. A logger that died may end within a message; the flags give the
-  /// offsets of data that was appended later.
+  /// offsets of data appended later.
   std::size_t end_of_part(std::size_t at) const {
     std::size_t end = bytes_.size();
     for (const std::uint64_t offset : appended_)
@@ -178,8 +176,7 @@ class UlogReader {
     }
   }
 
-  /// Whether messages continue at an offset: with a sound one, with at most `others` unsound ones before a sound one,
-  /// or with the end of the part.
+  /// Whether a sound message follows, after at most `others` unsound ones, or the part ends.
   bool goes_on(std::size_t at, int others) const {
     if (at == end_of_part(at - 1)) return true;
     const auto m = message_at(at);
@@ -198,9 +195,8 @@ class UlogReader {
     return known != sizes_.end() && size <= known->second.second;
   }
 
-  /// Whether to trust a message. A sound definition is always trusted, because without it a whole topic is lost. Data
-  /// are trusted if another message follows: after a lost byte nothing would follow in step. Any other message is not
-  /// trusted if a data message lies within it, because then its size is damaged.
+  /// Whether to trust a message: a sound definition, without which a topic is lost; data if another message follows, as
+  /// none would in step after a lost byte; any other unless data lie within it, because then its size is damaged.
   bool believed(const Message& m) const {
     const bool is_sound = sound(m);
     if (is_sound && (m.type == 'F' || m.type == 'A')) return true;
@@ -302,8 +298,7 @@ class UlogReader {
     }
   }
 
-  /// Adds the numbers of a type to `layout`, nested types included. False where a type is unknown, nesting is too deep,
-  /// or there are too many numbers.
+  /// Adds a type's numbers, nested ones too. False for an unknown type, too deep nesting, or too many numbers.
   bool lay(const std::string& type, const std::string& path, std::size_t depth, std::size_t& offset,
            Layout& layout) const {
     const auto format = formats_.find(type);
@@ -351,8 +346,7 @@ class UlogReader {
   void data(std::string_view content) {
     if (content.size() < 2) return void(++bad_);
     const auto id = number<std::uint16_t>(content);
-    // The message that announces the topic may be lost: other messages with this number and size belong to the same
-    // topic.
+    // The announcement may be lost: messages with this number and size belong to one topic.
     if (sizes_.try_emplace(id, content.size(), content.size()).second) unannounced_.insert(id);
     if (unannounced_.contains(id)) return void(++orphans_);
     const auto topic = topics_.find(id);

@@ -9,12 +9,11 @@
 
 namespace flappy::flightlog {
 
-/// Whether `bytes` begin like a ULog.
 bool is_ulog(std::string_view bytes);
 
-/// Adds all wanted topics: channel "sensor_combined[0]", fields "gyro_rad[0]". The time of receipt of a row is its
-/// timestamp; its stamp is timestamp_sample where it has one, else timestamp. Damaged messages are left out, and a file
-/// that ends early is read up to there; both give a warning. InputError, beginning with `name`, where this is no ULog.
+/// Adds wanted topics: channel "sensor_combined[0]", fields "gyro_rad[0]". Time of receipt: timestamp; stamp:
+/// timestamp_sample, else timestamp. Damaged messages are left out, and an early end is accepted, both with a warning.
+/// InputError, beginning with `name`, where this is no ULog.
 void read_ulog(std::string_view bytes, const std::string& name, Channels& channels, std::vector<std::string>& warnings);
 
 }  // namespace flappy::flightlog

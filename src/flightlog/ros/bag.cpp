@@ -105,8 +105,7 @@ class SqliteBag : public Bag {
     });
   }
 
-  /// Copies the file and its journals to a temporary folder: SQLite merges the journal into the file before it reads,
-  /// and the user's file must not change.
+  /// Copies the file and its journals: SQLite merges the journal before reading, and the user's file must not change.
   fs::path copy_of(const fs::path& path) {
     copy_.emplace();
     for (const char* ending : {"", kBeside[0], kBeside[1]}) {
@@ -170,7 +169,6 @@ class SqliteBag : public Bag {
   bool ended_ = false;
 };
 
-/// The files of a split bag in sequence.
 class SplitBag : public Bag {
  public:
   explicit SplitBag(std::vector<std::unique_ptr<Bag>> parts) : parts_(std::move(parts)) {}

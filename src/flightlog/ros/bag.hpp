@@ -38,12 +38,10 @@ class Bag {
 
   /// Opens a file, or a folder whose .mcap or .db3 files follow each other by number. InputError where it is no bag.
   static std::unique_ptr<Bag> open(const std::filesystem::path& path);
-  /// Whether `path` looks like a bag to open().
   static bool is_bag(const std::filesystem::path& path);
 };
 
-/// The layout of a topic's messages, from the bag's definition or from standard_messages(). MessageError where neither
-/// gives one and where messages are not in CDR.
+/// A topic's layout, from its bag or standard_messages(). MessageError where neither has it or messages are not CDR.
 std::shared_ptr<const Layout> layout_of(const BagTopic& topic);
 
 }  // namespace flappy::flightlog::ros

@@ -30,7 +30,6 @@ std::size_t size_of(Kind kind) {
   }
 }
 
-/// Appends to a path; the destructor removes the addition.
 class Lengthened {
  public:
   Lengthened(std::string& path, std::string_view name) : path_(path), size_(path.size()) {

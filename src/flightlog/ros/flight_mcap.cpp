@@ -30,12 +30,10 @@ void put_header(Members& m, std::int64_t t_ns, const char* frame, const std::str
   m[path + ".frame_id"] = frame;
 }
 
-/// Sets the diagonal of a 3 x 3 covariance to sd^2.
 void put_variance(Members& m, const std::string& path, double sd) {
   for (const int i : {0, 4, 8}) m[path + "[" + std::to_string(i) + "]"] = sd * sd;
 }
 
-/// A stream of the log: its times and the function that writes a sample.
 struct Feed {
   const Column* t_s;
   std::function<void(std::size_t i)> write;

@@ -3,11 +3,11 @@
 //   /pose         PoseStamped    motion capture, in "world"          /tf      TFMessage   the same, "world" to "torso"
 //   /imu          Imu            in "torso"; variances as declared   /clock   Clock       with every pose
 //   /wing_input   WingInput      inputs and voltages that the driver applied; NaN where the log lacks them
-//   /battery      BatteryState   where power is logged: its current is minus that of both motors
+//   /battery      BatteryState   where power is logged: current is minus that of both motors
 //   /motors       JointState     where power is logged: effort is the current in A of left_motor and right_motor
 //   /joint_states JointState     where wings are logged: left_stroke, left_rotation, right_stroke, right_rotation
 //
-// The log time of a message is the arrival of its sample; its stamp is the measured instant, earlier by the declared latency.
+// A message's log time is the arrival of its sample; its stamp is earlier by the declared latency.
 #pragma once
 
 #include <filesystem>

@@ -1,7 +1,5 @@
-// Reads the members of a ROS 2 message from its definition (the text of a .msg file).
-//
-// A concatenated definition, as MCAP files and rosbag2's databases contain it, is the text of one message followed by the texts of the
-// messages that it refers to, each after a line of '=' and a line "MSG: package/Type".
+// Reads the members of a ROS 2 message from its definition (the text of a .msg file). A concatenated definition, as in
+// MCAP and rosbag2, also has the messages that it refers to, each after a line of '=' and a line "MSG: package/Type".
 #pragma once
 
 #include <cstdint>
@@ -67,7 +65,6 @@ class Definitions {
   bool has(std::string_view type) const { return texts_.contains(full_type_name(type)); }
   /// MessageError where the type, or one that it refers to, is unknown, cannot be read or contains itself.
   std::shared_ptr<const Layout> layout(std::string_view type) const;
-  /// The concatenated definition of a type.
   std::string concatenated(std::string_view type) const;
   std::vector<std::string> names() const;
 

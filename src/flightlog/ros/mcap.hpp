@@ -1,5 +1,4 @@
-// Writes and reads MCAP files (mcap.dev/spec): messages of many topics in one file. Profile "ros2", which rosbag2 writes and Foxglove and
-// PlotJuggler read.
+// Writes and reads MCAP files (mcap.dev/spec), messages of many topics, with profile "ros2", as rosbag2 and Foxglove.
 #pragma once
 
 #include <cstdint>
@@ -22,8 +21,8 @@ struct McapOptions {
   double flush_s = 1;
 };
 
-/// Writes messages in chunks. A chunk is written as a whole and does not depend on later bytes, so a killed process
-/// leaves a file that can be read up to its last chunk. InputError where the file cannot be written.
+/// Writes messages in chunks, which do not depend on later bytes, so a killed process leaves a file that can be read up
+/// to the last one. InputError where the file cannot be written.
 class McapWriter {
  public:
   explicit McapWriter(const std::filesystem::path& path, const McapOptions& options = {});
@@ -37,7 +36,6 @@ class McapWriter {
                           const std::string& hash);
   /// `stamp_ns`: time of sending or of the event that the message reports.
   void write(std::uint16_t topic, std::int64_t logged_ns, std::int64_t stamp_ns, std::string_view bytes);
-  /// Writes the open chunk to the file.
   void flush();
   /// Writes the summary, which gives readers random access.
   void finish();
@@ -85,14 +83,12 @@ struct McapMessage {
   std::string_view bytes;  ///< valid until the next message is read
 };
 
-/// Reads all messages in the order of the file. Damaged records are left out, and a file that ends early is read up to
-/// there; both give a warning.
+/// Reads in the order of the file. Leaves out damaged records; ends where the file ends early; warns of both.
 class McapReader {
  public:
   /// `bytes` must outlive the reader; `name` is the file in messages. InputError where this is no MCAP file.
   McapReader(std::string_view bytes, std::string name);
   std::optional<McapMessage> next();
-  /// Names of the channels announced so far.
   std::vector<std::string> topics() const;
   const std::vector<std::string>& warnings() const { return warnings_; }
 

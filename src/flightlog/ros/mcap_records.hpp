@@ -52,7 +52,6 @@ class Bytes {
     return *this;
   }
   const std::string& text() const { return text_; }
-  /// The bytes as the content of a record.
   std::string record(Code code) const {
     Bytes head;
     head.number<std::uint8_t>(code).number<std::uint64_t>(text_.size());

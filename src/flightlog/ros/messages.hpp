@@ -1,4 +1,3 @@
-// Definitions of the messages that this project reads and writes, for bags and senders that do not include them.
 #pragma once
 
 #include "flightlog/ros/layout.hpp"
@@ -14,8 +13,7 @@ namespace flappy::flightlog::ros {
 ///   Watch            selects the flapper of a batch that is shown
 ///   Command, CommandResult, FileChunk   a request to a server, its reply, and a part of a file that it sends
 ///
-/// The texts contain members only: constants, defaults and comments belong neither to the bytes of a message nor to its
-/// hash.
+/// The texts have members only: constants, defaults and comments belong neither to a message's bytes nor to its hash.
 const Definitions& standard_messages();
 
 namespace type_name {

@@ -10,8 +10,7 @@ namespace flappy::flightlog::ros {
 /// "RIHS01_" and the SHA-256 of type_description().
 std::string type_hash(const Layout& layout);
 
-/// JSON with the members of a type and of all types that it refers to, sorted by name, with the spaces that ROS 2
-/// writes.
+/// JSON of a type and of all that it refers to, sorted by name, with the spaces that ROS 2 writes.
 std::string type_description(const Layout& layout);
 
 }  // namespace flappy::flightlog::ros

@@ -15,18 +15,15 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-/// Standard deviation of the smoothing weights: for the path that deviations are measured from, and for the path that a simulation follows, which
-/// is smoothed less because the flight itself smooths it again; and the time between the knots of the latter.
+/// Standard deviation of the smoothing weights: measured path; flown path, which the flight smooths again. Knots.
 constexpr double kPathSd_s = 0.25, kFlownSd_s = 0.12, kKnot_s = 0.1;
 /// A path within these ranges of position and heading counts as a hover.
 constexpr double kHoverReach_m = 0.06, kHoverTurn_rad = 0.6;
-/// Before a recorded path, the simulation hovers kClear_m away from ground and ceiling while the controller learns the trim, approaches the start
-/// of the path, and rests there.
+/// Before a recorded path: hover kClear_m off ground and ceiling to learn the trim, approach the start, rest.
 constexpr double kLearn_s = 3, kApproach_s = 1, kRest_s = 0.5, kLead_s = kLearn_s + kApproach_s + kRest_s;
 constexpr double kClear_m = 0.5;
-/// Left out at the start of each flight: a simulated vehicle starts at rest and has to catch up with a moving path.
+/// Left out at the start of each flight: a simulated vehicle starts at rest and has to catch up.
 constexpr double kCatchUp_s = 0.5;
-/// Least number of beats from which quantities are computed.
 constexpr std::size_t kMinBeats = 40;
 
 constexpr std::array<const char*, 9> kQuantities = {"mean_amplitude_V", "mean_difference_V", "mean_bias_V",
@@ -41,7 +38,7 @@ struct Beat {
   BeatMotion regime;
 };
 
-/// Whole beats of a recording from `from_s` to `to_s` in which all streams have data and the vehicle is clear of the ground.
+/// Whole beats in which all streams have data and the vehicle is clear of the ground.
 std::vector<Beat> beats_of(const Recording& r, double from_s, double to_s) {
   struct Sum {
     double n = 0, t_s = 0, roll = 0, pitch = 0;
@@ -150,7 +147,6 @@ Quantities quantities_of(std::vector<Beat> beats) {
 
 using Path = std::vector<flight::Segment<double>>;
 
-/// Cubic path segment with the given end points and velocities.
 flight::Segment<double> segment(std::uint32_t tick, double duration_s, const OnPath& from, const OnPath& to) {
   flight::Segment<double> s{tick, {}};
   const double h = duration_s;
@@ -163,7 +159,6 @@ flight::Segment<double> segment(std::uint32_t tick, double duration_s, const OnP
   return s;
 }
 
-/// The path of a simulation: hover away from surfaces to learn the trim, approach the start of the recorded path, rest, follow the recorded path.
 Path path_of(const std::vector<Beat>& beats, const sim::World& world, double tick_s) {
   std::vector<OnPath> knots;
   const double first_s = beats.front().t_s, span_s = beats.back().t_s - first_s;

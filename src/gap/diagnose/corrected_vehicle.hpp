@@ -1,4 +1,4 @@
-// The corrected vehicle, to train on.
+// Makes the corrected vehicle of a diagnosis, to train on.
 #pragma once
 
 #include "flappy/vehicle.hpp"
@@ -6,8 +6,8 @@
 
 namespace flappy::gap {
 
-/// The vehicle with the parameters and effects of the conclusion and nothing else; its posterior has their remaining uncertainty. `uncertain`: the
-/// randomisation with the minor draws of the inference.
+/// The vehicle with the parameters and effects of the conclusion alone; its posterior has their uncertainty.
+/// `uncertain`: with the minor draws of the inference.
 model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Inference& inference,
                                  const sim::Randomisation& uncertain);
 

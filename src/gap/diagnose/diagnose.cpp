@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 /// A next flight is proposed if the second hypothesis has at least this probability.
 constexpr double kMinRival = 0.01;
-/// Most effects in a hypothesis on a beat-averaged vehicle: its file may lack many effects at once, and another fit costs little.
+/// A beat-averaged vehicle's file may lack many effects at once, and another fit costs little.
 constexpr int kMaxBeatAveragedEffects = 8;
 
 std::vector<int> read_channels(const std::vector<std::string>& names, bool beat_averaged) {

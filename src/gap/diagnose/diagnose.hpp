@@ -1,4 +1,4 @@
-// A diagnosis from a vehicle file, flight logs and settings: the only entry point for flappy-gap, jobs of the server, Python and the blind
+// A diagnosis from a vehicle file, flight logs and settings: the only entry point for all front ends and the blind
 // benchmark.
 #pragma once
 
@@ -16,19 +16,18 @@ namespace flappy::gap {
 struct DiagnosisSettings {
   std::string vehicle;               ///< the vehicle file
   std::vector<std::string> flights;  ///< folders of logs
-  /// Files. Empty: priors.toml, model_discrepancy.toml and verdict.toml of configs/gap, or of configs/gap/beat_averaged for a beat-averaged vehicle.
+  /// Empty: the files of configs/gap, or of configs/gap/beat_averaged for a beat-averaged vehicle.
   std::string priors, discrepancy, verdict;
   std::vector<std::string> withheld;  ///< effects to leave out of the catalogue
   /// For a beat-averaged vehicle, the only channels that count; empty: all that it compares.
   std::vector<std::string> channels;
-  /// Configuration of flappy-fly that the flights were flown with. Empty: closed-loop simulations follow the recorded paths with the controller of
+  /// flappy-fly configuration of the flights. Empty: simulations follow the recorded paths with the controller of
   /// fly/hover.toml.
   std::string manoeuvre;
   std::string experiments;  ///< folder of manoeuvres, one of which may be proposed; empty: configs/gap/experiments
   int threads = 0;          ///< 0: one for each processor
 };
 
-/// Settings, read and checked.
 struct DiagnosisRequest {
   DiagnosisSettings settings;
   model::Vehicle vehicle;
@@ -41,7 +40,6 @@ struct DiagnosisRequest {
 /// Reads and checks all files but the logs. io::InputError for a setting or file that is not accepted.
 DiagnosisRequest read_request(const DiagnosisSettings& settings);
 
-/// A diagnosis, with the inference that it summarises.
 struct Diagnosed {
   Diagnosis result;
   std::optional<model::Vehicle> corrected;  ///< none: the data are faulty, or the diagnosis was stopped
@@ -50,14 +48,14 @@ struct Diagnosed {
   std::optional<sim::Randomisation> uncertain;  ///< with the minor draws at their estimates
   Inference inference;
 };
-/// Reads the logs and diagnoses. `progress`: returns false to stop before the next effect is fitted. io::InputError if a log cannot be read.
+/// Diagnoses; `progress` returns false to stop before the next effect is fitted. io::InputError for an unreadable log.
 Diagnosed diagnose(const DiagnosisRequest& request,
                    const std::function<bool(double share, const std::string& what)>& progress = {});
 
-/// Adds the closed-loop check of the corrected vehicle (closed_loop_prediction.hpp). No effect on incomplete results and beat-averaged vehicles.
+/// Adds the closed-loop check (closed_loop_prediction.hpp). No effect on incomplete results and beat-averaged vehicles.
 void fly_closed_loop(const DiagnosisRequest& request, Diagnosed& diagnosed);
-/// Adds the most informative next flight (next_experiment.hpp) if the second hypothesis is probable enough. No effect on incomplete results and
-/// beat-averaged vehicles.
+/// Adds the most informative next flight (next_experiment.hpp) if the second hypothesis is probable enough. No effect
+/// on incomplete results and beat-averaged vehicles.
 void propose_experiment(const DiagnosisRequest& request, Diagnosed& diagnosed);
 
 }  // namespace flappy::gap

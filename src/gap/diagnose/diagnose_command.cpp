@@ -16,8 +16,7 @@
 namespace flappy::gap {
 namespace {
 
-/// All effects in the groups of the withheld effects: short flights cannot tell effects of one group apart, so another one of the group would stand
-/// in for a withheld effect.
+/// All effects in the groups of the withheld ones: another effect of a group would stand in for the withheld one.
 std::vector<std::string> whole_groups(const DiagnosisSettings& settings) {
   const model::Vehicle vehicle = model::read_any_vehicle(settings.vehicle);
   std::vector<std::string> all;

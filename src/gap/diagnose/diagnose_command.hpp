@@ -1,4 +1,3 @@
-// flappy-gap diagnose.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -13,7 +12,7 @@ struct DiagnoseCommand {
   bool quiet = false;          ///< prints nothing
 };
 
-/// Diagnoses, prints the summary, writes the files; returns the content of diagnosis.json. After Ctrl-C, the diagnosis is incomplete, or lacks the
+/// Diagnoses, writes the files and returns the content of diagnosis.json. After Ctrl-C it is incomplete, or lacks the
 /// closed-loop check or the proposed flight. io::InputError as from read_request and diagnose.
 nlohmann::ordered_json run_diagnose(const DiagnoseCommand& command);
 

@@ -1,4 +1,3 @@
-// The files that a diagnosis writes into its folder.
 #pragma once
 
 #include <filesystem>
@@ -10,8 +9,8 @@ namespace flappy::gap {
 inline constexpr const char *kDiagnosisFile = "diagnosis.json", *kVehicleFile = "vehicle_corrected.toml",
                             *kResidualsFile = "residuals.csv", *kHypothesesFile = "hypotheses.csv";
 
-/// Writes diagnosis.json with the whole result, and two tables for spreadsheets: residuals.csv, a row for each test of a residual, and
-/// hypotheses.csv, a row for each parameter of each hypothesis.
+/// Writes diagnosis.json, residuals.csv (a row for each test) and hypotheses.csv (a row for each parameter of each
+/// hypothesis).
 void write_diagnosis(const std::filesystem::path& folder, const Diagnosis& diagnosis);
 
 }  // namespace flappy::gap

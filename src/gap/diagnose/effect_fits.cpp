@@ -14,12 +14,12 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Number of hypotheses that are tried with a remainder, and of single effects with which the parameters are fitted again.
+/// Number of hypotheses tried with a remainder, and of single effects with which the parameters are fitted again.
 constexpr std::size_t kMaxRemainders = 3, kMaxMoved = 3;
 constexpr int kFitIterations = 6;
 /// Log evidence of a hypothesis whose vehicle cannot be simulated.
 constexpr double kRefuted = -1e9;
-/// An effect cannot show if its magnitudes change no basis coefficient by more than this, in the channel's unit per unit coordinate.
+/// An effect cannot show if its magnitudes change no coefficient by more, in the channel's unit per unit coordinate.
 constexpr double kNoChange = 1e-9;
 
 ScoredHypothesis baseline(HypothesisKind kind, double log_evidence, double prior) {
@@ -53,8 +53,8 @@ std::vector<FreeBlock> free_blocks(const ScaledEvidence& w, const RegimeBasis& b
   return blocks;
 }
 
-/// Evidence with blocks that may be free. Expectation-maximisation finds the nearest maximum, so it starts twice: from `start`, and, if known, from
-/// the scales of an unknown cause alone, where models are off by more.
+/// Evidence with blocks that may be free. Expectation-maximisation finds the nearest maximum, so it starts from `start`
+/// and, if known, from the scales of an unknown cause alone, where models are off by more.
 ScaledEvidence weigh_freely(const RobotFit& robot, const Hypothesis& hypothesis, const Fit& fit, const Scales& start,
                             const Scales* unknown_scales, double penalty_nats) {
   ScaledEvidence w = robot.weigh(hypothesis, fit, start, penalty_nats);
@@ -75,7 +75,7 @@ FreeBlock largest_deviation(const ScaledEvidence& w, const RegimeBasis& basis) {
   return most;
 }
 
-/// Effects that cannot show in these logs: they have no beat-averaged form, or change no row, as effects of the battery where none is logged.
+/// Effects without a beat-averaged form, or that change no row, as effects of the battery where none is logged.
 std::vector<std::string> untestable(const RobotFit& robot, const std::vector<std::string>& withheld) {
   std::vector<std::string> list;
   const model::Vehicle& vehicle = robot.uncertain().nominal();
@@ -138,7 +138,6 @@ double EffectFits::log_prior_of_one() const {
 /// Gain by chance of the last effect of a hypothesis, nats.
 double EffectFits::gain_by_chance(const ScoredHypothesis& a) const { return rule_.gain.chance_of(a.effects.back()); }
 
-/// Start of a fit: the screened coordinates of the effects, and the fitted parameters of the vehicle without effects.
 VectorXd EffectFits::start(const Hypothesis& h, const std::vector<ScreenedEffect>& set) const {
   VectorXd at = h.start();
   at.head(h.shared()) = robot_.parameters().at.head(h.shared());
@@ -173,8 +172,8 @@ ScoredHypothesis EffectFits::fitted(const std::vector<ScreenedEffect>& set, cons
   return a;
 }
 
-/// Fits the parameters again, jointly with the effects; keeps this fit if it explains more. Does nothing for a beat-averaged vehicle, which was
-/// fitted jointly at first.
+/// Refits the parameters jointly with the effects; keeps a better fit. A beat-averaged vehicle's are joint from the
+/// start.
 void EffectFits::move_parameters(const std::vector<ScreenedEffect>& set, const Fitter& fitter,
                                  ScoredHypothesis& a) const {
   if (!robot_.evidence().policy().move_parameters) return;
@@ -182,7 +181,7 @@ void EffectFits::move_parameters(const std::vector<ScreenedEffect>& set, const F
   take(h, fit_jointly(h, set, fitter), fitter.scales(), a);
 }
 
-/// Takes `fit` for the hypothesis, unless its vehicle could not be simulated or the present fit explains as much.
+/// Takes `fit` unless its vehicle could not be simulated or the present fit explains as much.
 void EffectFits::take(const Hypothesis& h, Fit fit, const Scales& scales, ScoredHypothesis& a) const {
   if (!fit.flown()) return;
   const ScaledEvidence w = robot_.weigh(h, fit, scales);
@@ -194,8 +193,7 @@ void EffectFits::take(const Hypothesis& h, Fit fit, const Scales& scales, Scored
   if (w.law_factor > 1) a.other_law = largest_deviation(w, robot_.evidence().basis());
 }
 
-/// A hypothesis with an effect that is fitted only linearly, so it counts for no gain. Where the flights say little of the effect, its posterior is
-/// near its prior.
+/// An effect fitted only linearly counts for no gain. Where flights say little of it, its posterior is near its prior.
 ScoredHypothesis EffectFits::linear(const ScreenedEffect& s) const {
   ScoredHypothesis a;
   a.kind = HypothesisKind::effect;
@@ -210,8 +208,7 @@ ScoredHypothesis EffectFits::linear(const ScreenedEffect& s) const {
   Posterior& p = a.fit.posterior;
   const Index first = h.shared();
   if (h.unknowns()[static_cast<std::size_t>(first)].low < 0) return a;
-  // the first magnitude cannot be negative: its mean given that it is positive, and the means of the others given that
-  // mean
+  // mean of the first magnitude given that it is positive, and means of the others given that mean
   const double mean = p.mean[first], sd = std::sqrt(p.covariance(first, first)), t = mean / sd;
   const double beyond =
       std::exp(-0.5 * t * t) / (std::sqrt(std::numbers::pi / 2) * std::erfc(-t / std::numbers::sqrt2));
@@ -219,7 +216,7 @@ ScoredHypothesis EffectFits::linear(const ScreenedEffect& s) const {
   return a;
 }
 
-/// Whether all magnitudes of one of the effects were fitted close to their values in the vehicle file.
+/// Whether all magnitudes of one effect were fitted close to their values in the vehicle file.
 bool EffectFits::vanished(const ScoredHypothesis& a) const {
   if (!a.fitted()) return true;
   const Hypothesis h(robot_.uncertain(), a.effects);
@@ -253,8 +250,7 @@ std::vector<ScoredHypothesis> EffectFits::single_effects(const ScreenedCatalogue
   std::vector<ScoredHypothesis> singles;
   std::vector<ScreenedEffect> open = catalogue.others;
   if (by_simulation) {
-    // finalists without a screened gain are fitted, too: where the parameters compensate for an effect, the linear
-    // model shows no gain
+    // finalists without screened gain are fitted, too: parameters that compensate hide the gain from the linear model
     std::vector<ScoredHypothesis> fits(finalists.size());
     io::parallel_for(fits.size(), threads_, [&](std::size_t i) { fits[i] = fitted({finalists[i]}, robot_.fitter()); });
     std::vector<std::size_t> order(fits.size());
@@ -291,8 +287,7 @@ void EffectFits::join_further(const std::function<bool(double, const std::string
   for (int n = 2; n <= options_.max_effects; ++n) {
     if (!progress(0.7 + 0.3 * (n - 1) / options_.max_effects, "fitting another jointly with " + best.effects.back()))
       break;
-    // further effects have to exceed the model discrepancy that is left with the best set in force, so the scales are
-    // found again
+    // further effects have to exceed the discrepancy left with the best set in force, so the scales are found again
     sets.scales = robot_.find_scales(Hypothesis(robot_.uncertain(), best.effects), best.fit, sets.scales);
     const Fitter fitter = robot_.fitter().with_scales(sets.scales);
     std::vector<MagnitudeColumn> others = robot_.magnitudes();

@@ -23,18 +23,19 @@ class EffectFits {
  public:
   EffectFits(const RobotFit& robot, const Baselines& baselines, const InferenceOptions& options, int threads);
 
-  /// A hypothesis for each effect, the best first. If `by_simulation`, finalists are fitted by simulation; all others are fitted linearly.
+  /// A hypothesis for each effect, the best first. Finalists are fitted by simulation if `by_simulation`; others
+  /// linearly.
   std::vector<ScoredHypothesis> single_effects(const ScreenedCatalogue& catalogue, bool by_simulation) const;
 
   struct Sets {
     std::vector<ScoredHypothesis> hypotheses;  ///< with one effect and with several, the best first
     Scales scales;                             ///< scales given the parameters alone
   };
-  /// Adds hypotheses with several effects: one effect after another joins the set that explains most, as long as it gains more than by chance.
+  /// Effects join the set that explains most, one after another, as long as it gains more than by chance.
   Sets combine(std::vector<ScoredHypothesis> singles,
                const std::function<bool(double, const std::string&)>& progress) const;
 
-  /// The hypotheses that explain most, with a remainder in addition to their effects; only those for which a remainder is found.
+  /// The hypotheses that explain most, with a remainder; only those for which one is found.
   std::vector<ScoredHypothesis> with_remainders(const std::vector<ScoredHypothesis>& hypotheses,
                                                 const Scales& scales) const;
 

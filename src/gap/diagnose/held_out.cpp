@@ -16,7 +16,7 @@ using Eigen::VectorXd;
 /// Length of a block of rows that is resampled; number of resamples; number of shifted copies.
 constexpr double kBlock_s = 2;
 constexpr int kDraws = 1000, kCopies = 20;
-/// Ridge of the regression on functions of rms 1, so that it stays determined where functions are nearly the same.
+/// Ridge on functions of rms 1, for functions may be nearly the same.
 constexpr double kRidge = 0.01;
 
 /// Type of a flight: its name without the number of the repetition, as "level_flight" for level_flight_2.
@@ -85,7 +85,7 @@ HeldOutError error_of(const Flights& flights, const Residuals& each, const Resid
   return e;
 }
 
-/// Rms of the residual of `y` in held-out flights, where y is fitted by one column `x` to the other flights by least squares; both [flight][beat].
+/// Rms in held-out flights of `y` fitted by the column `x` to the other flights; both [flight][beat].
 double left_given(const std::vector<std::vector<double>>& y, const std::vector<std::vector<double>>& x) {
   double sum = 0, n = 0;
   for (std::size_t out = 0; out < y.size(); ++out) {
@@ -107,8 +107,8 @@ void centre(std::vector<std::vector<double>>& v) {
     for (double& value : flight) value -= sum / n;
 }
 
-/// Controls of each effect of a set: the share of the rms that its contribution removes, given the other effects, and the largest share that shifted
-/// copies of this contribution remove.
+/// For each effect, the share of the rms that its contribution removes given the others, and the most that a shifted
+/// copy removes.
 void control(const Flights& flights, const FittedHypothesis& all, const VectorXd& at, int threads, Validation& to) {
   std::vector<VehicleHypothesis> vehicles = {all.hypothesis.vehicle(at)};
   for (const std::string& e : all.hypothesis.effects()) {
@@ -273,7 +273,6 @@ double mean_square(const Evidence& evidence, const Flights& flights, const Resid
 Validation validate(const Fitter& fitter, const sim::Randomisation& uncertain, const Flights& flights,
                     const Inference& d, int threads) {
   Validation v;
-  // the effects of the conclusion, added one by one
   std::vector<FittedHypothesis> fits = {{Hypothesis(uncertain, {}), &d.parameters}};
   std::vector<const Residuals*> left = {&d.refit};
   const std::vector<std::string>& effects = d.conclusion().effects;

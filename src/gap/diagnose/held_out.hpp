@@ -10,7 +10,7 @@ struct FittedHypothesis {
   const Fit* fit;
 };
 
-/// Residuals, [fit][flight]. Each flight is predicted by the fit to the flights of the other folds; if there is a single fold, by the fit to all.
+/// Residuals, [fit][flight], of predictions by the fit to the other folds, or to all flights if there is one fold.
 /// `fold`: [flight].
 std::vector<Residuals> held_out(const Fitter& fitter, const Flights& flights, const std::vector<FittedHypothesis>& fits,
                                 const std::vector<int>& fold, int threads);
@@ -19,14 +19,14 @@ std::vector<Residuals> held_out(const Fitter& fitter, const Flights& flights, co
 void hold_out(const Fitter& fitter, const sim::Randomisation& uncertain, const Flights& flights, int threads,
               Inference& d);
 
-/// The residual in each flight less the functions of the regime that are fitted to the residuals of the other flights by least squares. An estimate
-/// of what is left once all that depends on the regime is explained.
+/// Residuals less the functions of the regime that are fitted to the other flights by least squares: estimates what is
+/// left once all that depends on the regime is explained.
 Residuals smoothed_away(const Evidence& evidence, const Flights& flights, const Residuals& residual);
 /// Mean square of the beat means over all channels, in units of the noise variance.
 double mean_square(const Evidence& evidence, const Flights& flights, const Residuals& residual);
 
-/// Ladder, controls and agreements of the concluded effects (Validation). For the controls, the contribution of an effect is rotated in time within
-/// each flight by kMinShift rows or more; such a copy is fitted like the effect itself, to the other flights by least squares.
+/// Ladder, controls and agreements of the concluded effects. For the controls, an effect's contribution is rotated in
+/// time by kMinShift rows or more within each flight, and fitted like the effect to the other flights.
 inline constexpr std::size_t kMinShift = 50;
 Validation validate(const Fitter& fitter, const sim::Randomisation& uncertain, const Flights& flights,
                     const Inference& d, int threads);

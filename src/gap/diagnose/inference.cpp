@@ -12,10 +12,8 @@ namespace {
 
 using Eigen::VectorXd;
 
-/// Most halvings of a step to a vehicle that is not physical.
 constexpr int kMaxHalvings = 10;
 
-/// Calls the progress function of the options, and remembers whether it asked to stop.
 class Progress {
  public:
   explicit Progress(const InferenceOptions& options) : told_(options.progress) {}
@@ -30,12 +28,11 @@ class Progress {
   bool stopped_ = false;
 };
 
-/// The most probable coordinates of a fit without background magnitudes.
 VectorXd without_background(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit) {
   if (!fitter.evidence().policy().background_in_corrected)
     return fitter.joint_fit(hypothesis, fit, fitter.all_flights(), false).at;
   VectorXd at = fitter.refit_without_background(hypothesis, fit).at;
-  // parameters are fitted independently of each other, so together they may describe a body that cannot exist
+  // parameters are fitted one by one, so together they may describe a body that cannot exist
   for (int n = 0; n < kMaxHalvings && model::physical_fault(hypothesis.vehicle(at).vehicle); ++n)
     at = (at + fit.at) / 2;
   return at;

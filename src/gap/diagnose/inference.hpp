@@ -29,11 +29,11 @@ struct ScoredHypothesis {
   std::vector<FreeBlock> unexplained;     ///< blocks of an unknown cause, or of a remainder in addition to the effects
   std::vector<std::string> jointly_with;  ///< effects with which these blocks are fitted jointly
   Fit fit;                                ///< effects and parameters; without a residual if fitted only linearly
-  /// The largest deviation of an effect that acts by the place from the law of the catalogue. None: the law factor does not exceed 1.
+  /// The largest deviation of an effect by the place from the catalogue's law. None: the law factor does not exceed 1.
   std::optional<FreeBlock> other_law;
   Residuals held_out;  ///< [flight], with the fit to the other flights; empty if not fitted by simulation
-  /// Effects of another hypothesis whose fit predicts for this one: its own effects and further ones, whose gain may be due to chance. Empty:
-  /// its own fit predicts.
+  /// Effects of another hypothesis whose fit predicts for this one: its own effects and further ones, whose gain may be
+  /// due to chance. Empty: its own fit predicts.
   std::vector<std::string> predicted_with;
   bool fitted() const { return fit.flown(); }
   bool has_remainder() const { return !unexplained.empty(); }
@@ -51,7 +51,6 @@ struct InferenceOptions {
   VerdictRule rule = read_verdict_rule();
 };
 
-/// Results of all stages; a Diagnosis summarises them.
 struct Inference {
   bool complete = true;                      ///< false: stopped by `progress`
   std::vector<ScoredHypothesis> hypotheses;  ///< the most probable first

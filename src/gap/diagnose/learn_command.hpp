@@ -1,4 +1,3 @@
-// flappy-gap learn-discrepancy.
 #pragma once
 
 #include <string>
@@ -11,7 +10,7 @@ struct LearnCommand {
   std::vector<std::string> robots;  ///< folders, each with the flights of one robot
   int threads = 0;
 };
-/// Learns the model discrepancy (gap/evidence/learn_discrepancy.hpp) and writes it to `out`. io::InputError if a log has a fault.
+/// Writes the learnt model discrepancy to `out`. io::InputError if a log has a fault.
 void run_learn_discrepancy(const LearnCommand& command);
 
 }  // namespace flappy::gap

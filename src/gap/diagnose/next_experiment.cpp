@@ -16,7 +16,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// A hypothesis as fitted to the flights so far.
 struct Rival {
   std::string name;
   double probability;
@@ -39,7 +38,7 @@ std::string name_of(const ScoredHypothesis& a) {
 /// Number of the most probable rivals that have to survive a manoeuvre.
 constexpr std::size_t kSurvive = 4;
 
-/// Coordinates of a rival whose effect the flights leave open: the fitted parameters, and the root mean square of each magnitude.
+/// Coordinates of a rival left open: the fitted parameters, and the root mean square of each magnitude.
 VectorXd open_place(const Hypothesis& h, const Fit& fit, const VectorXd& parameters) {
   VectorXd at = fit.mean();
   at.head(h.shared()) = parameters;
@@ -76,7 +75,7 @@ struct Expected {
   BasisCoefficients law_sd;                  ///< standard deviation of the deviations of the laws of its effects
 };
 
-/// Columns along the directions of a rival for the parameters that all hypotheses share, from the columns of another rival: spares simulations.
+/// Columns along a rival's directions for the shared parameters, from another rival's columns: spares simulations.
 std::vector<BasisCoefficients> turned(const Fit& l, const Directions& directions, Index shared) {
   std::vector<BasisCoefficients> columns;
   const MatrixXd turn =
@@ -94,7 +93,7 @@ std::vector<BasisCoefficients> turned(const Fit& l, const Directions& directions
   return columns;
 }
 
-/// None if the simulation of the vehicle diverges. `first`: the linearisation of the first rival with parameters, whose columns serve the others.
+/// None if the simulation diverges. `first`: linearisation of the first rival with parameters; its columns serve all.
 std::optional<Expected> expect(const Rival& rival, const Fitter& fitter, std::optional<Fit>& first) {
   const bool with_parameters = rival.directions.reach.size() > 0;
   std::vector<BasisCoefficients> known;
@@ -138,8 +137,8 @@ double nats(const Evidence& evidence, const Expected& a, const Expected& b) {
   return Evidence::posterior(reduced, chosen, prior_mean).log_evidence - with;
 }
 
-/// Predictions of rivals that the flights so far leave open: the residual of the most probable rival, plus the change that their magnitudes make.
-/// All of them differ from one vehicle by their magnitudes alone, so each change is smooth and costs a single simulation.
+/// Predictions of rivals left open: the residual of the most probable rival plus the change by their magnitudes. They
+/// differ from one vehicle by magnitudes alone, so each change is smooth and costs one simulation.
 void add_open(const std::vector<Rival>& rivals, const Flights& flight, const Evidence& evidence,
               std::vector<std::optional<Expected>>& expected) {
   std::vector<std::size_t> open;
@@ -171,12 +170,11 @@ void add_open(const std::vector<Rival>& rivals, const Flights& flight, const Evi
   }
 }
 
-/// Time step of the courses in a proposal.
 constexpr double kCourseStep_s = 0.1;
 
 constexpr const char* kCourses[] = {"x_m", "y_m", "z_m", "amplitude_V", "difference_V", "bias_V", "split_cycle"};
 
-/// Courses of the quantities kCourses, [quantity][step]: means over kCourseStep_s; a step without samples repeats the one before.
+/// [quantity][step] means over kCourseStep_s; a step without samples repeats the one before.
 std::vector<std::vector<double>> course_of(const flightlog::FlightLog& log) {
   const flightlog::MocapStream& m = log.mocap;
   const flightlog::CommandStream& c = log.command;

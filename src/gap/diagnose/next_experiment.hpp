@@ -1,19 +1,17 @@
-// The next flight: the manoeuvre that best tells apart the hypotheses that are still probable, the rivals.
+// The next flight: the manoeuvre that best tells apart the rivals, the hypotheses that are still probable.
 //
-// The most probable vehicle flies each manoeuvre in our own simulator; each rival then predicts the log. Let Delta be the difference of the
-// predictions of two rivals A and B, each with its parameters and magnitudes as fitted to the flights so far. The expected evidence for A over B,
-// if A is true, is
-//   nats(A, B) = 1/2 Delta^T K^-1 Delta      K: covariance of the declared noise, of the model discrepancy (evidence.hpp), of the deviations of
-//                                            the laws of their effects, and of what is still uncertain of B
-// So the parameters and magnitudes of B may adapt to the new flight as far as the flights so far allow. The errors of B in old and new flights
-// are the same; their correlation is neglected, so this is a lower bound. If A is an effect that the flights so far leave open, its magnitude is
-// the root mean square of its posterior.
-// Let N_A be the nats of A over the most probable rival (for the most probable rival: over the next one), and D(N) the tempered factor on a rival
-// that is N nats behind (tempered in verdict.hpp). Then the probability p of a true A becomes p / (p + (1 - p) D(N_A)), and the expected
-// information of a manoeuvre is
-//   I = - sum over A of p_A log(p_A + (1 - p_A) D(N_A))
-// which is at most the entropy of the present probabilities: a manoeuvre that separates many rivals a little beats one that separates a single
-// rival well.
+// The most probable vehicle flies each manoeuvre in our simulator; each rival predicts the log. With Delta the
+// difference of the predictions of rivals A and B as fitted so far, the expected evidence for A over B, if A is true,
+// is
+//   nats(A, B) = 1/2 Delta^T K^-1 Delta      K: covariance of noise, model discrepancy (evidence.hpp), deviations of
+//                                            the laws of their effects, and what is still uncertain of B
+// So B may adapt to the new flight as far as the flights so far allow. The correlation of its errors in old and new
+// flights is neglected: a lower bound. For an effect left open, the magnitude is the root mean square of its posterior.
+// With N_A the nats of A over the most probable rival (for that one: over the next) and D(N) the tempered factor on a
+// rival N nats behind (verdict.hpp), the probability p of a true A becomes p / (p + (1 - p) D(N_A)). The expected
+// information,
+//   I = - sum over A of p_A log(p_A + (1 - p_A) D(N_A)),
+// is at most the entropy now: separating many rivals a little beats separating one well.
 #pragma once
 
 #include <filesystem>
@@ -31,7 +29,7 @@ struct Manoeuvre {
   rollout::FlyConfig config;
 };
 
-/// The configurations (*.toml) of a folder, sorted by name. io::InputError if there is none, or if one is faulty.
+/// The configurations (*.toml) of a folder by name. io::InputError if there is none or a faulty one.
 std::vector<Manoeuvre> read_manoeuvres(const std::filesystem::path& folder);
 
 struct NextOptions {
@@ -41,8 +39,9 @@ struct NextOptions {
   VerdictRule rule = read_verdict_rule();
 };
 
-/// The most informative manoeuvre first. Hypotheses with an unknown cause or a remainder are no rivals, for no vehicle simulates them. Empty if
-/// there are fewer than two rivals. Leaves out manoeuvres in which one of the four most probable rivals crashes.
+/// The most informative manoeuvre first; empty with fewer than two rivals. Hypotheses with an unknown cause or a
+/// remainder are no rivals: no vehicle simulates them. Leaves out manoeuvres in which one of the four most probable
+/// rivals crashes.
 std::vector<NextExperiment> rank_experiments(const Inference& inference, const sim::Randomisation& uncertain,
                                              const std::vector<Manoeuvre>& manoeuvres, const NextOptions& options = {});
 

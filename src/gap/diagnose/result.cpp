@@ -9,7 +9,7 @@
 namespace flappy::gap {
 namespace {
 
-/// Half width of the 90 % interval of a normal distribution, in standard deviations.
+/// Half width of a normal 90 % interval, in standard deviations.
 constexpr double kHalf90 = 1.645;
 /// Smallest error of a sensor that is reported, in prior standard deviations.
 constexpr double kMinSensorError = 0.25;
@@ -23,7 +23,6 @@ std::vector<std::pair<std::string, double>> moved_parameters(const Fit& fit, con
   return moved;
 }
 
-/// The most probable hypothesis that was fitted by simulation; null: none.
 const ScoredHypothesis* best_fitted(const Inference& d) {
   const auto best = std::ranges::find_if(d.hypotheses, &ScoredHypothesis::fitted);
   return best == d.hypotheses.end() ? nullptr : &*best;
@@ -34,7 +33,6 @@ UnexplainedTerm term_of(const FreeBlock& b, const RegimeBasis& basis) {
           basis.quantity(b.function), b.times,    b.gain_nats};
 }
 
-/// Adds the hypotheses with their losses, and the losses of the stages.
 void add_hypotheses(const RowContext& context, const sim::Randomisation& uncertain, const Inference& d, Diagnosis& r) {
   r.noise_floor = huber_floor();
   const Losses refit = losses_of(context, d.refit);

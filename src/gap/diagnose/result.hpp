@@ -1,4 +1,3 @@
-// Makes the result of a diagnosis from its inference.
 #pragma once
 
 #include <string>
@@ -11,11 +10,11 @@ namespace flappy::gap {
 /// The result for faulty data. `folders`: of the logs.
 Diagnosis result_of(const std::vector<std::string>& folders, std::vector<flightlog::DataFault> faults);
 
-/// The result without closed-loop check and proposed flight. `folders`: of the logs; `uncertain`: with the minor draws of the inference.
+/// The result without closed-loop check and proposed flight. `uncertain`: with the minor draws of the inference.
 Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flights,
                     const sim::Randomisation& uncertain, const Inference& inference);
 
-/// Estimates of the magnitudes and shape parameters of the effects of a hypothesis, with 90 % intervals.
+/// Magnitudes and shape parameters of the effects of a hypothesis, with 90 % intervals.
 std::vector<Estimate> estimates_of(const ScoredHypothesis& hypothesis, const sim::Randomisation& uncertain);
 
 }  // namespace flappy::gap

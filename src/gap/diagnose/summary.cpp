@@ -83,7 +83,7 @@ std::vector<ResidualLocation> one_of_each_test(const Diagnosis& r) {
   return list;
 }
 
-/// The quantity of the closed-loop check whose error the correction reduces most, as a share of the recorded value.
+/// The quantity whose error the correction reduces most, as a share of the recorded value.
 const ClosedLoop* most_corrected(const std::vector<ClosedLoop>& list) {
   const ClosedLoop* most = nullptr;
   double largest = 0;
@@ -95,7 +95,6 @@ const ClosedLoop* most_corrected(const std::vector<ClosedLoop>& list) {
   return most;
 }
 
-/// The error of a sensor: amount, sign and interval.
 std::string sensor_line(const Estimate& s) {
   const bool more = s.value > 0;
   const auto told = [&](const std::string& what, double factor, const char* unit, const std::string& how) {
@@ -134,7 +133,6 @@ std::vector<std::string> summary_of(const Diagnosis& r, const std::string& out) 
   for (const RankedHypothesis& c : r.hypotheses) ranked.push_back(&c);
   std::ranges::stable_sort(ranked, std::greater{}, &RankedHypothesis::probability);
   const bool named = r.verdict.kind == VerdictKind::effect || r.verdict.kind == VerdictKind::group;
-  // the most probable hypothesis of the verdict, whose magnitudes are shown
   const RankedHypothesis* concluded = nullptr;
   for (const RankedHypothesis* c : ranked)
     if (concluded == nullptr && named && c->kind == HypothesisKind::effect &&

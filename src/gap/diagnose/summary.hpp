@@ -1,4 +1,3 @@
-// The summary of a diagnosis for a person: the verdict, its reasons, and what to do next.
 #pragma once
 
 #include <string>
@@ -10,7 +9,7 @@ namespace flappy::gap {
 
 inline constexpr std::size_t kSummaryLines = 30;
 
-/// Lines of the summary, in general fewer than kSummaryLines. `out`: folder of the files; empty: none were written.
+/// The summary for a person, in general fewer than kSummaryLines lines. `out`: folder of the files; empty: none.
 std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::string& out);
 
 }  // namespace flappy::gap

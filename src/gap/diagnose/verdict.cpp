@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-/// Hypotheses are refuted only if functions of the regime explain more than this share of the residual of the parameters; less may be chance.
+/// Refuted only if the regime explains more than this share of the parameters' residual; less may be chance.
 constexpr double kMinExplainable = 0.15;
 constexpr double kRefuted = -1e9;
 
@@ -22,8 +22,7 @@ const ScoredHypothesis& parameters_alone(const std::vector<ScoredHypothesis>& al
   return *std::ranges::find(all, HypothesisKind::parameters, &ScoredHypothesis::kind);
 }
 
-/// Refutes hypotheses that explain too little of the part of the residual that depends on the regime, in held-out flights, however probable they are
-/// relative to their rivals.
+/// Refutes hypotheses that explain too little of what depends on the regime in held-out flights, however probable.
 void refute(const Evidence& evidence, const Flights& flights, double min_share, Inference& d) {
   const double refit = mean_square(evidence, flights, d.refit);
   const double explainable = refit - mean_square(evidence, flights, smoothed_away(evidence, flights, d.refit));
@@ -35,8 +34,8 @@ void refute(const Evidence& evidence, const Flights& flights, double min_share, 
   }
 }
 
-/// A background magnitude acts linearly, but an effect is simulated and may explain more. So that this difference does not count as evidence for
-/// the effect, a hypothesis without the effect may have it as background, too, at the log-prior cost of such magnitudes.
+/// A background magnitude acts linearly, while a simulated effect may explain more. So that this is no evidence for the
+/// effect, other hypotheses may have it as background, at the log-prior cost.
 void share_backgrounds(const RobotFit& robot, const Scales& scales, double penalty_nats,
                        std::vector<ScoredHypothesis>& all) {
   const double before = parameters_alone(all).log_evidence;
@@ -69,7 +68,6 @@ void share_backgrounds(const RobotFit& robot, const Scales& scales, double penal
       b.predicted_with = a.predicted_with.empty() ? a.effects : a.predicted_with;
     }
   }
-  // effects that were not fitted keep their evidence relative to the parameters
   for (ScoredHypothesis& b : all)
     if (b.kind == HypothesisKind::effect && !b.fitted()) b.log_evidence += parameters_alone(all).log_evidence - before;
 }

@@ -1,5 +1,4 @@
-// The constants by which evidence becomes a verdict. Members are tables and keys of configs/gap/verdict.toml, which explains each constant and how
-// it was learnt.
+// The constants by which evidence becomes a verdict: tables and keys of configs/gap/verdict.toml, which explains them.
 #pragma once
 
 #include <algorithm>

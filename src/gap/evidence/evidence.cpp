@@ -68,7 +68,7 @@ Evidence::Evidence(const Flights& flights, ModelDiscrepancy discrepancy, int thr
       groups_[static_cast<std::size_t>(g)].signal = n > 0 ? sum / n : 0;
       all += groups_[static_cast<std::size_t>(g)].signal / kCoefficients;
     }
-    // average of the group's own mean square and its channel's: an error of the waveform moves power between harmonics
+    // the group's own mean square averaged with its channel's: errors of the waveform move power between harmonics
     for (int c = 0; c < kCoefficients; ++c) {
       double& s = groups_[static_cast<std::size_t>(channel) * kCoefficients + static_cast<std::size_t>(c)].signal;
       s = std::sqrt((s + all) / 2);
@@ -131,7 +131,7 @@ Rows Evidence::without(std::size_t flight, Rows residual, const BasisCoefficient
   return residual;
 }
 
-/// Calls use(beat, whether the beat before counts) for the beats of a flight that a channel covers.
+/// Calls use(beat, whether the beat before counts) for the beats that a channel covers.
 template <class Use>
 void Evidence::for_rows(std::size_t flight, int channel, const Use& use) const {
   const PredictedFlight& f = this->flight(flight);
@@ -195,7 +195,7 @@ void Evidence::learn(const Residuals& residual, Learn what) {
   });
 }
 
-/// Calls use(beat, now, past) for the rows of a group: the whitened row is now x (this row) - past x (the row of the beat before).
+/// Calls use(beat, now, past) for the rows of a group: whitened row = now x (this row) - past x (the beat before's).
 template <class Use>
 void Evidence::for_whitened(std::size_t flight, int group, const Use& use) const {
   const Group& g = groups_[static_cast<std::size_t>(group)];

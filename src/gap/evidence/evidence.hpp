@@ -1,13 +1,12 @@
-// How probable residuals are under a hypothesis, in closed form.
-//
-// Rows (gap/replay/beat_rows.hpp) form groups: one channel, one coefficient of the beat. In a group, over the beats of a flight,
+// How probable residuals are under a hypothesis, in closed form. Rows (gap/replay/beat_rows.hpp) form groups: one
+// channel, one coefficient of the beat. In a group, over the beats of a flight,
 //   residual = regressors theta + basis delta + noise
-//   theta  the unknowns of the hypothesis, standard normal a priori, shared by all groups
-//   delta  the model discrepancy: what every model of a flapping wing gets wrong, a smooth function of input and motion (RegimeBasis) in each
-//          group, N(0, (share x signal)^2); an effect has to explain more than this
-//   noise  first-order autoregressive from beat to beat, with a standard deviation and an autocorrelation of its own in each group, learnt from
-//          what even the whole basis does not explain; heavy-tailed: rows far off count less (Student t)
-// theta and delta are integrated out (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, ch. 2.7), so
+//   theta  unknowns of the hypothesis, standard normal a priori, shared by all groups
+//   delta  model discrepancy: what every model gets wrong, a smooth function of input and motion (RegimeBasis),
+//          N(0, (share x signal)^2); an effect has to explain more than this
+//   noise  first-order autoregressive over beats; standard deviation and autocorrelation of each group, learnt from
+//          what the whole basis leaves; heavy-tailed: rows far off count less (Student t)
+// theta and delta are integrated out (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, ch. 2.7):
 //   log p(residual) = -1/2 r^T K^-1 r - 1/2 log det K + const
 #pragma once
 
@@ -29,7 +28,6 @@ class RegimeBasis {
   explicit RegimeBasis(const Flights& flights);
   int size() const { return static_cast<int>(functions_.size()); }
   const std::string& name(int i) const { return function(i).name; }
-  /// The quantity of the regime that the function depends on (RegimeFunction).
   const std::string& quantity(int i) const { return function(i).quantity; }
   BasisFunction kind(int i) const { return function(i).kind; }
   /// [beat][size()].
@@ -45,7 +43,7 @@ class RegimeBasis {
   std::vector<Eigen::MatrixXd> values_;
 };
 
-/// The part of rows that is a smooth function of the regime, as coefficients of the basis: [group][basis].
+/// The part of rows that is a smooth function of the regime: [group][basis].
 using BasisCoefficients = Eigen::MatrixXd;
 
 /// Regressors; the priors of their coefficients are normal with standard deviation 1.
@@ -103,11 +101,11 @@ class Evidence {
   /// With the noise that the headers declare. Keeps a reference to `flights`.
   Evidence(const Flights& flights, ModelDiscrepancy discrepancy, int threads);
 
-  /// Learns the noise from the residual of a good fit: standard deviation, autocorrelation, and the weights of outliers.
+  /// Learns standard deviation, autocorrelation and weights of outliers from the residual of a good fit.
   Evidence with_noise(const Residuals& residual) const;
   /// Learns only the weights of outliers: for residuals that are larger than the noise.
   Evidence with_weights(const Residuals& residual) const;
-  /// Learns the noise from the whole residual, including its smooth part. From then on, scales stay 1, except those of free blocks.
+  /// Learns the noise from the whole residual, with its smooth part. From then on, scales stay 1 except of free blocks.
   Evidence with_remainder(const Residuals& residual) const;
   Evidence with_discrepancy(ModelDiscrepancy discrepancy) const;
 
@@ -115,8 +113,8 @@ class Evidence {
   const ModelDiscrepancy& discrepancy() const { return discrepancy_; }
   const DiagnosisPolicy& policy() const { return flights_->front()->policy(); }
 
-  /// Coefficients of rows on the basis, by least squares. Differences of simulations are rough, for a small change of a parameter moves the step in
-  /// which a wing meets its stop; what is not a smooth function of the regime is noise under every hypothesis.
+  /// Coefficients of rows on the basis, by least squares. Simulated differences are rough, as a small change moves the
+  /// step in which a wing meets its stop; what is not smooth in the regime is noise under every hypothesis.
   BasisCoefficients basis_coefficients(const Residuals& rows) const;
   SufficientStatistics statistics(const Residuals& residual) const;
   /// Adds `share` times a smooth change to the residual of `to`.
@@ -126,17 +124,18 @@ class Evidence {
 
   /// Prior standard deviation of the discrepancy coefficients, [group][basis].
   BasisCoefficients discrepancy_sd(const Scales& scales) const;
-  /// Integrates delta out. `use`: [flight] whether it counts. `discrepancy_sd`: [group][basis]. `known`: sums of products of the regressors from an
-  /// earlier call; null: computed.
+  /// Integrates delta out. `use`: [flight] whether it counts. `discrepancy_sd`: [group][basis]. `known`: sums of
+  /// products of the regressors from an earlier call; null: computed.
   Reduced reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& regressors,
                  const std::vector<char>& use, const BasisCoefficients& discrepancy_sd,
                  const Eigen::MatrixXd* known = nullptr) const;
-  /// Posterior of the coefficients of the chosen regressors, which have the given prior means and prior standard deviation 1.
+  /// Posterior of the chosen regressors' coefficients, with prior standard deviation 1.
   static Posterior posterior(const Reduced& reduced, const std::vector<int>& chosen, const Eigen::VectorXd& prior_mean,
                              bool covariance = true);
 
-  /// Expectation-maximisation over the scales, from `start` on (gap/evidence/weigh.cpp). `law_sd`: [group][basis] standard deviation of the
-  /// deviations of the effects' laws, which no scale changes; empty: 0. `unknown_penalty_nats`: penalty of each free block; none: no block is free.
+  /// Expectation-maximisation over the scales from `start` on (weigh.cpp). `law_sd`: [group][basis] standard deviation
+  /// of the deviations of the effects' laws, which no scale changes; empty: 0. `unknown_penalty_nats`: penalty of each
+  /// free block; none: no block is free.
   ScaledEvidence weigh(const SufficientStatistics& residual, const Regressors& regressors, const std::vector<char>& use,
                        const BasisCoefficients& law_sd, const Scales& start,
                        std::optional<double> unknown_penalty_nats = {}, int max_iterations = kMaxIterations) const;
@@ -145,7 +144,6 @@ class Evidence {
   static double scale_cost_nats(double times, ScalePrior prior, const Scales& scales);
   static int block_of(int group, BasisFunction function);
 
-  /// Standard deviation of the noise of a row.
   double noise_sd(int group) const;
   /// Rms of the signal of a group; its mean square is averaged with that of its channel.
   double signal(int group) const { return groups_[static_cast<std::size_t>(group)].signal; }

@@ -14,21 +14,19 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Reach of the first differences. Later ones reach kReachSd standard deviations of the posterior, within bounds: a step has to be long where the
-/// posterior is wide and short where it is narrow.
+/// First differences reach kFirstReach; later ones kReachSd standard deviations of the posterior, within bounds.
 constexpr double kFirstReach = 0.3, kMinReach = 0.1, kMaxReach = 1, kReachSd = 3;
-/// Number of points around the point of a fit over which statistics are averaged, and their distance in reaches.
+/// Statistics are averaged over this many points around that of a fit; their distance in reaches.
 constexpr int kAround = 8;
 constexpr double kAroundReach = 0.2;
 /// A smaller step ends the iteration.
 constexpr double kConverged = 0.02;
-/// Nuisance regressors with less information, in units of their prior precision, are left out: they matter some hundredths of a nat.
+/// Nuisance regressors with less information, in prior precisions, are left out: they matter hundredths of a nat.
 constexpr double kMinInformation = 0.05;
 /// Largest distance, in reaches, at which the columns of another point are used.
 constexpr double kMaxDistance = 2;
-/// A change follows a function of the place if its square along that function is at least this share of the largest square along any of them.
+/// A change follows a function of the place if its square along it is at least this share of the largest.
 constexpr double kFollows = 0.1;
-/// Iterations of a fit of the effects alone.
 constexpr int kMaxEffectSteps = 2;
 constexpr int kMaxWithoutBackground = 6;
 
@@ -81,7 +79,7 @@ const BasisCoefficients* Fitter::linear_column(const Hypothesis& hypothesis, Ind
   return linear == linear_.end() ? nullptr : &linear->second;
 }
 
-/// Steps along the directions from `at` to points around it; adds the vehicles of these points.
+/// Steps along the directions to points around `at`; adds the vehicles of these points.
 std::vector<VectorXd> Fitter::around(const Hypothesis& hypothesis, const VectorXd& at, const Directions& directions,
                                      const std::vector<BasisCoefficients>& known,
                                      std::vector<VehicleHypothesis>& vehicles) const {
@@ -91,8 +89,7 @@ std::vector<VectorXd> Fitter::around(const Hypothesis& hypothesis, const VectorX
     VectorXd shift = VectorXd::Zero(k);
     for (Index d = 0; d < k; ++d) {
       if (static_cast<std::size_t>(d) < known.size() && known[static_cast<std::size_t>(d)].size() == 0) continue;
-      // columns of a Hadamard matrix without its first: each direction goes up as often as down, and any seven
-      // consecutive directions are orthogonal
+      // Hadamard columns but the first: each direction goes up as often as down, any seven in a row are orthogonal
       const int sign = __builtin_popcount(static_cast<unsigned>((d % (kAround - 1) + 1) & i)) % 2 ? -1 : 1;
       shift[d] = kAroundReach * sign * directions.reach[d];
     }
@@ -103,8 +100,8 @@ std::vector<VectorXd> Fitter::around(const Hypothesis& hypothesis, const VectorX
   return shifts;
 }
 
-/// Averages the statistics over points around the fit, for the residual at one point is rough. The columns take each point back to the fit, so
-/// nothing is averaged if a column is missing.
+/// The residual at one point is rough, so statistics are averaged over points around. The columns take each point back
+/// to the fit; nothing is averaged if one is missing.
 void Fitter::average(const std::vector<Residuals>& rows, const std::vector<VectorXd>& shifts, Fit& l) const {
   for (Index d = 0; !shifts.empty() && d < shifts[0].size(); ++d)
     if (shifts[0][d] != 0 && l.columns[static_cast<std::size_t>(d)].size() == 0) return;
@@ -220,7 +217,7 @@ Regressors Fitter::unscaled_regressors(const Fit& fit) const {
   return r;
 }
 
-/// Change by all magnitudes of each effect, in linear approximation. Effects of sensors are left out, for their laws are known.
+/// Linear change by each effect's magnitudes. Effects of sensors are left out, for their laws are known.
 std::map<std::string, BasisCoefficients> Fitter::changes(const Hypothesis& hypothesis, const Fit& fit) const {
   std::map<std::string, BasisCoefficients> whole;
   for (Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
@@ -245,10 +242,10 @@ bool Fitter::acts_by_place(const Hypothesis& hypothesis, const Fit& fit) const {
                              [&](const auto& change) { return law_sd_of(change.second, 1).any(); });
 }
 
-/// The law of an effect that acts by the place (near surfaces, at a tether, in time) may deviate from the catalogue's in more than its magnitude. An
-/// effect acts by the place if more than half of its change follows functions of the place. Along each function of the place that the change follows,
-/// each load of the body may deviate by the rms of the loads times the law factor. Along functions that the change hardly follows, the law factor
-/// does not count: it may be large, and then a heating motor would explain loads that depend on the heading.
+/// The law of an effect by the place (near surfaces, at a tether, in time) may deviate from the catalogue's. An effect
+/// acts by the place if more than half of its change follows functions of the place; along each of these, each load may
+/// deviate by the rms of the loads times the law factor. Elsewhere the factor, which may be large, does not count, or a
+/// heating motor would explain loads that depend on the heading.
 BasisCoefficients Fitter::law_sd_of(const BasisCoefficients& change, double law_factor) const {
   const RegimeBasis& basis = evidence_->basis();
   BasisCoefficients sd = BasisCoefficients::Zero(change.rows(), change.cols());
@@ -307,7 +304,7 @@ Reduced Fitter::reduce(const Fit& fit, const Regressors& r) const {
   return evidence_->reduce(fit.statistics, r.columns, all_flights(), evidence_->discrepancy_sd(scales_));
 }
 
-/// Posterior along all directions. `damping`: precision that is added around the present point (Levenberg); if not 0, without a covariance.
+/// `damping`: precision added around the present point (Levenberg); if not 0, without a covariance.
 Posterior Fitter::solve(const Fit& fit, const Regressors& r, Reduced reduced, double damping) const {
   std::vector<Index> seen;
   for (std::size_t d = 0; d < fit.columns.size(); ++d)
@@ -332,7 +329,6 @@ double Fitter::cost(const Regressors& nuisances, const MatrixXd& sums, const Suf
          Evidence::posterior(reduced, nuisances.all, nuisances.prior_mean(), false).log_evidence;
 }
 
-/// Directions of the parameters of another fit, and the coordinates of the effects.
 Directions Fitter::joint_directions(const Hypothesis& hypothesis, const Fit& parameters) {
   Directions d = axes(hypothesis);
   const Index shared = hypothesis.shared();
@@ -414,8 +410,8 @@ Fit Fitter::refit_without_background(const Hypothesis& hypothesis, const Fit& be
   return without.improve(hypothesis, before, kMaxWithoutBackground, &before, true);
 }
 
-/// Gauss-Newton. Columns are kept while the steps stay close to the point where they were computed; the last point gets columns of its own.
-/// `columns_are_here`: whether the columns of `fit` were computed at its point.
+/// Gauss-Newton. Columns are kept while steps stay close; the last point gets its own. `columns_are_here`: `fit` has
+/// its own.
 Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, const Fit* parameters,
                     bool columns_are_here) const {
   if (!fit.flown()) return fit;
@@ -441,15 +437,14 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, c
     const VectorXd step = fit.directions.axes * fit.posterior.mean;
     bool improved = n < max_iterations && step.cwiseAbs().maxCoeff() >= kConverged;
     if (improved) {
-      // shares of the step, and damped steps, which are shorter in directions with little information; all are tried at
-      // once
+      // shares of the step, and damped steps, shorter where there is little information; all are tried at once
       constexpr double kShares[] = {1.4, 1, 0.7, 0.5, 0.35, 0.25, 0.1, 0.03},
                        kDampings[] = {0.3, 1, 3, 10, 30, 100, 300, 1000};
       std::vector<VectorXd> tries;
       for (const double share : kShares) tries.push_back(hypothesis.bounded(fit.at + share * step));
       for (const double damping : kDampings)
         tries.push_back(hypothesis.bounded(fit.at + fit.directions.axes * solve(fit, r, reduced, damping).mean));
-      // effects of sensors keep their present values, so that all tries share one log; their changes are added linearly
+      // effects of sensors keep their values, so that all tries share one log; their changes are added linearly
       std::vector<VehicleHypothesis> vehicles;
       for (VectorXd at : tries) {
         at(in_log) = fit.at(in_log);

@@ -1,5 +1,5 @@
-// Finds the most probable unknowns of a hypothesis by Gauss-Newton on the rows of whole flights. Derivatives are differences between vehicles
-// that are simulated together, as lanes of a batch.
+// Finds the most probable unknowns of a hypothesis by Gauss-Newton on whole flights. Derivatives are differences
+// between vehicles that are simulated together, as lanes of a batch.
 #pragma once
 
 #include <map>
@@ -22,7 +22,7 @@ struct Fit {
   Directions directions;
   Residuals residual;               ///< empty: not simulated, or the simulation diverged
   SufficientStatistics statistics;  ///< statistics of the residual, averaged over points around `at`
-  /// [direction] change of the prediction for a unit along the direction; empty if the simulation diverges there.
+  /// [direction] change of the prediction per unit along it; empty if the simulation diverges there.
   std::vector<BasisCoefficients> columns;
   double law_factor = 1;  ///< by how much the laws of its effects may deviate from the catalogue's (Fitter::law_sd)
   Posterior posterior;    ///< along the directions, relative to `at`
@@ -38,7 +38,7 @@ struct Background {
   BasisCoefficients column;
 };
 
-/// Fits hypotheses to flights, given their evidence, nuisance regressors, and scales. Immutable: with_... return a changed copy.
+/// Fits hypotheses, given evidence, nuisance regressors and scales. Immutable: with_... return a changed copy.
 class Fitter {
  public:
   /// Columns of magnitudes by [effect, name].
@@ -47,10 +47,10 @@ class Fitter {
   /// Without nuisance regressors; scales are 1. Keeps a reference to `flights`.
   Fitter(const Flights& flights, std::shared_ptr<const Evidence> evidence, int threads);
   Fitter with_evidence(std::shared_ptr<const Evidence> evidence) const;
-  /// Regressors that are fitted jointly with every hypothesis: `nuisances`, then background magnitudes, including those of effects that a hypothesis
-  /// names. Regressors on which the flights have no information, given `fit`, are left out.
+  /// Fits `nuisances`, then background magnitudes, jointly with every hypothesis, even those of effects that it names.
+  /// Leaves out regressors on which the flights have no information, given `fit`.
   Fitter with_nuisances(const Regressors& nuisances, const std::vector<Background>& background, const Fit& fit) const;
-  /// Columns of magnitudes that act linearly, so that they need not be simulated.
+  /// Columns of magnitudes that act linearly and need not be simulated.
   Fitter with_linear_magnitudes(LinearMagnitudes magnitudes) const;
   Fitter with_scales(Scales scales) const;
 
@@ -72,47 +72,44 @@ class Fitter {
 
   /// The columns of a fit, without empty ones.
   static Regressors own_regressors(const Fit& fit);
-  /// The columns of a fit, then nuisances and background magnitudes with the scales of this robot. An effect that a hypothesis names has its
-  /// background magnitude as well, for the model of the robot may have errors along the effect.
+  /// The columns of a fit, then nuisances and background magnitudes with the robot's scales. A named effect keeps its
+  /// background, as the model may have errors along it.
   Regressors regressors(const Fit& fit) const;
   /// As regressors(), with scales of 1.
   Regressors unscaled_regressors(const Fit& fit) const;
 
   /// Posterior along all directions of a fit, from some flights alone. `use`: [flight] whether it counts.
   Posterior posterior(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
-  /// The most probable coordinates from some flights alone, and the part of the residual that nuisance regressors then explain.
+  /// The most probable coordinates from some flights alone, and the part of the residual that nuisances then explain.
   struct JointFit {
     Eigen::VectorXd at;
     BasisCoefficients nuisances;
   };
   JointFit joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use,
                      bool with_background = true) const;
-  /// Standard deviation, [group][basis], of the deviations of the laws of effects that act by the place from the catalogue's laws.
+  /// Standard deviation, [group][basis], of the deviations of effects that act by the place from the catalogue's laws.
   BasisCoefficients law_sd(const Hypothesis& hypothesis, const Fit& fit) const {
     return law_sd(hypothesis, fit, fit.law_factor);
   }
   BasisCoefficients law_sd(const Hypothesis& hypothesis, const Fit& fit, double law_factor) const;
-  /// Whether one of its effects acts by the place.
   bool acts_by_place(const Hypothesis& hypothesis, const Fit& fit) const;
 
   /// A fit without a posterior. `known`: columns of the first directions, which are not simulated again.
   Fit linearise(const Hypothesis& hypothesis, const Eigen::VectorXd& at, Directions directions,
                 const std::vector<BasisCoefficients>& known = {}) const;
-  /// One direction for each coordinate.
   static Directions axes(const Hypothesis& hypothesis);
   /// At most `max_iterations` iterations from `start` on. Not flown() if the simulation diverges at the start.
   Fit fit(const Hypothesis& hypothesis, Eigen::VectorXd start, int max_iterations) const;
   /// As fit(), with the directions and columns of another fit for the parameters.
   Fit fit_given(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters,
                 int max_iterations) const;
-  /// Fits the effects alone, with the parameters of another fit, so that all effects are compared with the same columns of the parameters.
+  /// Fits the effects alone, so that all effects are compared with the same columns of the parameters.
   Fit fit_effects(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters) const;
-  /// Continues another fit, along its directions.
+  /// This and the next continue another fit, along its directions.
   Fit refit(const Hypothesis& hypothesis, const Fit& before, int max_iterations) const;
-  /// Continues another fit, along its directions, without background magnitudes.
   Fit refit_without_background(const Hypothesis& hypothesis, const Fit& before) const;
-  /// A linear fit without a residual, around the magnitudes of the vehicle file. `effects`: columns of the unknowns of the effects; an unknown with
-  /// an empty column is not fitted.
+  /// A linear fit without a residual, around the magnitudes of the vehicle file. `effects`: columns of the unknowns of
+  /// the effects; an unknown with an empty column is not fitted.
   Fit fit_linear(const Hypothesis& hypothesis, const Fit& parameters,
                  const std::vector<BasisCoefficients>& effects) const;
 
@@ -136,7 +133,6 @@ class Fitter {
   double cost(const Regressors& nuisances, const Eigen::MatrixXd& sums, const SufficientStatistics& residual,
               const Eigen::VectorXd& at) const;
 
-  /// A nuisance regressor or a background magnitude.
   struct Nuisance {
     BasisCoefficients column, scaled;
     double prior_mean;
@@ -151,7 +147,7 @@ class Fitter {
   Scales scales_;
   LinearMagnitudes linear_;
   std::vector<Nuisance> nuisances_;
-  /// Indices in `nuisances` of with_nuisances of those that were not left out; they come first in nuisances_.
+  /// Indices in `nuisances` of with_nuisances, without those left out; these come first in nuisances_.
   std::vector<std::size_t> places_;
   std::vector<std::string> effects_;
 };

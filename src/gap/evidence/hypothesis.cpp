@@ -7,11 +7,11 @@
 namespace flappy::gap {
 namespace {
 
-/// Prior standard deviation of the IMU's lag: a header does not say whether a sample is instantaneous, averaged, or held.
+/// Prior of the IMU's lag: a header does not say whether a sample is instantaneous, averaged, or held.
 constexpr double kImuLagSd_s = 5e-4;
 /// Largest deviation of a parameter, in standard deviations.
 constexpr double kMaxDeviation = 4;
-/// Half width of the 90 % interval of a normal distribution, which is also the 90 % quantile of a half-normal one, in standard deviations.
+/// Half width of a normal 90 % interval, also the 90 % quantile of a half-normal, in standard deviations.
 constexpr double kHalf90 = 1.645;
 
 }  // namespace

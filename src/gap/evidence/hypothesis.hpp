@@ -1,5 +1,5 @@
-// The unknowns of a hypothesis, as coordinates that are standard normal a priori: the uncertain parameters of the vehicle, the lag of the IMU,
-// and the magnitudes and shape parameters of the effects it assumes.
+// The unknowns of a hypothesis as coordinates, standard normal a priori: the vehicle's uncertain parameters, the lag of
+// the IMU, the magnitudes and shape parameters of its effects.
 #pragma once
 
 #include <Eigen/Dense>
@@ -38,17 +38,17 @@ class Hypothesis {
   const std::vector<std::string>& effects() const { return effects_; }
   const std::vector<Unknown>& unknowns() const { return unknowns_; }
   Eigen::Index size() const { return static_cast<Eigen::Index>(unknowns_.size()); }
-  /// The first unknowns are the vehicle's parameters, the same for every hypothesis; then the IMU's lag; then those of the effects.
+  /// Unknowns: the vehicle's parameters, the same for every hypothesis; the IMU's lag; those of the effects.
   Eigen::Index parameters() const { return static_cast<Eigen::Index>(uncertain_->majors()); }
   Eigen::Index lag() const { return parameters(); }
   Eigen::Index shared() const { return parameters() + 1; }
-  /// Coordinates of a vehicle. An effect that the vehicle lacks has magnitudes of 0, and shape parameters in the middle of their prior.
+  /// Coordinates of a vehicle. Effects that it lacks have magnitudes of 0, and shape parameters in mid-prior.
   Eigen::VectorXd start(const model::Vehicle& vehicle) const;
   Eigen::VectorXd start() const { return start(uncertain_->nominal()); }
   /// The nearest coordinates within the accepted ranges.
   Eigen::VectorXd bounded(Eigen::VectorXd coordinates) const;
 
-  /// `minor`: a minor draw of the randomisation, and by how many standard deviations it is moved.
+  /// `minor`: a minor draw, and by how many standard deviations it is moved.
   VehicleHypothesis vehicle(const Eigen::VectorXd& coordinates,
                             std::optional<std::pair<std::size_t, double>> minor = {}) const;
 

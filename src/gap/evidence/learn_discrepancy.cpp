@@ -26,12 +26,12 @@ struct Moment {
 };
 using Shares = std::array<std::array<std::array<Moment, kKinds>, kHarmonics + 1>, kChannels>;
 
-/// Scales of the background magnitudes of a robot, by effect; they make the prior of the background magnitudes heavy-tailed.
+/// [effect] Scales of a robot's background magnitudes; they make their prior heavy-tailed.
 using Factors = std::map<std::string, double>;
 
 using Robots = std::vector<std::unique_ptr<const RobotFit>>;
 
-/// Expected squares of the discrepancy coefficients and of the background magnitudes over all robots, given the model discrepancy `now`.
+/// Expected squares of the coefficients and background magnitudes over all robots, given `now`.
 void expect(const Robots& robots, const ModelDiscrepancy& now, Shares& shares,
             std::map<std::string, Moment>& backgrounds, std::vector<Factors>& factors) {
   factors.resize(robots.size());
@@ -103,7 +103,7 @@ void shrink(Shares& shares) {
       }
 }
 
-/// The class of regimes in which the background of each effect is largest, in units of the model discrepancy.
+/// The class of regimes in which each effect's background is largest, in units of the model discrepancy.
 std::map<std::string, std::size_t> classes_of(const Robots& robots, const ModelDiscrepancy& now) {
   std::map<std::string, std::array<double, kClasses>> sums;
   for (const auto& robot : robots) {
@@ -122,8 +122,8 @@ std::map<std::string, std::size_t> classes_of(const Robots& robots, const ModelD
   return classes;
 }
 
-/// Averages the variance of each effect with the median of its class. The robots come from few simulators, and the errors of each simulator look like
-/// a few effects; the median is insensitive to those.
+/// Averages each effect's variance with the median of its class. The median ignores the few effects that the errors of
+/// the few simulators behind the robots look like.
 void shrink(const std::map<std::string, std::size_t>& classes, std::map<std::string, Moment>& backgrounds) {
   std::array<std::vector<double>, kClasses> of_class;
   for (const auto& [effect, m] : backgrounds) of_class[classes.at(effect)].push_back(m.sum / m.count);

@@ -1,4 +1,4 @@
-// Learns the model discrepancy from robots that are trusted: their flights contain nothing that the vehicle file lacks.
+// Learns the model discrepancy from trusted robots: their flights contain nothing that the vehicle file lacks.
 #pragma once
 
 #include <string>
@@ -8,10 +8,10 @@
 
 namespace flappy::gap {
 
-/// Finds the prior standard deviations of the discrepancy coefficients, by channel, harmonic and kind of function, and of the background magnitudes
-/// that make the residuals of all robots most probable: expectation-maximisation from `start` on, whose other parameters stay. Each robot is fitted
-/// first. At the end, estimates are shrunk towards those of like channels and effects, for single estimates rest on few coefficients. `flights`:
-/// [robot]. io::InputError after Ctrl-C.
+/// Prior standard deviations of coefficients, by channel, harmonic and kind, and of background magnitudes that make all
+/// residuals most probable: each robot is fitted, then expectation-maximisation runs from `start`, whose other
+/// parameters stay. Estimates are shrunk towards like ones, as each rests on few coefficients. `flights`: [robot].
+/// io::InputError after Ctrl-C.
 ModelDiscrepancy learn_discrepancy(const std::vector<Flights>& flights, const sim::Randomisation& uncertain,
                                    const ModelDiscrepancy& start, int threads);
 

@@ -1,5 +1,5 @@
-// The model discrepancy: what every model of a flapping wing gets wrong, before anything is known of a vehicle (Kennedy and O'Hagan 2001). Its
-// parameters, and how they were learnt, stand in configs/gap/model_discrepancy.toml.
+// The model discrepancy: what every model gets wrong before anything is known of a vehicle (Kennedy and O'Hagan 2001).
+// configs/gap/model_discrepancy.toml has its parameters and how they were learnt.
 #pragma once
 
 #include <array>
@@ -13,19 +13,19 @@
 
 namespace flappy::gap {
 
-/// Classes of kinds of functions of the regime; functions of a class share a scale in each channel and harmonic.
+/// Classes of kinds of functions; those of a class share a scale in each channel and harmonic.
 enum class Regimes { always, inputs, velocity, place, count };
 Regimes regimes_of(BasisFunction function);
 
-/// Prior of a scale: inverse gamma for its square, centred on 1 or, if it follows the robot, on the scale of the robot.
+/// Inverse gamma for the square of a scale, centred on 1 or, if it follows the robot, on the robot's scale.
 struct ScalePrior {
   double freedom = 0;  ///< degrees of freedom
   bool follows_robot = false;
 };
 
 struct ModelDiscrepancy {
-  /// Priors of the scales by which models of one robot are off by more or less than those of others: log robot ~ N(0, robot_sd^2), and
-  /// (block / robot)^2 ~ inverse gamma for each class of regimes in a channel and harmonic, so that the model discrepancy has heavy tails.
+  /// Priors of how far models of one robot are off: log robot ~ N(0, robot_sd^2); (block / robot)^2 ~ inverse gamma for
+  /// each class of regimes in a channel and harmonic: heavy tails.
   struct Spread {
     double robot_sd;
     double block_freedom;
@@ -39,15 +39,14 @@ struct ModelDiscrepancy {
     double sd;
   };
   std::vector<Nuisance> nuisances;
-  /// Prior standard deviation of the coefficients of functions of this kind, as a share of the channel's signal.
+  /// Prior sd of the coefficients of functions of this kind, as a share of the channel's signal.
   double share(int channel, int harmonic, BasisFunction function) const {
     return shares[static_cast<std::size_t>(channel)][static_cast<std::size_t>(harmonic)]
                  [static_cast<std::size_t>(function)];
   }
-  /// Prior standard deviation of the background magnitude of an effect, in its coordinates (gap/evidence/hypothesis.hpp): the magnitude that a vehicle
-  /// without the effect has of it, or of something that looks like it.
+  /// Prior sd of the background magnitude of an effect, in its coordinates (hypothesis.hpp): what a vehicle without the
+  /// effect has of it, or of something that looks like it.
   double background_sd(const std::string& effect) const;
-  /// Degrees of freedom of the scale of a block of this class.
   double freedom_of(Regimes regimes) const {
     return regimes == Regimes::place ? spread.place_freedom : spread.block_freedom;
   }
@@ -56,16 +55,16 @@ struct ModelDiscrepancy {
   std::array<std::array<std::array<double, static_cast<std::size_t>(BasisFunction::count)>, kHarmonics + 1>, kChannels>
       shares{};
   std::map<std::string, double> background;  ///< background_sd by effect; "other": effects that are not listed
-  /// Effects of wings, hinges and drive, which each model describes in its own way: their background magnitude follows the robot, with
-  /// spread.model_freedom.
+  /// Effects of wings, hinges and drive, which models describe differently: their background follows the robot
+  /// (model_freedom).
   std::vector<std::string> of_models;
   bool beat_averaged = false;  ///< every background magnitude follows the robot, with spread.effect_freedom
 };
 
-/// An effect with a magnitude for each wing has two background magnitudes; this suffix marks the one that both wings share.
+/// Suffix of the background magnitude that both wings share, for an effect with a magnitude for each wing.
 inline constexpr const char* kOfBoth = "_of_both";
 
-/// The text of a file like configs/gap/model_discrepancy.toml. `learnt`: source of the values, for the head of the file.
+/// Text of configs/gap/model_discrepancy.toml. `learnt`: source of the values, for the head of the file.
 std::string discrepancy_text(const ModelDiscrepancy& discrepancy, const std::string& learnt);
 /// io::InputError with file and line.
 ModelDiscrepancy read_model_discrepancy(

@@ -34,7 +34,7 @@ RegimeBasis::RegimeBasis(const Flights& flights) {
     for (std::size_t f = 0; f < flights.size(); ++f) column[f] = functions[f][i].values;
     append(functions.front()[i].name, functions.front()[i].quantity, functions.front()[i].kind);
   }
-  // an offset for each flight, which would otherwise look like an influence of the height at which that flight flew
+  // an offset for each flight would otherwise look like an influence of that flight's height
   for (std::size_t offset = 1; offset < flights.size() && flights.front()->policy().flight_offsets; ++offset) {
     for (std::size_t f = 0; f < flights.size(); ++f) column[f].setConstant(f == offset ? 1 : 0);
     append("flight " + flights[offset]->name(), "flight", BasisFunction::flight);

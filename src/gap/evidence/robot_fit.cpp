@@ -17,9 +17,9 @@ namespace {
 constexpr int kFirstIterations = 4, kMaxRefits = 5, kRefitIterations = 6;
 /// Scale of background magnitudes over their prior scale, in the first fit with them.
 constexpr double kWideScale = 5;
-/// Rounds in which the catalogue is fitted linearly and the noise is learnt from the residual that it leaves.
+/// Rounds of linear fits of the catalogue, each followed by learning the noise from what is left.
 constexpr int kRemainderRounds = 3;
-/// Gain of evidence for which another round is made, and loss at which it is undone; smaller changes may be errors of the linear models.
+/// Another round needs this gain and is undone at this loss; smaller changes may be errors of linear models.
 constexpr double kMinGain_nats = 2;
 
 /// Prior of the law factor: standard deviation of its log, and its largest value.
@@ -70,8 +70,8 @@ void RobotFit::refit_with_nuisances() {
   for (int round = 0; round < kMaxRefits && refit_with_minors(); ++round) continue;
 }
 
-/// Parameters that are fitted while background magnitudes are small compensate for a large one, and then no later fit finds it. So each may be large
-/// in the first fit.
+/// Parameters fitted with small backgrounds compensate for a large one, which no later fit finds; so each may be large
+/// at first.
 void RobotFit::widen_effects() {
   Scales wide = weigh(no_effects_, parameters_, fitter_.scales()).scales;
   for (std::size_t e = 0; e < wide.effects.size(); ++e)
@@ -95,7 +95,7 @@ double RobotFit::beyond_background(const std::string& effect, const VectorXd& ma
          improbable(effect + kOfBoth, VectorXd::Constant(1, half * (magnitudes[0] + magnitudes[1])));
 }
 
-/// Moves the minor draws to their estimates, and fits the parameters again. Undone if it loses evidence. False if it gains little or is undone.
+/// Moves the minor draws to their estimates and refits. Undone if it loses; false if it gains little or is undone.
 bool RobotFit::refit_with_minors() {
   const auto log_evidence = [&] { return weigh(no_effects_, parameters_, fitter_.scales()).posterior.log_evidence; };
   const std::vector<double> minors = uncertain_.minors();
@@ -110,7 +110,7 @@ bool RobotFit::refit_with_minors() {
     parameters_ = std::move(fit);
   };
   take(there, parameters_);
-  // with new columns, for with columns of another point a fit may stop a hundred nats below a better point nearby
+  // new columns: with those of another point a fit may stop a hundred nats below a better point nearby
   parameters_ = fitter_.fit(no_effects_, parameters_.mean(), kRefitIterations);
   take_scales();
   const double gain = log_evidence() - before;
@@ -154,7 +154,7 @@ void RobotFit::set_nuisances() {
   fitter_ = fitter_.with_nuisances(nuisance_regressors(), background(evidence().discrepancy(), true), parameters_);
 }
 
-/// Takes the residual that all magnitudes of the catalogue together leave as noise, under every hypothesis.
+/// Takes what all magnitudes of the catalogue together leave as noise, under every hypothesis.
 void RobotFit::learn_remainder() {
   for (int round = 0; round < kRemainderRounds; ++round) {
     Regressors r = Fitter::own_regressors(parameters_);
@@ -176,8 +176,7 @@ void RobotFit::learn_remainder() {
 
 Scales RobotFit::find_scales(const Hypothesis& hypothesis, const Fit& fit, const Scales& start) const {
   ScaledEvidence best = weigh(hypothesis, fit, start);
-  // expectation-maximisation stays in a maximum in which blocks explain what an effect's background may explain better,
-  // so larger background magnitudes are tried, one effect after another
+  // expectation-maximisation stays where blocks explain what a background may explain better, so try larger ones
   while (evidence().policy().discrepancy_scales) {
     const std::optional<Scales> larger = larger_effect(hypothesis, fit, best.scales);
     if (!larger) break;
@@ -188,9 +187,8 @@ Scales RobotFit::find_scales(const Hypothesis& hypothesis, const Fit& fit, const
   return best.scales;
 }
 
-/// The scales with the largest gain if the background magnitude of a single effect becomes larger; none if no effect gains. Given all else, the
-/// likelihood of the coefficients of a background magnitude is normal with precision C^-1 - 1 and sum C^-1 m, where m and C are their posterior mean
-/// and covariance.
+/// The scales with the largest gain from a larger background of one effect; none if none gains. With posterior mean m
+/// and covariance C, the likelihood of its coefficients is normal with precision C^-1 - 1 and sum C^-1 m.
 std::optional<Scales> RobotFit::larger_effect(const Hypothesis& hypothesis, const Fit& fit, const Scales& now) const {
   const Fitter fitter = fitter_.with_scales(now);
   const Regressors r = fitter.regressors(fit);
@@ -238,8 +236,7 @@ ScaledEvidence RobotFit::weigh(const Hypothesis& hypothesis, const Fit& fit, con
     return w;
   };
   ScaledEvidence best = with(1, start);
-  // also from prior scales of the effects' own background, for the effect may now explain what a large background
-  // magnitude explained
+  // also from prior scales of their own background: the effect may explain what a large background did
   Scales without_background = start;
   bool differs = false;
   for (const std::string& effect : hypothesis.effects())
@@ -274,7 +271,7 @@ std::vector<SensorFinding> RobotFit::sensors(const Fitter& fitter, const Hypothe
   return list;
 }
 
-/// Change of the prediction for one step. `there`: residual of a vehicle that is `steps` steps away from that of the parameters.
+/// For one step. `there`: residual of a vehicle `steps` steps from that of the parameters.
 BasisCoefficients RobotFit::change(Residuals there, double steps) const {
   for (std::size_t f = 0; f < there.size(); ++f)
     for (std::size_t k = 0; k < there[f].size(); ++k) there[f][k] = (parameters_.residual[f][k] - there[f][k]) / steps;

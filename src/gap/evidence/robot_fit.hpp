@@ -1,12 +1,11 @@
-// Fits the parameters of a vehicle to the flights of a robot, and learns what all later stages of a diagnosis use: the noise, the scales of the
-// model discrepancy, nuisance regressors, and the change that each magnitude of the catalogue makes.
+// Fits a vehicle's parameters to a robot's flights, and learns what later stages share: noise, scales of the model
+// discrepancy, nuisance regressors, and the change by each magnitude of the catalogue.
 #pragma once
 
 #include "gap/evidence/screening.hpp"
 
 namespace flappy::gap {
 
-/// Error of a declared sensor.
 struct SensorFinding {
   std::string name;  ///< for example "imu_mounting.x_rad", "imu.latency_s"
   double value, sd;
@@ -15,7 +14,7 @@ struct SensorFinding {
 
 class RobotFit {
  public:
-  /// Fits. Keeps a reference to `flights`. `withheld`: effects to leave out of the catalogue; `threads`: as for io::parallel_for.
+  /// Fits; keeps a reference to `flights`. `withheld`: effects to leave out; `threads`: as for io::parallel_for.
   RobotFit(const Flights& flights, const sim::Randomisation& uncertain, const ModelDiscrepancy& discrepancy,
            std::vector<std::string> withheld, int threads);
   RobotFit(const RobotFit&) = delete;
@@ -26,27 +25,29 @@ class RobotFit {
   const Fitter& fitter() const { return fitter_; }
   /// With the minor draws at their estimates.
   const sim::Randomisation& uncertain() const { return uncertain_; }
-  /// The hypothesis without effects.
   const Hypothesis& no_effects() const { return no_effects_; }
   const Fit& parameters() const { return parameters_; }
   /// The vehicle file under the same noise; without columns.
   const Fit& nominal() const { return nominal_; }
   const std::vector<MagnitudeColumn>& magnitudes() const { return magnitudes_; }
 
-  /// Background magnitudes of all effects. An effect with a magnitude for each wing has two: the difference of the wings, and the part that both
-  /// share, for an error of a wing model is the same in both wings. `shapes`: also with other shape parameters.
+  /// Background magnitudes of all effects. An effect with a magnitude for each wing has two: the difference of the
+  /// wings, and the part that both share, as an error of a wing model is the same in both. `shapes`: also with other
+  /// shape parameters.
   std::vector<Background> background(const ModelDiscrepancy& discrepancy, bool shapes) const;
-  /// Errors of declared sensors, then minor draws of the vehicle: change of the prediction for one prior standard deviation of each.
+  /// Change of the prediction for one prior sd of each error of declared sensors, then of each minor draw of the
+  /// vehicle.
   Regressors nuisance_regressors() const;
-  /// Nats by which magnitudes of an effect are more probable a priori as an effect than as its background.
+  /// Nats by which an effect's magnitudes are more probable a priori than as its background.
   double beyond_background(const std::string& effect, const Eigen::VectorXd& magnitudes, const Scales& scales) const;
   /// Errors of declared sensors, given a fit. `fitter`: with the scales of the fit.
   std::vector<SensorFinding> sensors(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit) const;
 
-  /// Evidence of a hypothesis with its own scales, searched from `start` on. `unknown_penalty_nats`: as in Evidence::weigh.
+  /// Evidence of a hypothesis with its own scales, searched from `start`. `unknown_penalty_nats`: as in
+  /// Evidence::weigh.
   ScaledEvidence weigh(const Hypothesis& hypothesis, const Fit& fit, const Scales& start,
                        std::optional<double> unknown_penalty_nats = {}) const;
-  /// Scales given a fit, searched from `start` on and from scales at which the background magnitude of one effect is much larger.
+  /// Scales given a fit, searched from `start` and from scales at which one effect's background is much larger.
   Scales find_scales(const Hypothesis& hypothesis, const Fit& fit, const Scales& start) const;
 
  private:

@@ -12,12 +12,11 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Log of twice the probability that N(mean, sd^2) is positive. Twice, for the prior of a magnitude that cannot be negative is half-normal.
+/// log(2 P(N(mean, sd^2) > 0)). Twice, as the prior of a magnitude that cannot be negative is half-normal.
 double log_twice_positive(double mean, double sd) {
   return std::log(std::max(std::erfc(-mean / (sd * std::numbers::sqrt2)), 1e-300));
 }
 
-/// Evidence of one effect at a time, jointly with the regressors of a fit.
 class Screening {
  public:
   Screening(const Fitter& fitter, const Fit& fit, const std::vector<MagnitudeColumn>& columns)
@@ -81,8 +80,7 @@ class Screening {
     const auto one_sided = [&](const Linear& m) { return columns_[m.column].one_sided; };
     ScreenedEffect s{effect, 0, VectorXd::Zero(columns_[magnitudes.front().column].unknowns)};
     for (const Linear& m : magnitudes) s.coordinates[columns_[m.column].unknown] = columns_[m.column].from;
-    // either jointly with the background magnitude of the effect, or instead of it, which saves the log-prior cost of
-    // its scale
+    // jointly with the effect's background magnitude, or instead of it, which saves the cost of its scale
     const int place = fitter_.place_of(effect);
     const std::vector<double>& scales = fitter_.scales().effects;
     std::vector<int> others;
@@ -108,8 +106,8 @@ class Screening {
         return log_twice_positive(coordinate(k), std::sqrt(p.covariance(at(k), at(k))));
       };
       if (whole) s.gain = p.log_evidence - without_;
-      // if magnitudes that cannot be negative are, the most negative one is set to 0 and left out: of two that
-      // compensate for each other, only one is present. The probability of its positive side stays in the gain
+      // sets the most negative of forbidden magnitudes to 0: of two that compensate, only one is present. The
+      // probability of its positive side stays in the gain
       std::size_t worst = magnitudes.size();
       for (std::size_t k = 0; k < magnitudes.size(); ++k)
         if (one_sided(magnitudes[k]) && coordinate(k) < (worst == magnitudes.size() ? 0 : coordinate(worst))) worst = k;
@@ -135,7 +133,7 @@ class Screening {
   double without_ = 0;
 };
 
-/// Distance of near steps in prior standard deviations of the background magnitude; and their least distance, below which differences are rough.
+/// Distance of near steps in background standard deviations; the least distance: shorter differences are rough.
 constexpr double kNearSd = 2, kMinReach = 0.05;
 
 }  // namespace

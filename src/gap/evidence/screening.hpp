@@ -1,11 +1,10 @@
-// Screening: the evidence that each effect of the catalogue would gain jointly with a fit, estimated by linear models.
+// Screening: the evidence that each effect of the catalogue would gain jointly with a fit, by linear models.
 #pragma once
 
 #include "gap/evidence/fit.hpp"
 
 namespace flappy::gap {
 
-/// A magnitude of an effect.
 struct Magnitude {
   std::string effect;
   Eigen::Index unknown, unknowns;  ///< index among the effect's unknowns, and their number
@@ -13,7 +12,6 @@ struct Magnitude {
   double from;                     ///< coordinate in the vehicle file
 };
 
-/// Vehicles that differ from the fitted one in a magnitude.
 struct MagnitudeStep : Magnitude {
   VehicleHypothesis vehicle;               ///< one step, kMagnitudeReach, away
   std::vector<VehicleHypothesis> shaped;   ///< one step away, with one shape parameter a standard deviation away
@@ -24,8 +22,8 @@ struct MagnitudeStep : Magnitude {
 inline constexpr std::size_t kMaxSteps = 5;
 inline constexpr double kMagnitudeReach = 0.4;
 
-/// Steps for each effect of the catalogue but `withheld`, at the given coordinates of the parameters, with shape parameters in the middle of their
-/// prior. `background`: gives the reach of the near steps; null: no near steps.
+/// Steps for each effect but `withheld`, with shape parameters in mid-prior. `background`: reach of near steps; null:
+/// none.
 std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, const Eigen::VectorXd& at,
                                            const std::vector<std::string>& withheld,
                                            const ModelDiscrepancy* background = nullptr);
@@ -33,9 +31,9 @@ std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, 
 /// Change of the prediction for a unit of a magnitude's coordinate, near its value in the vehicle file.
 struct MagnitudeColumn : Magnitude {
   BasisCoefficients change;
-  /// Change per unit at background magnitudes, above and below: small magnitudes may act differently, for instance on how a wing meets its stop.
+  /// Change per unit at background magnitudes, above and below: small magnitudes may act differently.
   std::vector<BasisCoefficients> near;
-  /// Change at large magnitudes, where the effect is no longer linear; a delay of a third of a beat, for instance, acts unlike a small one.
+  /// Change at large magnitudes, where the effect is not linear: a delay of a third of a beat acts unlike a small one.
   struct Large {
     double at;                        ///< coordinate less that of the vehicle file
     BasisCoefficients chord, change;  ///< per unit: mean on the way to `at`; local at `at`
@@ -49,7 +47,7 @@ struct ScreenedEffect {
   Eigen::VectorXd coordinates;  ///< most probable coordinates of its unknowns
 };
 
-/// Screens each effect that has columns; the largest gain first. In `columns`, those of one effect have to be consecutive.
+/// Screens each effect that has columns; the largest gain first. The columns of one effect have to be consecutive.
 std::vector<ScreenedEffect> screen(const Fitter& fitter, const Fit& fit, const std::vector<MagnitudeColumn>& columns);
 
 }  // namespace flappy::gap

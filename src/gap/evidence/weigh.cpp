@@ -1,14 +1,13 @@
-// Learns from the flights of a robot how far models of it are off: a scale for each block of the model discrepancy, and one for the background
-// magnitude of each effect.
-//
-// Given the scales, theta and delta are normal (evidence.hpp). Let s D be the prior standard deviation of delta in a group, and z = delta / (s D):
+// Learns how far models of a robot are off: a scale for each block of the model discrepancy and each effect's
+// background. With s D the prior standard deviation of delta in a group, and z = delta / (s D), theta and delta are
+// normal (evidence.hpp):
 //   z | theta ~ N(H^-1 d (right - normal change theta), H^-1)      d = s D, H = 1 + d normal d
-// which gives the expected squares of delta in a block. With n coefficients in the block, the most probable scale is
-//   s^2 = (sum E[delta^2] / D^2 + nu f^2) / (n + nu),
-// where f is the scale of the robot as a whole. The scales of background magnitudes have the same law, centred on f or on 1 (ScalePrior): a robot may
-// have a large background magnitude of an effect, and each hypothesis pays the log-prior cost of it. Each iteration of expectation-maximisation
-// increases the log evidence with the prior of the scales (Dempster, Laird, Rubin 1977). The scales are not integrated out but taken at the maximum,
-// for to first order the width of the maximum is the same for every hypothesis.
+// With n coefficients in a block, and f the scale of the robot, the most probable scale is
+//   s^2 = (sum E[delta^2] / D^2 + nu f^2) / (n + nu)
+// Scales of background magnitudes have the same law, centred on f or 1 (ScalePrior); each hypothesis pays the log-prior
+// cost of a large one. Each iteration of expectation-maximisation increases log evidence plus prior (Dempster, Laird,
+// Rubin 1977). Scales are taken at the maximum, not integrated out: to first order its width is the same for every
+// hypothesis.
 #include <cmath>
 #include <limits>
 
@@ -24,12 +23,10 @@ using Eigen::VectorXd;
 
 /// Iterations end when they gain less evidence than this.
 constexpr double kSettled_nats = 0.1;
-/// Growth of the stride after an iteration that gains, and its limit.
 constexpr double kStrideGrowth = 1.5, kMaxStride = 8;
 /// Smallest scale of a free block over the scale of the robot.
 constexpr double kMinFree = 2;
 
-/// Sums over the rows of one group.
 struct Sums {
   MatrixXd normal, change, all;  ///< basis x basis; basis x regressors; normal (change), then basis x residual
   VectorXd prior_sd;             ///< prior standard deviation of delta at scale 1
@@ -48,8 +45,8 @@ double log_prior(double scale, double robot, double freedom) {
   return freedom / 2 * (2 * std::log(ratio) + 1 - ratio * ratio);
 }
 
-/// The most probable scale f of a robot, given the scales s that follow it with nu degrees of freedom. `freedom`: sum of nu; `inverses`: sum of
-/// nu / s^2; `sd`: prior standard deviation of log f.
+/// The most probable robot scale f. `freedom`: sum of nu; `inverses`: sum of nu / s^2 over scales s that follow it;
+/// `sd`: of log f.
 double robot_scale(double freedom, double inverses, double sd) {
   constexpr double kGrid = 0.02;
   double best = 1, most = -std::numeric_limits<double>::infinity();
@@ -60,7 +57,7 @@ double robot_scale(double freedom, double inverses, double sd) {
   return best;
 }
 
-/// Over-relaxed expectation-maximisation: `stride` times the step between the logarithms of two sets of scales (Salakhutdinov, Roweis 2003).
+/// Over-relaxed: `stride` times the step between the logarithms of two sets of scales (Salakhutdinov, Roweis 2003).
 Scales strided(const Scales& from, const Scales& to, double stride) {
   const auto go = [&](double a, double b) { return a * std::pow(b / a, stride); };
   Scales s = to;
@@ -237,8 +234,7 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
       const double bound2 = scales_held_ ? 1 : (total[b] + nu[b] * f2) / (n + nu[b]);
       next.blocks[b] = std::sqrt(bound2);
       next.free[b] = 0;
-      // blocks with few degrees of freedom have heavy tails that hold any error of a model, so an excess there is no
-      // sign of an unknown cause
+      // blocks of few degrees of freedom have tails that hold any model error: an excess is no sign of an unknown cause
       if (unknown_penalty_nats && nu[b] >= discrepancy_.spread.place_freedom) {
         const double free2 = std::max(total[b] / n, kMinFree * kMinFree * f2);
         const auto objective = [&](double s2) { return -0.5 * (n * std::log(s2) + total[b] / s2); };

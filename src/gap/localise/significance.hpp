@@ -1,5 +1,5 @@
-// Tests of whether residuals could be noise alone. Noise is correlated from beat to beat, so no test takes beats for independent: sums over
-// blocks of beats count as independent, except those of neighbouring blocks.
+// Tests of whether residuals could be noise alone. Noise is correlated over beats, so only sums over blocks of beats
+// count as independent, except those of neighbouring blocks.
 #pragma once
 
 #include <cstddef>
@@ -8,17 +8,17 @@
 
 namespace flappy::gap {
 
-/// Block number of each beat, all flights in a row. `beats`: [flight]. Blocks that are neighbours in time have consecutive numbers; numbers of
-/// different flights are more than kWhitenessLags apart, so that no test takes their blocks for neighbours.
+/// Block number of each beat, all flights in a row. `beats`: [flight]. Numbers are consecutive in time; those of
+/// different flights are more than kWhitenessLags apart, so none are neighbours.
 std::vector<int> blocks_of(const std::vector<std::size_t>& beats, int length);
 
 struct FittedSlope {
   double slope = 0, p_value = 1;
 };
-/// Least squares of y = slope x, and a t test of the slope against 0. The variance of the slope is that of the sums of x (y - slope x) over blocks,
-/// plus the covariance of neighbouring blocks in full where it is positive (Hansen and Hodrick 1980; Newey and West 1987 give it half); correlation
-/// far beyond a block makes the variance too small. The effective number of blocks is 1 / sum of their squared shares of x^2 (Carter, Schnepel,
-/// Steigerwald 2017); none with fewer than five. With x = 1 in some beats and 0 in others, this tests the mean of y in the former.
+/// Least squares of y = slope x, and a t test of slope 0. Variance: sums of x (y - slope x) over blocks, plus the full
+/// covariance of neighbours where positive (Hansen and Hodrick 1980; Newey and West 1987: half); correlation far beyond
+/// a block makes it too small. Effective blocks: 1 / sum of squared shares of x^2 (Carter, Schnepel, Steigerwald 2017);
+/// none below five. With x = 1 in some beats, else 0, tests the mean of y there.
 std::optional<FittedSlope> slope_test(const std::vector<double>& x, const std::vector<double>& y,
                                       const std::vector<int>& block);
 
@@ -30,7 +30,6 @@ struct Whiteness {
 inline constexpr int kWhitenessLags = 6;
 std::optional<Whiteness> whiteness_test(const std::vector<double>& y, const std::vector<int>& block);
 
-/// Periodogram, summed over frequency bands.
 struct Bands {
   std::vector<double> power;  ///< [band]; all bands add up to the sum of squares about the mean
   std::vector<std::size_t> bins;
@@ -38,7 +37,7 @@ struct Bands {
 /// Adds the periodogram of one flight to the bands, which end at `ends_Hz`. `y`: [beat], 0 in beats without a row.
 void add_bands(const std::vector<double>& y, double beats_Hz, const std::vector<double>& ends_Hz, Bands& to);
 
-/// Which tests are discoveries if at most a share `rate` of all discoveries may be false (Benjamini and Hochberg 1995).
+/// Which tests are discoveries if at most a share `rate` of these may be false (Benjamini and Hochberg 1995).
 std::vector<char> discoveries(const std::vector<double>& p_values, double rate);
 
 }  // namespace flappy::gap

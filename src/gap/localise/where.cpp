@@ -21,8 +21,8 @@ constexpr double kBandEnds_Hz[] = {0.5, 1, 2, 4, 8};
 /// Weight of the square of a coefficient in the mean square of the waveform.
 double share_of(int coefficient) { return coefficient == 0 ? 1 : 0.5; }
 
-/// Share of the variance of first-order autoregressive noise below a frequency: the integral of (1 - past^2) / |1 - past exp(i pi f)|^2.
-/// `frequency`: over half the rate of beats; `past`: autocorrelation from beat to beat.
+/// Share of autoregressive noise's variance below a frequency: integral of (1 - past^2) / |1 - past exp(i pi f)|^2.
+/// `frequency`: over half the rate of beats; `past`: autocorrelation over a beat.
 double share_below(double frequency, double past) {
   if (frequency >= 1) return 1;
   return 2 / std::numbers::pi * std::atan((1 + past) / (1 - past) * std::tan(std::numbers::pi / 2 * frequency));
@@ -32,7 +32,6 @@ struct TestedBeat {
   std::size_t flight, beat;
 };
 
-/// The rows of one channel, and their tests.
 class ChannelRows {
  public:
   ChannelRows(const RowContext& around, const Residuals& residual, int channel, Stage stage)
@@ -116,8 +115,8 @@ class ChannelRows {
     }
   }
 
-  /// Autocorrelation of the noise from beat to beat, from neighbouring beats within blocks. The mean of each block is
-  /// subtracted, for slow changes are not noise; the bias that this causes in short blocks is corrected (Kendall 1954).
+  /// Autocorrelation of the noise over a beat, within blocks, less each block's mean, as slow changes are not noise;
+  /// corrected for the bias in short blocks (Kendall 1954).
   double memory() const {
     std::vector<double> sums(1, 0), counts(1, 0);
     const std::vector<double>& y = rows_[0];
@@ -225,7 +224,6 @@ RowContext row_context_of(const Flights& flights, std::vector<double> noise_sd) 
   }
   for (int g = 0; g < kGroups; ++g)
     s.rows.push_back(!flights.empty() && flights.front()->has_rows(g / kCoefficients, g % kCoefficients) ? 1 : 0);
-  // only quantities that all flights have
   const auto gather = [&](std::vector<RegimeQuantity> (PredictedFlight::*of)() const, std::vector<Quantity>& to) {
     for (const auto& f : flights)
       for (RegimeQuantity& own : ((*f).*of)()) {

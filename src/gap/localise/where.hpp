@@ -1,15 +1,14 @@
-// Locates residuals that exceed the noise: by channel, by regime, by phase of the beat, by frequency.
-//
-// The table has one row for each test of one channel, with the rms of the residual, that of the noise, and the p value of noise alone:
+// Locates residuals that exceed the noise. The table has a row for each test of one channel: rms of residual and noise,
+// and the p value of noise alone:
 //   channel     all beats
 //   regime      a third of the beats: those with low, middle or high height, speed, ...
 //   phase       the mean or one harmonic of the beats: where in the stroke
-//   frequency   a band of the beat means, against the highest band and the spectrum of first-order autoregressive noise
+//   frequency   a band of the beat means, against the highest band and the spectrum of autoregressive noise
 //   input       the part that is proportional to an input
 //   whiteness   correlation between blocks of beats; not for path and turn, whose rows are differences over beats
-// The tests of channel, regime, phase and input use sums over blocks of beats (gap/localise/significance.hpp); the smallest p value of the
-// coefficients of a channel counts, multiplied by their number (Bonferroni). Among all tests of a stage, the share of false discoveries is held
-// to kFalseDiscoveries.
+// The tests of channel, regime, phase and input use sums over blocks (significance.hpp) and the smallest p value of a
+// channel's coefficients times their number (Bonferroni). The share of false discoveries of a stage is held to
+// kFalseDiscoveries.
 #pragma once
 
 #include <string>
@@ -26,7 +25,6 @@ constexpr std::size_t group_of(int channel, int coefficient) {
   return static_cast<std::size_t>(channel) * kCoefficients + static_cast<std::size_t>(coefficient);
 }
 
-/// A quantity by which beats are sorted.
 struct Quantity {
   std::string name, unit;
   std::vector<std::vector<double>> values;  ///< [flight][beat]
@@ -47,8 +45,8 @@ struct RowContext {
 };
 RowContext row_context_of(const Flights& flights, std::vector<double> noise_sd);
 
-/// All rows of the table for one stage. `residual`: [flight], empty where the simulation of the vehicle diverged. In the test of an input, `gap`
-/// and `noise_floor` are the rms of the part proportional to it.
+/// All rows of the table for one stage. `residual`: [flight], empty where the simulation diverged. In the test of an
+/// input, `gap` and `noise_floor` are the rms of the part proportional to it.
 std::vector<ResidualLocation> locate(const RowContext& around, const Residuals& residual, Stage stage);
 
 }  // namespace flappy::gap

@@ -15,7 +15,6 @@ using Vec = model::Vec3<double>;
 
 /// Rows in a period of the bandwidth: a little more than the two that the sampling theorem asks for.
 constexpr double kRowsPerPeriod = 2.2;
-/// Least number of rows of a flight.
 constexpr std::size_t kMinRows = 30;
 
 Vec vec(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
@@ -28,7 +27,7 @@ std::size_t row(std::size_t beat, int channel) {
   return beat * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients;
 }
 
-/// A column of a stream on the grid of the motion, `late_s` later, interpolated linearly.
+/// A column on the grid of the motion, `late_s` later, interpolated linearly.
 std::vector<double> on_grid(const flightlog::Column& t_s, const flightlog::Column& x, double late_s,
                             const flightlog::BeatAveragedMotion& m) {
   std::vector<double> y(m.size());
@@ -42,7 +41,7 @@ std::vector<double> on_grid(const flightlog::Column& t_s, const flightlog::Colum
   return y;
 }
 
-/// Delays `x` by `late` samples, then applies a first-order lag of `lag` samples, which is exact for an input that is held between samples.
+/// Delay, then a first-order lag, both in samples; exact for an input held between samples.
 std::vector<double> follow(std::vector<double> x, double late, double lag) {
   if (late != 0) {
     const std::vector<double> own = x;

@@ -1,14 +1,13 @@
-// A recorded flight, predicted by beat-averaged vehicles (model/beat_averaged.hpp). At each row, the recorded motion and inputs give force F and
-// moment M, and these give the specific force f and the angular acceleration a that motion capture should have measured,
-//   f = F / m + a x d + w x (w x d),  d: from the centre of mass to the torso's origin      I a = M - w x I w,  M: about the centre of mass
-// Inputs pass through the same low-pass filter as the recorded motion (flightlog/beat_averaged_motion.hpp). Nothing is integrated, so no error
-// accumulates. Rows are about half a period of the bandwidth apart: closer rows would not be independent.
-//
-// The loads come from the vehicle file or, if its model is "predicted", from the flight's predicted.csv (gap/replay/predicted_loads.hpp), whose
-// columns pass through the same filter. Effects act on both, except effects of the drive, which predicted loads already contain.
-//
-// Force channels always have rows. Torque channels have rows if the vehicle has moments and compares them, or if the caller selects them. Rows
-// count where the torso origin is at least extent.below_m of the vehicle above the ground.
+// A flight predicted by beat-averaged vehicles (model/beat_averaged.hpp). At each row, recorded motion and inputs give
+// force F and moment M, and these the specific force f and angular acceleration a that motion capture should measure,
+//   f = F / m + a x d + w x (w x d),  d: from the centre of mass to the torso's origin
+//   I a = M - w x I w,  M: about the centre of mass
+// Inputs pass the motion's low-pass (flightlog/beat_averaged_motion.hpp). Nothing is integrated, so no error
+// accumulates. Rows are about half a period of the bandwidth apart: closer ones would not be independent. Loads come
+// from the vehicle file or, if its model is "predicted", from predicted.csv (predicted_loads.hpp) through the same
+// filter. Effects act on both, except those of the drive, which predicted loads contain. Force channels always have
+// rows; torque channels if the vehicle has and compares moments, or the caller selects them. Rows count where the
+// origin is at least the vehicle's extent.below_m above the ground.
 #pragma once
 
 #include <map>
@@ -24,8 +23,9 @@ namespace flappy::gap {
 
 class BeatAveragedPrediction final : public PredictedFlight {
  public:
-  /// `nominal`: the vehicle that is believed to have flown. `channels`: the only channels to have rows; empty: all that the vehicle compares.
-  /// io::InputError naming `folder` if the log lacks an input of the vehicle, or if motion capture saw too little of the flight.
+  /// `nominal`: the vehicle that is believed to have flown. `channels`: the only ones with rows; empty: all that it
+  /// compares. io::InputError naming `folder` if the log lacks an input, or motion capture saw too little of the
+  /// flight.
   BeatAveragedPrediction(const std::filesystem::path& folder, flightlog::FlightLog log, const model::Vehicle& nominal,
                          const std::vector<int>& channels = {});
 
@@ -49,8 +49,8 @@ class BeatAveragedPrediction final : public PredictedFlight {
   const DiagnosisPolicy& policy() const override { return kBeatAveragedPolicy; }
 
  private:
-  /// An input or a column of predicted.csv at each row, after delay, first-order lag and low-pass filter: its value and rate, and both for its
-  /// product with the battery's voltage over the nominal one.
+  /// [row] An input or column of predicted.csv after delay, lag and low-pass, its rate, and both for its product with
+  /// the battery's voltage over the nominal one.
   struct Driven {
     std::vector<double> input, rate, times_battery, rate_times_battery;
   };

@@ -1,8 +1,8 @@
-// Projection of signals onto beats. Near beat j, a signal r(t) is described by its mean and the first harmonics of the beat,
+// Projection of a signal r(t) onto beats. Near beat j, its mean and first harmonics are
 //   c_jh = (norm) sum_i hat(b_i - j - 1/2) f_h(b_i) r_i      f = 1, cos 2 pi b, sin 2 pi b, cos 4 pi b, ...
-// b: time in beats since the start. hat: a triangle that falls from 1 to 0 within one beat to either side. The hats of all beats add up to 1,
-// and a smooth window suppresses differenced noise, which alternates from sample to sample. The rows keep changes that are slower than a few
-// beats; they lose what is above the last harmonic.
+// b: time in beats. hat: falls from 1 to 0 over a beat to either side; all hats add up to 1. The smooth window
+// suppresses differenced noise, which alternates over samples. Rows keep changes slower than a few beats up to the last
+// harmonic.
 #pragma once
 
 #include <cstddef>
@@ -17,8 +17,8 @@ inline constexpr int kCoefficients = 2 * kHarmonics + 1;
 class BeatProjection {
  public:
   BeatProjection() = default;
-  /// `beat`, `valid`: [sample] time in beats, and whether it counts. A beat is not covered if more than a tenth of the weight of its
-  /// hat is missing, or if it comes before beat `first`.
+  /// [sample] time in beats, and whether it counts. Beats before `first`, or with over a tenth of the hat's weight
+  /// missing, are not covered.
   BeatProjection(const std::vector<double>& beat, const std::vector<char>& valid, std::size_t beats, std::size_t first);
 
   std::size_t beats() const { return covered_.size(); }

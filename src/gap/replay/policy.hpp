@@ -1,5 +1,5 @@
-// How a diagnosis treats a kind of vehicle. A vehicle with wings and motors predicts each harmonic of a beat, and no model of its wings is exact.
-// A beat-averaged vehicle predicts only means over a beat; the part of these that no effect explains counts as noise.
+// How a diagnosis treats a kind of vehicle. With wings and motors, each harmonic is predicted, and no wing model is
+// exact. Beat-averaged: only means are predicted; what no effect explains counts as noise.
 #pragma once
 
 namespace flappy::gap {
@@ -10,14 +10,15 @@ struct DiagnosisPolicy {
   bool discrepancy_scales;
   bool nuisances_are_noise;  ///< residuals of held-out flights exclude what the nuisance regressors explain
   bool move_parameters;      ///< parameters are fitted again jointly with the effects that explain most
-  /// The corrected vehicle is fitted again by simulation, without background magnitudes; false: only linearly, by the columns of its fit.
+  /// The corrected vehicle is refitted by simulation without background magnitudes; false: only linearly, by its
+  /// columns.
   bool background_in_corrected;
   bool validate;         ///< ladder, controls and agreements are computed; effects that cannot show are listed
   double min_step_nats;  ///< least gain of evidence for which a fit takes another step
   int max_further;       ///< number of effects that are tried at a time, each jointly with the best set
 };
 
-/// Vehicles with wings and motors: each step of a fit costs a simulation, so a step has to bring more.
+/// Vehicles with wings and motors: each step of a fit costs a simulation, so it has to bring more.
 inline constexpr DiagnosisPolicy kWingPolicy{true, true, true, true, true, false, 0.5, 2};
 /// Beat-averaged vehicles: a step of a fit costs almost nothing.
 inline constexpr DiagnosisPolicy kBeatAveragedPolicy{false, false, false, false, false, true, 0.05, 1};

@@ -1,5 +1,5 @@
-// A recorded flight and its prediction by vehicle hypotheses, as rows: for each beat, the coefficients of each channel. There are two
-// implementations: for vehicles with wings and motors (reset_prediction.hpp), and for beat-averaged vehicles (beat_averaged_prediction.hpp).
+// A recorded flight and its predictions as rows: for each beat, the coefficients of each channel. Implemented for
+// vehicles with wings and motors (reset_prediction.hpp) and beat-averaged ones (beat_averaged_prediction.hpp).
 #pragma once
 
 #include <memory>
@@ -26,7 +26,7 @@ enum Channel : int {
   kBattery,      ///< battery voltage, V; only where logged
   kCurrentLeft,
   kCurrentRight,  ///< motor current, A; only where logged
-  // motion capture compared with the IMU, without a vehicle (gap/replay/stream_rows.hpp): only the mean of a beat
+  // motion capture against the IMU, without a vehicle (stream_rows.hpp): only the mean of a beat
   kPathX,
   kPathY,
   kPathZ,  ///< acceleration of the torso origin by motion capture less that by the IMU, m/s^2, W
@@ -66,16 +66,14 @@ enum class BasisFunction {
   count
 };
 
-/// A function of the regime.
 struct RegimeFunction {
   std::string name;
-  /// The quantity that it depends on: the name of an input, amplitude, velocity, rate, height, ceiling, wall, heading, time, ...
+  /// What it depends on: the name of an input, amplitude, velocity, rate, height, ceiling, wall, heading, time, ...
   std::string quantity;
   BasisFunction kind;
   Eigen::VectorXd values;  ///< [beat]
 };
 
-/// A quantity of the regime by which the beats of a flight are sorted.
 struct RegimeQuantity {
   std::string name, unit;
   std::vector<double> values;  ///< [beat]
@@ -84,19 +82,17 @@ struct RegimeQuantity {
 class PredictedFlight {
  public:
   virtual ~PredictedFlight() = default;
-  /// Name of the folder of the log.
   virtual const std::string& name() const = 0;
   virtual std::size_t beats() const = 0;
   virtual double beats_Hz() const = 0;
   virtual bool covers(std::size_t beat, int channel) const = 0;
-  /// Whether a channel has rows of this coefficient.
   virtual bool has_rows(int channel, int coefficient) const = 0;
   virtual const Rows& measured() const = 0;
-  /// The signal of each channel, which the model discrepancy is a share of: the measured rows. For vehicles with wings and motors, some channels
-  /// differ. Torque: the predicted rows are already the difference from the recorded motion, so `measured` is 0; the signal is the recorded
-  /// angular acceleration. Battery: the voltage less the full voltage. Path and turn: constants.
+  /// The signal of each channel, which the model discrepancy is a share of: the measured rows. Exceptions for vehicles
+  /// with wings and motors: for torque the recorded angular acceleration, as the rows are already differences from it;
+  /// for the battery its voltage less the full voltage; for path and turn constants.
   virtual const Rows& signal() const = 0;
-  /// Rows that the sensors of each vehicle would have measured, [vehicle]; empty for a vehicle whose simulation diverges.
+  /// Rows that the sensors of each vehicle would have measured, [vehicle]; empty if its simulation diverges.
   virtual std::vector<Rows> predict(const std::vector<const VehicleHypothesis*>& vehicles) const = 0;
   /// Smooths rows that were predicted elsewhere over beats, as `measured` and `predict` do.
   virtual void weigh(Rows& /*rows*/) const {}
@@ -110,10 +106,10 @@ class PredictedFlight {
   virtual const DiagnosisPolicy& policy() const = 0;
   /// Null for beat-averaged vehicles.
   virtual const Recording* recording() const { return nullptr; }
-  /// The same beats with another log of the flight. Null for beat-averaged vehicles.
+  /// The same beats with another log. Null for beat-averaged vehicles.
   virtual std::shared_ptr<const PredictedFlight> with_log(flightlog::FlightLog /*log*/) const { return nullptr; }
-  /// The same beats after the given errors of sensors are undone in the log. Null for beat-averaged vehicles, whose prediction includes the
-  /// effects of their sensors.
+  /// The same beats with the given errors of sensors undone in the log. Null for beat-averaged vehicles, whose
+  /// prediction includes the effects of their sensors.
   virtual std::shared_ptr<const PredictedFlight> corrected(const EffectValues& /*sensors*/) const { return nullptr; }
 };
 

@@ -9,10 +9,9 @@
 namespace flappy::gap {
 namespace {
 
-/// Rounded to a microsecond.
 std::string seconds(double t_s) { return io::shortest_digits(std::round(1e6 * t_s) / 1e6); }
 
-/// The column that a name in the header of the file stands for; none: the name is unknown.
+/// None: the name in the header is unknown.
 std::optional<PredictedColumn> column_of(const std::string& name, const model::BeatAveraged& vehicle) {
   for (std::size_t k = 0; k < model::kLoadNames.size(); ++k) {
     if (name == model::kLoadNames[k]) return PredictedColumn{k, {}, {}};
@@ -22,8 +21,8 @@ std::optional<PredictedColumn> column_of(const std::string& name, const model::B
   return std::nullopt;
 }
 
-/// Samples on the grid of the motion, linearly interpolated. Where samples are closer than half a step of the grid, each value is the mean over a
-/// step, so that frequencies above the grid's are not aliased into the band.
+/// Linear interpolation onto the motion's grid. Where samples are closer than half a step, the mean over a step,
+/// against aliasing.
 std::vector<double> on_grid(const std::vector<double>& t_s, const std::vector<double>& x,
                             const flightlog::BeatAveragedMotion& m) {
   std::vector<double> integral(x.size(), 0);

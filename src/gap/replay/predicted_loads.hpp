@@ -1,12 +1,10 @@
-// Force and moment on a vehicle in a recorded flight, as the user's own simulator predicts them (model = "predicted"): FOLDER/predicted.csv,
-//
-//   t_s                                      on the clock of command.csv; covers the time that motion capture and commands have in common, with
-//                                            steps of at most half a period of the vehicle's beat.bandwidth_Hz
-//   force_x_N ... moment_z_Nm                in B, about the torso's origin: all loads but weight, for the recorded inputs and motion, where each
-//                                            coefficient of the vehicle file has the value predicted_at
-//   d_NAME_force_x_N ... d_NAME_moment_z_Nm  derivatives of these by the coefficient NAME, per unit of NAME
-//
-// The load on the vehicle is   load + sum d_NAME (NAME - predicted_at).   Missing columns are 0.
+// Loads on a vehicle in a flight, as the user's simulator predicts them (model = "predicted"): FOLDER/predicted.csv,
+//   t_s                                      on the clock of command.csv; covers the time common to motion capture and
+//                                            commands, in steps of at most half a period of beat.bandwidth_Hz
+//   force_x_N ... moment_z_Nm                in B, about the torso's origin: all but weight, for recorded inputs,
+//                                            motion, and coefficients of the vehicle file at predicted_at
+//   d_NAME_force_x_N ... d_NAME_moment_z_Nm  derivatives by the coefficient NAME, per unit of NAME
+// The load is   load + sum d_NAME (NAME - predicted_at).   Missing columns are 0.
 #pragma once
 
 #include <filesystem>
@@ -24,8 +22,8 @@ struct PredictedColumn {
   std::vector<double> values;              ///< [step of the motion's grid] N or N m, over the coefficient's unit
 };
 
-/// `from_s`, `to_s`: the time that motion capture and commands have in common. io::InputError with file and line if the file is not a
-/// prediction of this vehicle for this flight.
+/// `from_s`, `to_s`: the time common to motion capture and commands. io::InputError with file and line if the file is
+/// not a prediction of this vehicle for this flight.
 std::vector<PredictedColumn> read_predicted_loads(const std::filesystem::path& file, const model::BeatAveraged& vehicle,
                                                   const flightlog::BeatAveragedMotion& motion, double from_s,
                                                   double to_s);

@@ -18,7 +18,7 @@ constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kFrequencyReach = 0.02;
 /// Cut off at both ends, so that the log still covers the grid after its clocks are corrected.
 constexpr double kMargin_s = 0.05;
-/// The first samples of the battery give its full voltage; a ratio to the nominal voltage below kFuller may be noise and counts as 1.
+/// First samples give the full voltage; a ratio to nominal below kFuller may be noise and counts as 1.
 constexpr std::size_t kFirstSamples = 20;
 constexpr double kFuller = 1.02;
 /// An interval between commands that is longer than so many times the median is a gap.
@@ -83,7 +83,7 @@ void Recording::lay_grid() {
   torso.push_back(torso_at(smoother.at(std::max(begin_s, smoother.begin_s()))));
   const std::vector<std::pair<double, double>> undriven = undriven_s();
   for (std::size_t k = first + 1; k < bounds.size() && bounds[k] <= last_s + kPredictionStep_s / 2; ++k) {
-    // a gap of the IMU is divided into intervals of the usual length, so that the torso is reset often enough
+    // a gap of the IMU is divided into usual intervals, so that the torso is reset often enough
     const int pieces = std::max(1, static_cast<int>(std::lround((bounds[k] - now_s) / usual_s)));
     for (int i = pieces; i > 0; --i) {
       const int n = static_cast<int>(std::lround((bounds[k] - now_s) / i / kPredictionStep_s));
@@ -98,8 +98,7 @@ void Recording::lay_grid() {
       const bool flies = torso.back().position_m[2] > least_z_m;
       const bool driven =
           std::ranges::none_of(undriven, [&](const auto& span) { return span.first < now_s && from_s < span.second; });
-      // all vehicle hypotheses share the grid; with another delay of motion capture, the record may cover less than the
-      // grid
+      // hypotheses share the grid; with another delay of motion capture, the record may cover less of it
       const bool recorded = now_s > smoother.begin_s() && from_s < smoother.end_s() &&
                             smoother.covers(std::max(from_s, smoother.begin_s()), at_s);
       valid.push_back(recorded && flies && driven ? 1 : 0);
@@ -189,7 +188,7 @@ double Recording::beat_at(double t_s) const {
   return phase_beats_[i - 1] + share * (phase_beats_[i] - phase_beats_[i - 1]);
 }
 
-/// Inputs are computed from the voltages, which every log has: the mean, the first harmonic, and the second harmonic of a split cycle.
+/// From the voltages, which every log has: mean, first harmonic, and the second harmonic of a split cycle.
 void Recording::read_regimes() {
   struct Sum {
     double n = 0, left = 0, right = 0, left_cos = 0, right_cos = 0, left_sin2 = 0, right_sin2 = 0;

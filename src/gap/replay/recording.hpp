@@ -1,5 +1,5 @@
-// A recorded flight, prepared for replay by any vehicle: the motor voltages, the motion of the torso at the bounds of the intervals of the IMU,
-// and the measurements in each interval.
+// A recorded flight, prepared for replay: motor voltages, motion of the torso at the bounds of the IMU's intervals, and
+// the measurements in each.
 #pragma once
 
 #include <filesystem>
@@ -13,14 +13,14 @@
 
 namespace flappy::gap {
 
-/// Time step of replays. Half of it costs twice the time and predicts held-out flights no better. If a robot without any fault was simulated with
-/// finer steps, the fitted parameters absorb the difference, so its verdict is "parameters" rather than "none".
+/// Time step of replays. Half of it costs twice the time and predicts no better. A faultless robot simulated with finer
+/// steps gets the verdict "parameters" rather than "none", as fitted parameters absorb the difference.
 inline constexpr double kPredictionStep_s = 2e-4;
-/// The hold time of a motor driver has to be a multiple of this. Replays use the recorded voltages and hold them for kPredictionStep_s.
+/// The hold time of a motor driver has to be a multiple of this. Replays hold recorded voltages for kPredictionStep_s.
 inline constexpr double kHoldStep_s = 1e-4;
-/// Beats until the transient of wings that start at rest has decayed: after three beats it is still thirty times the noise.
+/// Beats until the transient of wings that start at rest has decayed: after three it is thirty times the noise.
 inline constexpr double kSpinUpBeats = 6;
-/// Within this height above its stand, a vehicle may still touch the ground. No hypothesis models that contact.
+/// Below this height above its stand, a vehicle may touch the ground, which no hypothesis models.
 inline constexpr double kMinClearance_m = 0.01;
 
 /// Inputs and motion of a flight, as means over one beat.
@@ -34,8 +34,7 @@ struct Recording {
   std::string name;
   double least_z_m = 0;      ///< below this height of the torso origin in W, the vehicle may touch the ground
   double density_ratio = 1;  ///< air density of the flight over that of the vehicle file
-  /// Battery voltage at the start of the flight over its nominal voltage, which commands refer to. Any fall of the voltage during the flight is
-  /// left to the vehicle's model.
+  /// Battery voltage at the start over nominal, which commands refer to. Its later fall is left to the vehicle's model.
   double full = 1;
   flightlog::FlightLog log;
   flightlog::Smoother smoother;
@@ -50,14 +49,13 @@ struct Recording {
   std::vector<Eigen::Vector3d> force_m_s2;  ///< [interval] measured specific force, mean over the interval
   std::vector<double> left_V, right_V;      ///< [physics step]
 
-  // the beats
   std::vector<double> beat;         ///< [interval] time at its middle, in beats since the start (beat_at)
   std::size_t beats = 0;            ///< number of whole beats
   std::vector<BeatMotion> regimes;  ///< [beat]
 
-  /// `nominal`: the vehicle that is believed to have flown. InputError naming `folder` where no part of the flight can be replayed.
+  /// `nominal`: the vehicle that is believed to have flown. InputError naming `folder` if no part can be replayed.
   Recording(const std::filesystem::path& folder, flightlog::FlightLog flight_log, const model::Vehicle& nominal);
-  /// The same flight over the same beats, with another log: one in which errors of sensors were corrected.
+  /// The same flight over the same beats, with another log, in which errors of sensors were corrected.
   Recording(const Recording& other, flightlog::FlightLog flight_log);
 
   double interval_s(std::size_t k) const { return steps[k] * kPredictionStep_s; }

@@ -1,17 +1,17 @@
-// The reset at the end of an interval of the IMU, for a block of vehicles that replay one recorded motion. Compiled once for each instruction
-// set, like the step of the simulation.
+// The reset at the end of an IMU interval, for a block of vehicles that replay one motion. Compiled for each
+// instruction set.
 #pragma once
 
 #include "sim/block.hpp"
 
 namespace flappy::gap {
 
-/// Precision of replays: rounding errors are far below the noise of any sensor, and a block holds twice as many vehicles as in double.
+/// Precision of replays: rounding errors are far below any sensor's noise, and a block holds twice as many vehicles as
+/// in double.
 using Flown = float;
-/// Number of vehicle hypotheses that are replayed at once: the lanes of a block.
 inline constexpr std::size_t kVehicles = sim::kLanes<Flown>;
 
-/// Recorded motion of the torso origin at a bound of an interval: position and velocity in W, attitude body to world, body rate in B.
+/// Recorded motion of the torso origin at a bound of an interval: position, velocity in W, attitude B to W, rate in B.
 struct TorsoAt {
   double position_m[3] = {0, 0, 0}, attitude[4] = {1, 0, 0, 0}, velocity_m_s[3] = {0, 0, 0},
          body_rate_rad_s[3] = {0, 0, 0};
@@ -31,13 +31,13 @@ struct ResetBlockState {
   alignas(64) Flown rows[kResetRows][kVehicles];
 };
 
-/// Computes the rows of the interval from `from` to `to`, then resets every torso to the recorded motion at `to`; the wings keep their state.
-/// The body rate is not set to the recorded one: it is changed by the mean rate that the simulated rotation lacked. `from` null: the
-/// start of a flight; no rows, and the body rate is the recorded one.
+/// Computes the rows of the interval from `from` to `to`, then resets every torso to the recorded motion at `to`; wings
+/// keep their state. The body rate is not set: it is changed by the mean rate that the simulated rotation lacked.
+/// `from` null: the start of a flight; no rows, and the body rate is the recorded one.
 using ResetBlock = void (*)(sim::Block<Flown>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
                             const double imu_position_m[3], double gravity_m_s2, ResetBlockState& kept);
 
-/// Adds a sample, [signal][lane] with `width` signals, times each of `count` weights to the rows of a beat, [weight][signal][lane].
+/// `sample`: [signal][lane]; adds it times each weight to the rows of a beat, [weight][signal][lane].
 using ProjectBlock = void (*)(const Flown* sample, const double* weights, int count, std::size_t width, Flown* rows);
 
 }  // namespace flappy::gap

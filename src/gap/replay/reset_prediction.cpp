@@ -15,7 +15,7 @@ FLAPPY_KERNELS(ProjectBlock, project_block_kernel);
 
 namespace {
 
-/// Number of channels that are predicted at every interval of the IMU, and of those that the power meter samples.
+/// Channels predicted at every interval of the IMU, and those that the power meter samples.
 constexpr std::size_t kSignals = kBattery, kMetered = sim::kMeterRows;
 static_assert(kPathX == kSignals + kMetered);
 static_assert(kTorqueX == int{kTurning} && kForceX == int{kForce} && kStrokeLeft == int{kStroke} &&
@@ -23,11 +23,10 @@ static_assert(kTorqueX == int{kTurning} && kForceX == int{kForce} && kStrokeLeft
 
 /// Rounding error of a time, in steps.
 constexpr double kSameStep = 1e-3;
-/// Signals of the path and turn channels. Times the shares of the model discrepancy, they give how much motion capture and the IMU may disagree
-/// for reasons that no effect describes.
+/// Signals of path and turn; times the shares of the discrepancy, how much both sensors may disagree without an effect.
 constexpr double kStreamSignal_m_s2 = 1, kStreamSignal_rad_s = 1;
 
-/// Weights that a second difference of positions over three beats gives to the accelerations of the beats around.
+/// Weights that a second difference of positions over three beats gives to accelerations around.
 constexpr std::size_t kHalfKernel = 2;
 constexpr double kKernel[] = {1.0 / 9, 2.0 / 9, 3.0 / 9, 2.0 / 9, 1.0 / 9};
 
@@ -36,7 +35,7 @@ class ShiftedVoltage {
  public:
   explicit ShiftedVoltage(double steps)
       : whole_(static_cast<std::ptrdiff_t>(std::floor(steps))), share_(steps - std::floor(steps)) {}
-  /// Writes the delayed voltages of `count` steps from `step` on to every `stride`-th element of `to`.
+  /// Writes `count` steps from `step` on to every `stride`-th element of `to`.
   void put(const std::vector<double>& voltage_V, std::size_t step, int count, std::size_t stride, Flown* to) const {
     const auto size = static_cast<std::ptrdiff_t>(voltage_V.size()), first = static_cast<std::ptrdiff_t>(step) - whole_;
     const bool inside = first >= 1 && first + count <= size;
@@ -89,8 +88,8 @@ ResetPrediction::ResetPrediction(Recording recording) : recording_(std::move(rec
   compare_streams();
 }
 
-/// Places the samples of power.csv on the grid. Where a sample and a new voltage have the same time, the sample shows the new voltage. So it is
-/// predicted from the first step that does not begin before it and from the step after that, never from the step before.
+/// Places power.csv on the grid. A sample at the time of a new voltage shows the new one, so it is predicted from the
+/// first step that does not begin before it and the next, never from the one before.
 void ResetPrediction::lay_power(std::size_t first_beat) {
   const Recording& r = recording_;
   if (!r.log.power) return;
@@ -115,7 +114,7 @@ void ResetPrediction::lay_power(std::size_t first_beat) {
 
 namespace {
 
-/// Copies the rows of one lane of `together`, [beat][coefficient][signal][stride], to the channels from `first_channel` on.
+/// From one lane of `together`, [beat][coefficient][signal][stride], to the channels from `first_channel` on.
 template <class Value>
 void put_channels(const std::vector<Value>& together, std::size_t beats, std::size_t signals, std::size_t stride,
                   std::size_t lane, std::size_t first_channel, Rows& rows) {
@@ -151,7 +150,6 @@ void ResetPrediction::compare_streams() {
                                : Eigen::Matrix3d::Identity());
   }
   smooth_forces(measured_, path_m_s2_);
-  // constant signals, which scale the model discrepancy of these channels
   for (std::size_t j = 0; j < recording_.beats; ++j)
     for (std::size_t i = 0; i < 3; ++i) {
       signal_[j * kRowsPerBeat + (kPathX + i) * kCoefficients] = kStreamSignal_m_s2;
@@ -159,8 +157,8 @@ void ResetPrediction::compare_streams() {
     }
 }
 
-/// Weighs the mean forces of the beats around like a second difference of positions, in W, and expresses the result in B. `more_m_s2`: added in W,
-/// [axis][beat]; for measured forces, what motion capture says beyond the IMU.
+/// Weighs mean forces over beats like a second difference of positions, in W; result in B. `more_m_s2`: added in W,
+/// [axis][beat]: for measured forces, what motion capture says beyond the IMU.
 void ResetPrediction::smooth_forces(Rows& rows, const Eigen::Matrix3Xd& more_m_s2) const {
   const auto row = [&](std::size_t j, std::size_t i) { return j * kRowsPerBeat + (kForceX + i) * kCoefficients; };
   std::vector<Eigen::Vector3d> force(recording_.beats);
@@ -187,7 +185,7 @@ Rows ResetPrediction::rows_of(const std::vector<double>& samples) const {
   return rows;
 }
 
-/// Writes the rows of the battery and current channels. `samples`: [sample][battery, left, right].
+/// `samples`: [sample][battery, left, right].
 void ResetPrediction::put_power(const std::vector<double>& samples, Rows& rows) const {
   Rows together(recording_.beats * kCoefficients * kMetered, 0);
   power_.project(samples.data(), kMetered, together.data());

@@ -1,10 +1,9 @@
-// Reset predictions, as in multiple shooting (Bock, Plitt 1984): what the sensors of many vehicles would have measured in a recorded flight. The
-// recorded voltages drive each vehicle, and its torso is reset to the recorded motion at every interval of the IMU; wings and motors keep their
-// own state. So each interval tests only the forces and torques of that moment, errors do not accumulate, and a flight is simulated once over
-// its length. The prediction of a vehicle does not depend on the other vehicles of its batch.
-//
-// The measured mean force of a beat is that of motion capture: an accelerometer aliases vibration above its sampling rate into the mean, and a
-// second difference of positions over three beats, which weighs the beats around as 1 2 3 2 1, does not. Predicted forces are weighed likewise.
+// Reset predictions, as in multiple shooting (Bock, Plitt 1984): what sensors of many vehicles would have measured.
+// Recorded voltages drive each vehicle, and its torso is reset to the record at every interval of the IMU; wings and
+// motors keep their state. So intervals test only their own forces and torques, errors do not accumulate, and a flight
+// is simulated once. Predictions do not depend on the other vehicles of a batch.
+// A beat's measured mean force is that of motion capture, a second difference of positions over three beats, which
+// weighs beats as 1 2 3 2 1: an accelerometer aliases vibration above its rate. Predicted forces are weighed likewise.
 #pragma once
 
 #include <deque>
@@ -57,7 +56,7 @@ class ResetPrediction final : public PredictedFlight {
   Eigen::Matrix3Xd path_m_s2_;             ///< [axis][beat] rows of the path channels, W
   std::vector<Eigen::Matrix3d> attitude_;  ///< [beat] B to W
   bool has_wings_ = false;
-  // for each sample of power.csv on the grid: its index, the first step that does not begin before it, and how many steps later that step begins
+  // [power.csv sample on the grid] index, first step not before it, and how many steps later that begins
   std::vector<std::size_t> power_sample_, power_step_;
   std::vector<double> power_late_;
   Rows measured_, signal_;

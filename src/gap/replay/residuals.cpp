@@ -24,7 +24,7 @@ std::vector<Residuals> predict_all(const Flights& flights, const std::vector<con
   return result;
 }
 
-/// Errors of sensors that are undone in the log. A beat-averaged vehicle predicts with its effects of sensors, so these are not undone.
+/// Errors undone in the log: none for a beat-averaged vehicle, which predicts with its effects of sensors.
 EffectValues sensors_of(const VehicleHypothesis& h) {
   EffectValues sensors = h.vehicle.beat_averaged ? EffectValues() : sensor_effects(h.vehicle.effects);
   sensors.insert(h.sensors.begin(), h.sensors.end());
@@ -55,7 +55,7 @@ std::vector<Residuals> residuals(const Flights& flights, const std::vector<Vehic
     if (sensors.empty()) compare(flights, which, threads);
     else corrected.emplace_back(sensors, which);
   }
-  // if there are fewer corrected logs than threads, each log gets several threads for its flights
+  // fewer corrected logs than threads: each log gets several threads for its flights
   const int at_once =
       std::max(1, io::thread_count(threads) / static_cast<int>(std::max<std::size_t>(1, corrected.size())));
   io::parallel_for(corrected.size(), threads, [&](std::size_t k) {

@@ -1,21 +1,18 @@
-// Undoes effects of sensors in a log: the result is the log that sensors without these effects would have written. Effects of the vehicle are
-// simulated instead. Undoing those of the sensors lets one simulation serve all of them.
+// Undoes effects of sensors in a log, so that one simulation serves all of them; effects of the vehicle are simulated.
 //
-//   gyro_bias                   gyro - drift (1 - exp(-t / warm_up)), t since the log began; the mean of the drift over the log is kept
+//   gyro_bias                   gyro - drift (1 - exp(-t / warm_up)), t since the log began; the drift's mean is kept
 //   accelerometer_misalignment  specific force rotated back by a small rotation vector
 //   vibration_rectification     specific force - gain (mean square about the mean over a beat), on every axis
 //   mocap_tilt                  poses rotated back about x and y of W
 //   marker_offset               measured point - R offset
 //   mocap_delay                 poses earlier by the delay that the header does not declare
 //
-// The following errors of declared sensors are undone likewise. They are no effects of the catalogue, for every laboratory has them and they are
-// small:
-//
+// Likewise, errors of declared sensors, which are no effects: every laboratory has them, and they are small:
 //   imu_mounting                gyro and specific force rotated back by a small rotation vector
 //   imu_place                   position of the IMU in B corrected
 //   power_delay                 samples of power.csv earlier by the delay that the header does not declare
-//   imu_clock, mocap_clock,     times scaled about the middle of the log, for a clock that runs fast by `rate`: at either end of 10 s, the
-//     power_clock                 50 ppm of a crystal are 3 % of the period of the fourth harmonic
+//   imu_clock, mocap_clock,     times scaled about the middle of the log, for a clock that runs fast by `rate`: at
+//     power_clock               the ends of 10 s, a crystal's 50 ppm are 3 % of the period of the fourth harmonic
 #pragma once
 
 #include <map>
@@ -27,7 +24,6 @@ namespace flappy::gap {
 
 /// Parameter values by [effect or error of a sensor][parameter].
 using EffectValues = std::map<std::string, std::map<std::string, double>>;
-/// The effects of sensors among `effects`.
 EffectValues sensor_effects(const EffectValues& effects);
 
 /// `log` with the given effects and errors of sensors undone; other effects are ignored.

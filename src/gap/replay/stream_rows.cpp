@@ -15,15 +15,15 @@ using Eigen::Vector3d;
 
 constexpr std::size_t kSpan = 3;
 
-/// Motion of the torso by dead reckoning of the IMU, at the bounds of its intervals.
+/// Dead reckoning of the IMU, at the bounds of its intervals.
 struct Reckoned {
   std::vector<double> t_s;
   std::vector<Vector3d> position_m, velocity_m_s;
   std::vector<Quaterniond> attitude;
 };
 
-/// `force`: specific force, B; `turn`: rotation vector, B; both [interval]. Forces are rotated into W by the smoothed attitude, which is more
-/// accurate than the reckoned one.
+/// [interval] `force`: specific force, B; `turn`: rotation vector, B. Rotated by the smoothed attitude: it is more
+/// accurate.
 Reckoned reckon(const Recording& r, const std::vector<Vector3d>& force, const std::vector<Vector3d>& turn,
                 double gravity) {
   Reckoned x;
@@ -46,7 +46,7 @@ Reckoned reckon(const Recording& r, const std::vector<Vector3d>& force, const st
   return x;
 }
 
-/// Rows from the beat means of `samples`, [pose][6]: difference of the path, rotation of the attitude; both in W.
+/// Beat means of `samples`, [pose][6]: difference of the path, rotation of the attitude; both in W.
 std::vector<StreamRow> differences(const Recording& r, const std::vector<double>& pose_s,
                                    const std::vector<double>& samples) {
   std::vector<double> beat;

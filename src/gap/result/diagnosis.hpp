@@ -1,4 +1,4 @@
-// The result of a diagnosis: plain data, which diagnosis.json holds (gap/result/diagnosis_json.hpp). Intervals hold 90 %.
+// The result of a diagnosis: plain data, which diagnosis.json holds (diagnosis_json.hpp). Intervals hold 90 %.
 #pragma once
 
 #include <map>
@@ -10,7 +10,6 @@
 
 namespace flappy::gap {
 
-/// A number with its 90 % interval, in SI units.
 struct Estimate {
   std::string name;  ///< for example "wind.speed_m_s", "imu_mounting.x_rad"
   double value = 0, low = 0, high = 0;
@@ -22,8 +21,8 @@ struct Closure {
   double value = 0, low = 0, high = 0;
 };
 
-/// none: the vehicle file explains the flights. parameters: the file explains them with other parameters. effect: one or several effects of the
-/// catalogue are missing in the file. unknown: something is missing that is not in the catalogue.
+/// none: the file explains the flights; parameters: with other parameters; effect: effects of the catalogue are missing
+/// in it; unknown: something else is.
 enum class HypothesisKind { none, parameters, effect, unknown };
 
 /// One of the hypotheses that exclude each other; their probabilities add up to 1.
@@ -52,7 +51,6 @@ struct Verdict {
 /// Stages of the residuals: the vehicle file as it is; its parameters fitted; the most probable effects fitted as well.
 enum class Stage { nominal, refit, effect };
 
-/// Tests of residuals (gap/localise/where.hpp).
 enum class ResidualTest { channel, regime, phase, frequency, input, whiteness };
 
 /// Part of the beats or of the rows that a residual belongs to.
@@ -75,7 +73,6 @@ struct ResidualLocation {
   bool discovered = false;  ///< significant; at most 5 % of the discoveries of a stage are false
 };
 
-/// A part of the residual that no effect explains.
 struct UnexplainedTerm {
   std::string channel;
   int harmonic = 0;      ///< harmonic of the beat; 0: its mean
@@ -86,7 +83,7 @@ struct UnexplainedTerm {
   double gain_nats = 0;          ///< gain of evidence
 };
 
-/// A quantity of a recorded flight, and its prediction by both vehicles along the same path in simulation; NaN if a vehicle was lost.
+/// A quantity of a recorded flight, and its simulation by both vehicles on the same path; NaN if a vehicle was lost.
 struct ClosedLoop {
   std::string flight, quantity;
   double recorded = 0, nominal = 0, corrected = 0;
@@ -98,10 +95,9 @@ struct Course {
   std::vector<double> first, second;
 };
 
-/// The proposed flight, which separates the hypotheses best (gap/diagnose/next_experiment.hpp).
 struct NextExperiment {
   std::string manoeuvre;  ///< name of a configuration in configs/gap/experiments
-  /// The most probable hypothesis, and the one that the flight separates from it best: effects joined by +, or a kind.
+  /// The most probable hypothesis and the one best separated from it: effects joined by +, or a kind.
   std::vector<std::string> separates;
   double expected_nats = 0;  ///< expected evidence between these two
   double information = 0;    ///< expected information on all hypotheses, nats
@@ -109,7 +105,6 @@ struct NextExperiment {
   std::vector<Course> courses;  ///< the largest difference first
 };
 
-/// Residual of one channel in held-out flights, as root mean square.
 struct HeldOutError {
   std::string channel;
   double rms = 0, low = 0, high = 0;  ///< 90 % interval by resampling blocks of beats
@@ -131,7 +126,6 @@ struct Validation {
     double best_of_shifted = 0;   ///< the largest share that a shifted copy removes
   };
   std::vector<Control> controls;
-  /// A magnitude estimated from each flight alone.
   struct Agreement {
     std::string name;
     std::vector<double> value, sd;  ///< [flight]
@@ -151,7 +145,7 @@ struct Diagnosis {
   std::optional<UnexplainedTerm> other_law;  ///< largest deviation of a named effect from the law of the catalogue
   std::vector<Estimate> background;          ///< further effects of the corrected vehicle, which may be due to chance
   std::vector<Estimate> sensors;             ///< errors of the declared sensors that the flights show
-  /// Fitted parameters of the vehicle, jointly with the named effects, in prior standard deviations; the largest change first.
+  /// Parameters fitted jointly with the named effects, in prior standard deviations; the largest change first.
   std::vector<std::pair<std::string, double>> moved_parameters;
   std::vector<ResidualLocation> locations;
   std::optional<double> nominal_loss, refit_loss, effect_loss;  ///< mean losses in held-out flights
@@ -171,7 +165,7 @@ const char* name_of(ResidualTest test);
 /// Text of a regime, for example "height below 0.5 m", "harmonic 2 of the beat", "0.5 to 1 Hz".
 std::string text_of(const Regime& regime, ResidualTest test);
 
-/// Discoveries of a stage by channel, regime, phase or frequency, not by input or whiteness; the largest relative to its noise first.
+/// Discoveries of a stage by channel, regime, phase or frequency only; the largest relative to its noise first.
 std::vector<ResidualLocation> largest_discoveries(const Diagnosis& diagnosis, Stage stage, std::size_t most);
 
 /// Unit of a parameter by the suffix of its name: "kg/m" for line_kg_m; "" if it has none.

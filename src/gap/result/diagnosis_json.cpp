@@ -15,8 +15,6 @@ using Json = nlohmann::ordered_json;
 constexpr std::size_t kMaxWhere = 20;
 constexpr const char* kThirds[] = {"all", "low", "middle", "high"};
 
-// ---- numbers that may be missing
-
 Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 Json finite(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
@@ -28,7 +26,6 @@ double number_of(const Json& json) {
   return json.is_null() ? std::numeric_limits<double>::quiet_NaN() : json.get<double>();
 }
 
-/// The value of an enumeration by its name.
 template <class Enum, std::size_t count>
 Enum value_named(const Json& json, const char* (*name)(Enum), const Enum (&all)[count]) {
   const std::string text = json.get<std::string>();
@@ -44,8 +41,6 @@ constexpr VerdictKind kVerdicts[] = {VerdictKind::effect, VerdictKind::group,   
 constexpr Stage kStages[] = {Stage::nominal, Stage::refit, Stage::effect};
 constexpr ResidualTest kTests[] = {ResidualTest::channel,   ResidualTest::regime, ResidualTest::phase,
                                    ResidualTest::frequency, ResidualTest::input,  ResidualTest::whiteness};
-
-// ---- parts that appear more than once
 
 Json to_json(const std::vector<Estimate>& list) {
   Json json = Json::object();

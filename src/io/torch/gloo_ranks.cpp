@@ -1,4 +1,4 @@
-// Ranks that communicate by Gloo, through LibTorch's c10d. A heartbeat in a key-value store, which rank 0 serves, detects lost ranks.
+// Ranks that communicate by Gloo (LibTorch's c10d). A heartbeat in rank 0's key-value store detects lost ranks.
 #include <atomic>
 #include <chrono>
 #include <condition_variable>

@@ -149,7 +149,6 @@ struct Learner<T>::Storage {
     return a;
   }
 
-  /// Range of gradient parts that this rank computes.
   std::pair<std::size_t, std::size_t> own_parts() const { return io::own_share(options.ranks, parts); }
   /// Exchanges the gradients and sums of all parts between ranks, in one message.
   void exchange() {

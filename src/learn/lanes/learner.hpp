@@ -1,4 +1,4 @@
-// TD3 (Fujimoto et al. 2018) and DDPG (Lillicrap et al. 2016): one gradient step on a batch sampled from a replay memory.
+// TD3 (Fujimoto et al. 2018) and DDPG (Lillicrap et al. 2016): one gradient step on a batch from a replay memory.
 // For a transition (s, a, r, s') with discount d:
 //   a' = clip(mu'(s') + clip(noise, +-noise_clip), +-1)
 //   y  = r + d min_i Q'_i(s', a')
@@ -28,17 +28,16 @@ struct Normaliser {
 
 struct LearnerOptions {
   TransitionShape shape;
-  std::vector<int> actor_hidden = {32, 32}, critic_hidden = {64, 64};  ///< widths of hidden layers
+  std::vector<int> actor_hidden = {32, 32}, critic_hidden = {64, 64};  ///< widths
   policy::Activation actor_activation = policy::Activation::relu, critic_activation = policy::Activation::relu;
-  Normaliser input;               ///< normaliser of the observations, for actor and critics
+  Normaliser input;               ///< of the observations, for actor and critics
   double last_layer_scale = 0.1;  ///< scale of the initial weights in the last layers of actor and critics
 
   bool twin = true;
   int policy_delay = 2;
   double noise_sd = 0.2, noise_clip = 0.5;  ///< noise on the target actor's action; sd 0: none
   double tau = 0.005;
-  /// Error beyond which the loss is linear; below it, the loss is e^2 / 2, as in torch's huber_loss. 0: the loss is e^2
-  /// everywhere.
+  /// The loss is e^2 / 2 up to this error and linear beyond, as in torch's huber_loss; 0: e^2 everywhere.
   double huber = 0;
   double beta1 = 0.9, beta2 = 0.999, epsilon = 1e-8;
   std::size_t batch = 256;  ///< a multiple of kChunk
@@ -58,12 +57,12 @@ struct LearnerOptions {
 /// Throws std::invalid_argument for invalid options.
 void check_options(const LearnerOptions& options);
 
-/// Initial weight of a layer, uniform within +-scale/sqrt(inputs), as in torch's nn.Linear; initial biases are 0.
-/// `number`: index of the weight, output by output. `network`: 0 for the actor, then the critics.
+/// An initial weight, uniform within +-scale/sqrt(inputs), as in torch's nn.Linear; biases are 0. `number`: index of
+/// the weight, output by output. `network`: 0 for the actor, then the critics.
 double first_weight(std::uint64_t seed, int network, int layer, int inputs, std::uint32_t number, double scale);
 
-/// Additional work for the threads of an update: run(0) to run(items - 1), each once, in any order and in parallel.
-/// run() must not throw and must not change anything that the update reads.
+/// Work for an update's threads: run(0) to run(items - 1), each once, in any order, in parallel. run() must not throw
+/// or change anything that the update reads.
 struct ParallelWork {
   std::size_t items = 0;
   std::function<void(std::size_t)> run;
@@ -91,8 +90,8 @@ class Learner {
   Learner(Learner&&) noexcept;
   Learner& operator=(Learner&&) noexcept;
 
-  /// One gradient step at the given learning rates of Adam; its threads also do the work `beside`. Allocates no memory.
-  /// Throws std::invalid_argument if `replay` is empty or has another shape.
+  /// One step of Adam; its threads also do the work `beside`. Allocates no memory. Throws std::invalid_argument if
+  /// `replay` is empty or has another shape.
   void update(const Replay& replay, double actor_rate, double critic_rate, const ParallelWork& beside = {});
 
   const LearnerOptions& options() const;

@@ -1,5 +1,5 @@
-// Products of small matrices. Every element is one chain of fused multiply-adds in the order of k, so its bits do not depend on
-// tiles or on the width of registers. For files that are compiled once for each instruction set.
+// Products of small matrices. Each element is one chain of fused multiply-adds in the order of k, so its bits do not
+// depend on tiles or the width of registers. For files compiled once for each instruction set.
 #pragma once
 
 #include <utility>
@@ -20,8 +20,7 @@ inline namespace FLAPPY_ISA {
 using sim::kWidth;
 using sim::Lanes;
 
-/// Sizes of a tile of C: at most kTile registers of sums, which leave room for the factors, in at most kTileRows rows
-/// of kTileVectors registers.
+/// A tile of C: at most kTile registers of sums, leaving room for factors, in up to kTileRows rows of kTileVectors.
 #if defined(__AVX512F__)
 inline constexpr int kTile = 24, kTileVectors = 4, kTileRows = 12;
 #elif defined(__AVX2__) && !defined(FLAPPY_SCALAR)
@@ -69,7 +68,6 @@ FLAPPY_INLINE void multiply_rest(int rows, int depth, Strided<T> a, const T* b, 
   }
 }
 
-/// multiply() for kVectors registers of columns.
 template <class T, int kVectors, bool kAccumulate>
 void multiply_panel(int rows, int depth, Strided<T> a, const T* b, std::ptrdiff_t b_row, T* c, std::ptrdiff_t c_row) {
   constexpr int kRows = kTile / kVectors < kTileRows ? kTile / kVectors : kTileRows;
@@ -78,8 +76,8 @@ void multiply_panel(int rows, int depth, Strided<T> a, const T* b, std::ptrdiff_
   multiply_rest<T, kRows - 1, kVectors, kAccumulate>(rows, depth, a, b, b_row, c, c_row);
 }
 
-/// C[i][j] = sum over k < depth of A(i, k) B[k][j], for i < rows, j < columns; with kAccumulate added to C. `columns`
-/// is a multiple of 16. `b_row`, `c_row`: lengths of the rows of B and C.
+/// C[i][j] = sum over k < depth of A(i, k) B[k][j], i < rows, j < columns; with kAccumulate added to C. `columns`: a
+/// multiple of 16. `b_row`, `c_row`: row lengths of B, C.
 template <class T, bool kAccumulate = false>
 void multiply(int rows, int columns, int depth, Strided<T> a, const T* b, std::ptrdiff_t b_row, T* c,
               std::ptrdiff_t c_row) {

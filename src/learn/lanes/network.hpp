@@ -1,6 +1,5 @@
-// Multilayer perceptrons, forward and backward, for kChunk samples at once. Values are [neuron][sample]. Weights of a layer are
-// [1 + inputs][padded outputs], the first row is the bias; a layer is one matrix product, because the first row of its inputs
-// is all ones. Padding weights are 0, have no gradient, and stay 0.
+// Perceptrons, forward and backward, for kChunk samples at once. Values are [neuron][sample]. A layer's weights are
+// [1 + inputs][padded outputs]; their first row, the bias, meets a row of ones. Padding is 0, without gradient.
 #pragma once
 
 #include "learn/lanes/matrix.hpp"
@@ -101,16 +100,14 @@ void forward(const NetworkShape& net, const T* weights, T* values) {
   }
 }
 
-/// Work memory of the backward pass: gradients of the loss by the outputs of two layers, [widest][kChunk], and one
-/// transposed.
+/// Work memory of the backward pass: the loss's gradients by two layers' outputs, [widest][kChunk], and one transposed.
 template <class T>
 struct ActivationGradients {
   T *now, *next, *transposed;
 };
 
-/// Backward pass for a sum over samples. s.now holds its gradient by the outputs. The gradient by the weights is
-/// written to `gradient`, or added if `accumulate`; null: not computed. At the end s.now holds the gradient by the
-/// network's inputs `first` to `first` + `inputs` - 1.
+/// Backward pass, summed over samples. s.now holds the gradient by the outputs, at the end by inputs `first` to `first`
+/// + `inputs` - 1. That by the weights is written to `gradient`, or added if `accumulate`; null: not computed.
 template <class T>
 void backward(const NetworkShape& net, const T* weights, const T* values, ActivationGradients<T>& s, T* gradient,
               bool accumulate, int first, int inputs) {

@@ -1,5 +1,4 @@
-// Gradients of one chunk of the batch, and the step of Adam. Compiled once for each instruction set (FLAPPY_ISA); all give the same
-// bits.
+// Gradients of a chunk and the step of Adam, compiled for each instruction set (FLAPPY_ISA); all give the same bits.
 #include "learn/lanes/update.hpp"
 
 #include "sim/noise.hpp"
@@ -33,7 +32,6 @@ FLAPPY_INLINE void gather(const UpdatePlan<T>& plan, const Workspace<T>& w, cons
   transpose(kRow, static_cast<int>(wide), w.gathered, wide, w.columns, kRow);
 }
 
-/// Normalises and clips input rows for a network.
 template <class T>
 FLAPPY_INLINE void normalise(const InputView<T>& view, const T* from, T* to) {
   const L<T> clip(view.clip);
@@ -68,8 +66,8 @@ FLAPPY_INLINE void add_noise(const UpdatePlan<T>& plan, std::uint32_t sample, in
     }
 }
 
-/// Computes the targets y of the critics into w.target. A discount of 0 removes the next observation; the clip has made
-/// it finite, so that 0 times its value is 0.
+/// Writes the critics' targets y to w.target. A discount of 0 removes the next observation; the clip has made it
+/// finite, so that 0 times its value is 0.
 template <class T>
 FLAPPY_INLINE void find_targets(const UpdatePlan<T>& plan, const Workspace<T>& w, std::uint32_t sample) {
   const int actions = plan.actor.widths[plan.actor.layers];

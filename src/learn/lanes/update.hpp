@@ -1,4 +1,4 @@
-// Interface to the parts of an update that are compiled once for each instruction set.
+// The parts of an update that are compiled once for each instruction set.
 #pragma once
 
 #include "learn/lanes/network.hpp"

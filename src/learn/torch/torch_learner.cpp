@@ -20,8 +20,7 @@ void openblas_set_num_threads(int) __attribute__((weak));
 namespace flappy::learn {
 namespace {
 
-/// One perceptron. Its tensors are views of tensors that hold the numbers of all networks, so that Adam and the
-/// targets' step are a few operations on one tensor.
+/// Its tensors are views of those with the numbers of all networks, so that a step is a few operations on one tensor.
 struct Perceptron {
   std::vector<torch::Tensor> weights, biases, gains, shifts;  // gains and shifts only with layer norm
   policy::Activation hidden;
@@ -220,8 +219,8 @@ class Learner : public TorchLearner {
     const auto count = static_cast<std::int64_t>(numbers.size());
     return torch::from_blob(const_cast<double*>(numbers.data()), {count}, torch::kDouble).to(as_);
   }
-  /// A step of Adam (Kingma and Ba 2015, arXiv 1412.6980) for `count` numbers from index `at` on. First limits the norm
-  /// of the gradient; weight decay is decoupled (Loshchilov and Hutter 2019, arXiv 1711.05101).
+  /// Adam (Kingma and Ba 2015, arXiv 1412.6980) for `count` numbers from `at`. First limits the gradient's norm; weight
+  /// decay is decoupled (Loshchilov and Hutter 2019, arXiv 1711.05101).
   void adam(std::int64_t at, std::int64_t count, const Step& step) {
     const auto part = [&](const torch::Tensor& t) { return t.narrow(0, at, count); };
     const torch::Tensor g = part(gradients_), m = part(numbers_[2]), v = part(numbers_[3]), x = part(numbers_[0]);
@@ -236,8 +235,7 @@ class Learner : public TorchLearner {
     if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);
     at::set_num_threads(1);
   }
-  /// Calls visit(index outside, index inside) for every number. Outside, in actor files, an output's bias precedes its
-  /// weights.
+  /// Calls visit(index outside, index inside). Outside, in actor files, an output's bias precedes its weights.
   template <class Visit>
   void visit(const Visit& visit) const {
     std::size_t outside = 0, at = 0;

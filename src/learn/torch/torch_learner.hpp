@@ -1,4 +1,4 @@
-// The plugin that contains the LibTorch code of the engine on LibTorch.
+// The plugin with the LibTorch code of the engine on LibTorch.
 #pragma once
 
 #include <memory>
@@ -15,8 +15,7 @@ class TorchLearner {
   enum class Kind { weights, targets, first_moments, second_moments };
   virtual ~TorchLearner() = default;
 
-  /// A step of Adam: learning rate, and corrections of the moments, first = 1 / (1 - beta1^t), root = 1 / sqrt(1 -
-  /// beta2^t).
+  /// A step of Adam: rate, and corrections of the moments, first = 1 / (1 - beta1^t), root = 1 / sqrt(1 - beta2^t).
   struct Step {
     double rate, first, root;
   };
@@ -26,8 +25,8 @@ class TorchLearner {
     bool actor_learns;
     Step actor, critic;
   };
-  /// Computes the gradients for batch.rows, on the calling thread only. `share`: share of these rows in the whole
-  /// batch, by which gradients and metrics are multiplied.
+  /// Computes the gradients for batch.rows, on the calling thread only. `share`: of these rows in the whole batch, by
+  /// which gradients and metrics are multiplied.
   virtual UpdateMetrics differentiate(const Replay& replay, const Batch& batch, double share) = 0;
   /// Does the step of Adam after differentiate().
   virtual void step(const Batch& batch) = 0;
@@ -40,7 +39,6 @@ class TorchLearner {
   virtual void set(Kind kind, std::span<const double> numbers) = 0;
 };
 
-/// Functions of the plugin.
 struct TorchLearnerFunctions {
   /// `twice`: double precision, for tests. Throws io::InputError for a device that LibTorch does not have.
   std::unique_ptr<TorchLearner> (*make)(const LearnerOptions& options, bool twice);

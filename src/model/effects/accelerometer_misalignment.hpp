@@ -1,7 +1,6 @@
-// The accelerometer's axes are turned against those of the gyro and the body by a small rotation vector e:
-//   measured = R(e) f
-// [1] Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed., 2004, ch. 8: cross-axis errors. Valid for
-//     the few degrees of a soldered part.
+// The accelerometer's axes are turned against those of gyro and body by a small rotation vector e, valid for a few
+// degrees: measured = R(e) f
+// [1] Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed., 2004, ch. 8: cross-axis errors.
 #pragma once
 
 #include "model/effects/effect.hpp"

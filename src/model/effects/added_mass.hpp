@@ -1,13 +1,13 @@
-// Air that a wing accelerates: strips of rho pi/4 c^2 per span, which move with the velocity v_n of mid-chord along the wing's normal (+x of the
-// wing), and rho pi/128 c^4 per span, which turns about mid-chord,
-//   dF = -factor rho pi/4 c^2 v_n' dr     dM = -factor rho pi/128 c^4 Omega_y' dr     v_n = v_x - c/2 Omega_y - s r Omega_z
-// v: velocity of the shoulder in the air, Omega: angular velocity of the wing, both in the wing's frame; ' is the rate of change of these
-// components. So the wing's force and moments are rates of three momenta, linear in u = (v_x, Omega_y, Omega_z) with the planform's c^2 r^n.
-// [1] Sane, Dickinson, J. Exp. Biol. 205, 2002 (after Sedov 1965). [2] Whitney, Wood, J. Fluid Mech. 660, 2010.
-//     Like them, without Kirchhoff's terms Omega x momentum: separated flow has no leading-edge suction.
-// In time: the wing, and through the shoulder the body, feels the difference of the momenta from one step to the next one step later, so no
-// momentum is lost. For the hinges, their own part is added as inertia in the same step and its lagged share is subtracted, because added mass may
-// exceed the wing's own. The body's part may lag, because it is below a tenth of the body's mass.
+// Air that a wing accelerates: strips of rho pi/4 c^2 per span, which move with the velocity v_n of mid-chord along the
+// wing's normal (+x of the wing), and rho pi/128 c^4 per span, which turns about mid-chord,
+//   dF = -factor rho pi/4 c^2 v_n' dr   dM = -factor rho pi/128 c^4 Omega_y' dr   v_n = v_x - c/2 Omega_y - s r Omega_z
+// v: velocity of the shoulder in the air, Omega: angular velocity of the wing, in the wing's frame; ': rate of these
+// components. So force and moments are rates of three momenta, linear in u = (v_x, Omega_y, Omega_z) with the
+// planform's c^2 r^n. In time, wing and body feel the difference of the momenta of two steps one step later, so no
+// momentum is lost. For the hinges, their own part is inertia in the same step, less its lagged share, because added
+// mass may exceed the wing's own. The body's part may lag: it is below a tenth of the body's mass.
+// [1] Sane, Dickinson, J. Exp. Biol. 205, 2002 (after Sedov 1965). [2] Whitney, Wood, J. Fluid Mech. 660, 2010: like
+// them, without Kirchhoff's terms Omega x momentum, because separated flow has no leading-edge suction.
 #pragma once
 
 #include "model/effects/effect.hpp"
@@ -20,7 +20,6 @@ struct AddedMass {
   static constexpr std::array<EffectParameter, 1> kParameters{{{"factor", 0, 5, 1, 0, 3}}};
   static constexpr int kStates = 11;  // 1 after the first step; per side: u, beta', theta' of the last step
 
-  /// u of one side.
   template <int side, class T>
   static FLAPPY_INLINE Vec3<T> motion(const Surroundings<T>& s) {
     const WingPose<T>& g = of_side<side>(s.pose);

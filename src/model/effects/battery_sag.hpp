@@ -1,10 +1,11 @@
-// A battery whose voltage falls under load and with discharge, and a driver whose commands are shares d = V / nominal of the battery's voltage:
+// A battery whose voltage falls under load and with discharge, and a driver whose commands are shares d = V / nominal
+// of it:
 //   V_b = nominal - source_ohm I - fade Q     I = d_l i_l + d_r i_r     i = (d V_b - K N phi') / R     dQ/dt = I
-// with phi' the motor's rate about the stroke axis; solved for V_b. The motors get d V_b. I is what a pulse-width-modulated bridge draws for the
-// currents of both motors: its input and output power are equal, and energy that a motor returns flows back into the battery.
-// [1] Chen, Rincon-Mora, Accurate electrical battery model, IEEE Trans. Energy Conversion 21(2), 2006: source voltage as a function of the
-//     charge, less a series resistance times the current; here linear in the charge, without its slow RC pairs.
-// Valid over the flat part of a discharge; V_b without load is never below 0. A flight starts with a full battery.
+// with phi' the motor's rate about the stroke axis; solved for V_b. The motors get d V_b. I is what a lossless PWM
+// bridge draws; energy that a motor returns flows back into the battery. A flight starts with a full battery. Valid
+// over the flat part of a discharge; V_b without load is never below 0.
+// [1] Chen, Rincon-Mora, Accurate electrical battery model, IEEE Trans. Energy Conversion 21(2), 2006: source voltage
+// as a function of charge, less a series resistance times the current; here linear, without its slow RC pairs.
 #pragma once
 
 #include "model/effects/effect.hpp"

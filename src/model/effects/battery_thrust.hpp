@@ -1,6 +1,5 @@
-// The beat frequency falls with the battery's voltage, because the driver's command is a share of that voltage, as logged,
-//   a' = a (1 + gain (V / V_nominal - 1))     for each flapping actuator
-// gain 1: the frequency is proportional to the voltage. The multibody model describes the battery itself (battery_sag) and needs no gain.
+// The beat frequency falls with the battery's voltage, because the driver's command is a share of it, for each flapping
+// actuator: a' = a (1 + gain (V / V_nominal - 1)). The multibody model has battery_sag instead.
 // [1] Chen, Rincon-Mora, Accurate electrical battery model, IEEE Trans. Energy Conversion 21(2), 2006: why V falls.
 #pragma once
 

@@ -1,10 +1,11 @@
-// Effects on a beat-averaged robot (model/beat_averaged.hpp). In addition to its stages within the beat (effect.hpp), or instead of them, an
-// effect has one or more stages for the mean over beats:
+// Effects on a beat-averaged robot (model/beat_averaged.hpp): stages for the mean over beats, besides or instead of
+// those within the beat (effect.hpp):
 //   beat_averaged_drive(parameters, BeatAveragedDrive&)          how actuators follow their inputs
-//   beat_averaged_wind(parameters, state, Vec3&)         velocity of the air, in B
-//   beat_averaged_load(parameters, state, BeatAveragedLoads&)    force and moment in addition to those of the vehicle's file
-//   beat_averaged_seen(parameters, state, Vec3&)         specific force as motion capture shows it
-// and `vehicle` of effect.hpp. If these stages need other parameters, the effect has kBeatAveragedParameters, of which the first kBeatAveragedMagnitudes are magnitudes.
+//   beat_averaged_wind(parameters, state, Vec3&)                 velocity of the air, in B
+//   beat_averaged_load(parameters, state, BeatAveragedLoads&)    force and moment in addition to those of the file
+//   beat_averaged_seen(parameters, state, Vec3&)                 specific force as motion capture shows it
+// and `vehicle` of effect.hpp. If these stages need other parameters, the effect has kBeatAveragedParameters, of which
+// the first kBeatAveragedMagnitudes are magnitudes.
 #pragma once
 
 #include "model/effects/effect.hpp"
@@ -13,14 +14,12 @@
 namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
-/// Changes between the inputs and the wings.
 template <class T>
 struct BeatAveragedDrive {
   T delay_s{0}, lag_s{0};
   T battery_gain{0};  ///< flapping actuators are multiplied by 1 + gain (battery / nominal - 1)
 };
 
-/// State of a robot at an instant, averaged over beats.
 template <class T>
 struct BeatAveragedState {
   Matrix3<T> attitude;     ///< R_WB
@@ -47,8 +46,8 @@ struct BeatAveragedLoads {
 
 }  // namespace FLAPPY_ISA
 
-/// Parameters of an effect's beat-averaged stages: kBeatAveragedParameters if it has them, because a larger or different robot
-/// needs other ranges, else kParameters.
+/// Parameters of an effect's beat-averaged stages: kBeatAveragedParameters if it has them, because a larger or
+/// different robot needs other ranges, else kParameters.
 template <class Effect>
 constexpr const auto& beat_averaged_parameters() {
   if constexpr (requires { Effect::kBeatAveragedParameters; }) return Effect::kBeatAveragedParameters;

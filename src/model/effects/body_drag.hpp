@@ -1,7 +1,6 @@
-// Drag of the torso, even in voltage and quadratic in speed:
-//   F = -1/2 rho C_d A |v| v,  v the velocity of the drag centre in the air, which lies on the body's z axis
+// Drag of the torso: F = -1/2 rho C_d A |v| v, v: velocity in the air of the drag centre, which lies on the body's z
+// axis. Valid for |v| up to a few m/s (Re 1e3 to 1e4 on a 20 mm torso). C_d A of a 12 g vehicle: 1e-3 to 2e-3 m^2.
 // [1] Hoerner, Fluid-Dynamic Drag, 1965, ch. 3: bluff bodies, C_d constant above Re about 1e3.
-// Valid for |v| up to a few m/s (Re 1e3 to 1e4 on a 20 mm torso). C_d A of a 12 g vehicle: 1e-3 to 2e-3 m^2.
 #pragma once
 
 #include "model/effects/beat_averaged_effect.hpp"

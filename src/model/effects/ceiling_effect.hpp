@@ -1,11 +1,9 @@
 // Thrust gained near a ceiling, as a factor on the lift of the wings:
-//   k = 1 + gain exp(-h / length)      h: clearance of the stroke plane to the ceiling
-// [1] Hsiao, Chirarattananon, Ceiling effects for hybrid aerial-surface locomotion of small rotorcraft, IEEE/ASME Trans.
-//     Mechatronics 24(5), 2019: thrust at constant power rises as a monotonic function of clearance / rotor radius, about 1.1
-//     at half a radius. The exponential is the form of He et al. 2019 for the ground. Near contact, the power in [1] falls to
-//     a third: more than this form can describe.
-// The force in the plane of the strokes is unchanged, as for the ground. Assumes a level attitude and a flat ceiling; above the ceiling h counts as
-// 0.
+//   k = 1 + gain exp(-h / length)      h: clearance of the stroke plane to the ceiling, 0 above it
+// The force in the plane of the strokes is unchanged, as for the ground. Assumes a level attitude and a flat ceiling.
+// [1] Hsiao, Chirarattananon, Ceiling effects for hybrid aerial-surface locomotion of small rotorcraft, IEEE/ASME
+// Trans. Mechatronics 24(5), 2019: thrust rises monotonically at constant power, about 1.1 at half a rotor radius. Near
+// contact the power in [1] falls to a third, more than this exponential (He et al. 2019, for the ground) can describe.
 #pragma once
 
 #include "model/effects/effect.hpp"

@@ -1,14 +1,15 @@
 // Wings that come together at the end of a stroke separate with more circulation, as a factor on the lift of both:
 //   k = 1 + gain e      e = max(S((a - contact) / width), remaining e)      the remaining e decays by
 //   d e/dt = -e |psidot| R / (2 c)      S(x) = 3 x^2 - 2 x^3 in [0, 1]
-// a: the smaller of both strokes' deflections to one side (front and rear alike); 0 if they differ in sign. Wing tips are 2 (y_s + R cos a) apart
-// and close by 2 R per radian near a = pi/2: by one chord over width = c / 2R, within which the gain rises to its full value. It starts to rise at
-// contact_rad; at the typical 1.3 rad the tips are three chords apart, at 1.62 rad one chord. The gain decays while the tip travels two chords, as
-// a started vortex is left behind (Wagner 1925).
-// [1] Lehmann, Sane, Dickinson, The aerodynamic effects of wing-wing interaction in flapping insect wings, J. Exp. Biol. 208,
-//     2005: up to 17 % of the lift of a stroke, after the reversal, with wings 10 to 12 deg apart. [2] Weis-Fogh, J. Exp. Biol. 59,
-//     1973: the bound vortex of each wing is the starting vortex of the other, so circulation need not wait for a vortex to be shed.
-// [1] measured more drag, too; here only the lift grows. The parameter is the gain at contact; its mean over a beat is smaller.
+// a: the smaller of both strokes' deflections to one side (front and rear alike); 0 if they differ in sign. Wing tips
+// are 2 (y_s + R cos a) apart and close by 2 R per radian near a = pi/2: by one chord over width = c / 2R, within which
+// the gain rises fully from contact_rad (at the typical 1.3 rad the tips are three chords apart, at 1.62 rad one). It
+// decays while the tip travels two chords, as a started vortex is left behind (Wagner 1925). Only the lift grows,
+// though [1] measured more drag, too. The parameter is the gain at contact; its mean over a beat is smaller.
+// [1] Lehmann, Sane, Dickinson, The aerodynamic effects of wing-wing interaction in flapping insect wings, J. Exp.
+// Biol. 208, 2005: up to 17 % of a stroke's lift, after the reversal, with wings 10 to 12 deg apart. [2] Weis-Fogh, J.
+// Exp. Biol. 59, 1973: each wing's bound vortex is the other's starting vortex, so circulation need not wait for one to
+// be shed.
 #pragma once
 
 #include "model/effects/effect.hpp"

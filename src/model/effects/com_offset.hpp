@@ -1,7 +1,6 @@
-// The torso's centre of mass differs from that of the vehicle file by (x, y, z) in B; its inertia about it is unchanged.
-// A thrust F then has the moment r x F, r from the new centre of mass: 1 mm on a 12 g vehicle is 31 rad/s^2 of pitch with the torso's inertia
-// alone; the wings, which are carried along, reduce it by a fifth.
-// [1] Goldstein, Classical Mechanics, ch. 5: rigid bodies. Exact, under the assumption that only battery and boards moved.
+// The torso's centre of mass differs from the vehicle file by (x, y, z) in B; its inertia about it is unchanged. Exact
+// if only battery and boards moved. The thrust's moment: 1 mm on a 12 g vehicle is 31 rad/s^2 of pitch with the torso's
+// inertia alone, a fifth less with the wings, which are carried along. [1] Goldstein, Classical Mechanics, ch. 5.
 #pragma once
 
 #include "model/effects/effect.hpp"

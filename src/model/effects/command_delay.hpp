@@ -1,7 +1,6 @@
-// The voltage arrives late: V(t - delay). Fractions of a step are interpolated linearly between steps; before the start of a
-// flight the voltage is 0.
+// The voltage arrives late: V(t - delay), interpolated linearly between steps; 0 before the start of a flight. Valid up
+// to kSlots - 2 steps, 25 ms at 1e-4 s; the delay is rounded to 1/1024 of a step.
 // [1] Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., ch. 4: transport delay.
-// Valid up to kSlots - 2 steps, 25 ms at 1e-4 s; the delay is rounded to 1/1024 of a step.
 #pragma once
 
 #include "model/effects/beat_averaged_effect.hpp"

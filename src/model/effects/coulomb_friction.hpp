@@ -1,8 +1,8 @@
-// Dry friction of motor and stroke joint that is larger at rest than in motion (Stribeck):
-//   f (1 + extra exp(-|phi'| / stribeck))      f: friction of the base model; phi': the motor's rate about the stroke axis
-// [1] Armstrong-Helouvry, Dupont, Canudas de Wit, A survey of models, analysis tools and compensation methods for the control
-//     of machines with friction, Automatica 30(7), 1994, sec. 2: stiction, and friction falling with speed.
-// No memory of the contact (presliding, rising static friction). The larger friction sticks like that of the base model.
+// Dry friction of motor and stroke joint that is larger at rest than in motion (Stribeck), without memory of the
+// contact:
+//   f (1 + extra exp(-|phi'| / stribeck))      f: friction of the base model; phi': motor's rate about the stroke axis
+// [1] Armstrong-Helouvry, Dupont, Canudas de Wit, A survey of models, analysis tools and compensation methods for the
+// control of machines with friction, Automatica 30(7), 1994, sec. 2: stiction, and friction falling with speed.
 #pragma once
 
 #include "model/effects/effect.hpp"

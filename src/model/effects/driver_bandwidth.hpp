@@ -1,7 +1,7 @@
-// The motor's voltage follows the driver's as a first-order lag, from 0 at the start of a flight:
-//   lag dV/dt = V_driver - V      exact for a voltage that is constant over a step; V is taken at the end of the step
-// [1] Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., ch. 4. It describes filters of the driver. It does not describe the
-// winding's L/R, which the base model neglects: that would also lag the back-EMF.
+// The motor's voltage follows the driver's filters as a first-order lag, from 0 at the start of a flight, lag dV/dt =
+// V_driver - V: exact for a voltage constant over a step; V at its end. Not the winding's L/R, which would also lag the
+// back-EMF.
+// [1] Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., ch. 4.
 #pragma once
 
 #include "model/effects/beat_averaged_effect.hpp"

@@ -1,7 +1,6 @@
-// A driver with a dead zone: its output is V - dead sgn V outside the zone, 0 within.
+// A driver with a dead zone: its output is V - dead sgn V outside, 0 within. It resembles a half bridge's dead time and
+// voltage drop, whose sign is that of the current, which differs where back-EMF exceeds the voltage.
 // [1] Tao, Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, 1996, ch. 2: dead zone.
-// It resembles a half bridge's dead time and the voltage drop of its switches, which reduce every voltage. Their sign is that of the current, which
-// differs from that of the voltage where back-EMF exceeds the voltage.
 #pragma once
 
 #include "model/effects/effect.hpp"

@@ -3,8 +3,8 @@
 //   kParameters          names with units, and ranges: magnitudes first, then shape parameters
 //   kStates              number of rows of memory from step to step, 0 at a reset; an effect without memory omits it
 //   one or more stages   static templates that change the result of a stage of the step
-// and one line in registry.hpp. Simulation, randomisation, the vehicle file and diagnosis all read that one description. A stage is found by its
-// name; an effect without it costs nothing there. In the order of a step:
+// and one line in registry.hpp. Simulation, randomisation, the vehicle file and diagnosis all read that one
+// description. A stage is found by its name; an effect without it costs nothing there. In the order of a step:
 //   vehicle(parameters, Vehicle&)                            the vehicle, before constants are derived from it
 //   motor(parameters, surroundings, state, Sides<Hinges>&)   rate of each motor, if it differs from that of its wing
 //   hinges(parameters, surroundings, state, Sides<Hinges>&)  motors, springs and stops of both sides
@@ -45,7 +45,6 @@ struct EffectInfo {
 
 inline namespace FLAPPY_ISA {
 
-/// Constants of one side that the base model does not need.
 template <class T>
 struct SideConstants {
   T resistance_ohm, back_emf_V_s;  // of the motor, the latter per stroke rate
@@ -69,7 +68,6 @@ struct Hinges {
   T stroke_torque_Nm, rotation_torque_Nm, rotation_inertia_kg_m2, cross_inertia_kg_m2;
 };
 
-/// Quantities that effects may read.
 template <class T>
 struct Surroundings {
   const Parameters<T>& p;
@@ -98,8 +96,7 @@ struct StateRows {
 
   FLAPPY_INLINE T get(int row) const { return T::load(rows + row * stride); }
   FLAPPY_INLINE void set(int row, const T& value) const { where(on, value, get(row)).store(rows + row * stride); }
-  /// Adds to a compensated sum in `row` and `row + 1`, so that small increments survive in single precision (Kahan
-  /// 1965).
+  /// Adds to a compensated sum (Kahan 1965) in `row` and `row + 1`: small increments survive in single precision.
   FLAPPY_INLINE void add(int row, const T& increment) const {
     const T sum = get(row), more = increment - get(row + 1);
     const T next = sum + more;
@@ -108,8 +105,7 @@ struct StateRows {
   }
 };
 
-// Lane-by-lane choice between results of stages. Written out member by member, so that compilers keep them in
-// registers.
+// Lane-by-lane choice between results of stages, member by member so that compilers keep them in registers.
 
 template <class T>
 FLAPPY_INLINE Hinges<T> where(auto m, const Hinges<T>& a, const Hinges<T>& b) {
@@ -163,7 +159,6 @@ FLAPPY_INLINE WingFlow<T> flow(const Surroundings<T>& s) {
           {g.body_rate_L.x, g.body_rate_L.y, g.body_rate_L.z + g.beta_rate}};
 }
 
-/// Height of the stroke plane in W.
 template <class T>
 FLAPPY_INLINE T stroke_plane_z(const Surroundings<T>& s) {
   return s.position_m.z + s.attitude.row_z.z * s.stroke_plane_m;

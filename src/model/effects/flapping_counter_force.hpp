@@ -1,9 +1,8 @@
-// Flapping counter-force: flapping wings brake the motion of the robot, because the half-stroke against the motion meets more air than the one with
-// it. Over a beat
-//   F_i = -rate_i m (f / f_nominal) v_i     i = x, y, z in B; v: velocity of the robot in the air; the component along z is called heave damping
-// It is linear in velocity and in the beat frequency f. The multibody model includes it without this effect, through the air on its wings.
-// [1] Cheng, Deng, Translational and rotational damping of flapping flight and its dynamics and stability at hovering, IEEE Trans. Robotics
-//     27(5), 2011: linear in velocity, and larger with stroke amplitude and frequency. Valid for v well below the wings' own speed.
+// Flapping counter-force: the half-stroke against the robot's motion meets more air than the one with it. Over a beat
+//   F_i = -rate_i m (f / f_nominal) v_i     i = x, y, z in B; v: velocity in the air; along z: heave damping
+// Valid for v well below the wings' own speed. The multibody model includes it through the air on its wings.
+// [1] Cheng, Deng, Translational and rotational damping of flapping flight and its dynamics and stability at hovering,
+// IEEE Trans. Robotics 27(5), 2011: linear in velocity, and larger with stroke amplitude and frequency.
 #pragma once
 
 #include "model/effects/beat_averaged_effect.hpp"

@@ -1,15 +1,16 @@
-// Play between motor and wing: motor and gear (phi, all about the stroke axis) turn freely within a dead zone `gap`, and press on the wing with the
-// teeth's stiffness k and damping d at its ends:
+// Play between motor and wing: motor and gear (phi, all about the stroke axis) turn freely within a dead zone `gap`,
+// and press on the wing with the teeth's stiffness k and damping d at its ends:
 //   J phi'' = T V - b phi' - f sgn phi' - tau      tau = k (phi - psi -+ gap/2) + d (phi' - psi')
-// Rotor inertia J, damping b and friction f, including the small shares of the joint, belong to the motor's side. Both rates are taken at the end of
-// the step (implicit Euler): with K = k h + d, D = J/h + b/2 + K and N the terms that drive phi' without psi',
+// Rotor inertia J, damping b and friction f, including the small shares of the joint, belong to the motor's side. Both
+// rates are taken at the end of the step (implicit Euler): with K = k h + d, D = J/h + b/2 + K and N the terms that
+// drive phi' without psi',
 //   phi'_new = (N + K psi'_new) / D      tau = k (phi - psi -+ gap/2) + K N / D - K (1 - K/D) psi'_new
-// so the teeth act on the wing as a torque and as an inertia h K (1 - K/D), which tends to J + h b/2 for k -> infinity: the rigid gear of the base
-// model, which gap = 0 gives exactly.
-// [1] Nordin, Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38(10), 2002: the dead-zone model with damping. Unlike in
-//     their physical model, separating teeth may pull for a moment.
-// The body feels the rotor's spin (motor.hpp) at the wing's rate: S (phi' - psi') is neglected.
-// k is the motor's stall torque per 0.001 rad, d a damping ratio of 0.1 on J. A flight starts in the middle of the gap.
+// so the teeth act on the wing as a torque and as an inertia h K (1 - K/D), which tends to J + h b/2 for k -> infinity:
+// the rigid gear of the base model, which gap = 0 gives exactly.
+// [1] Nordin, Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38(10), 2002: the dead-zone
+// model with damping. Unlike in their physical model, separating teeth may pull for a moment.
+// The body feels the rotor's spin (motor.hpp) at the wing's rate: S (phi' - psi') is neglected. k is the motor's stall
+// torque per 0.001 rad, d a damping ratio of 0.1 on J. A flight starts in the middle of the gap.
 #pragma once
 
 #include "model/effects/effect.hpp"

@@ -1,10 +1,11 @@
 // Thrust gained near the ground, as a factor on the lift of the wings:
-//   k = 1 + gain exp(-h / length)      h: height of the stroke plane over the ground
-// [1] He, Kou, Calaf, Leang, In-ground-effect modeling and nonlinear-disturbance observer for multirotor unmanned aerial
-//     vehicle control, J. Dyn. Syst. Meas. Control 141(7), 071013, 2019: k = 1 + C_a exp(-C_b h / R), fitted to small rotors.
-// Finite when standing, unlike 1 / (1 - (R / 4h)^2) (Cheeseman and Bennett 1955), from which it differs by at most 0.4 % for h > R with gain 0.27,
-// length 0.7 R. The ground reduces the downwash: for the same power, and so the same drag of the wings, the lift is larger. Therefore the force in
-// the plane of the strokes is unchanged. Assumes a level attitude and a flat ground; below the ground h counts as 0.
+//   k = 1 + gain exp(-h / length)      h: height of the stroke plane over the ground, 0 below it
+// Finite when standing, unlike 1 / (1 - (R / 4h)^2) (Cheeseman and Bennett 1955), from which it differs by at most 0.4
+// % for h > R with gain 0.27, length 0.7 R. The lift is larger for the same power, and so the same drag: the force in
+// the plane of the strokes is unchanged. Assumes a level attitude and a flat ground.
+// [1] He, Kou, Calaf, Leang, In-ground-effect modeling and nonlinear-disturbance observer for multirotor unmanned
+// aerial vehicle control, J. Dyn. Syst. Meas. Control 141(7), 071013, 2019: k = 1 + C_a exp(-C_b h / R), fitted to
+// small rotors.
 #pragma once
 
 #include "model/effects/beat_averaged_effect.hpp"

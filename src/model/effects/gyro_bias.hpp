@@ -1,8 +1,8 @@
-// Drift of a gyro's bias in addition to the constant bias of the sensor model: the part is warmed by its own current,
-//   b(t) = drift (1 - exp(-t / warm_up))      t since the flight's start
-// The first order is our assumption; data sheets of consumer parts give seconds to minutes. An additional random walk is left to the filters' own
-// process noise. [1] El-Sheimy, Hou, Niu, Analysis and modeling of inertial sensors using Allan variance, IEEE Trans. Instrum. Meas. 57(1), 2008:
-//     the slow noise of MEMS gyros.
+// Drift of a gyro's bias from the flight's start, as the part warms up: b(t) = drift (1 - exp(-t / warm_up)), our
+// assumption; data sheets of consumer parts give seconds to minutes. A random walk is left to the filters' own process
+// noise.
+// [1] El-Sheimy, Hou, Niu, Analysis and modeling of inertial sensors using Allan variance, IEEE Trans. Instrum. Meas.
+// 57(1), 2008: the slow noise of MEMS gyros.
 #pragma once
 
 #include "model/effects/effect.hpp"

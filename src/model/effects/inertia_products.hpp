@@ -1,9 +1,7 @@
-// Products of the torso's inertia in addition to those of the vehicle file, as fractions of the mean I of its principal moments about its centre of
-// mass:
-//   I_xy + xy I     I_xz + xz I     I_yz + yz I        (elements of the tensor: I_xy = -integral of x y)
-// [1] Goldstein, Classical Mechanics, ch. 5. Exact. The accepted fractions keep the inertia of a torso positive if its moments differ by less than
-// a
-// factor of two; beyond 0.15 some combinations are physically impossible.
+// Products of the torso's inertia in addition to those of the vehicle file, as fractions of the mean I of its principal
+// moments: I_xy + xy I, I_xz + xz I, I_yz + yz I (elements of the tensor: I_xy = -integral of x y). The accepted
+// fractions keep the inertia positive if its moments differ by less than a factor of two; beyond 0.15 some combinations
+// are impossible. Exact. [1] Goldstein, Classical Mechanics, ch. 5.
 #pragma once
 
 #include "model/effects/effect.hpp"

@@ -1,7 +1,5 @@
-// The tracked point is offset from the torso origin by d, in B:
-//   seen position = p + R_WB d
-// [1] Furgale, Rehder and Siegwart, Unified temporal and spatial calibration for multi-sensor systems, IROS 2013: the
-//     lever arm between sensors.
+// The tracked point is offset from the torso origin by d, in B: seen position = p + R_WB d
+// [1] Furgale, Rehder and Siegwart, Unified temporal and spatial calibration for multi-sensor systems, IROS 2013.
 #pragma once
 
 #include "model/effects/beat_averaged_effect.hpp"

@@ -1,9 +1,6 @@
-// Poses arrive later than their declared latency by a constant: a pose that is declared for the time t shows
-//   p(t - delay), R_WB(t - delay)
-// interpolated between the ends of control periods by cubics through positions and rates (Hermite); before the start of a flight the pose is its
-// first.
-// [1] Furgale, Rehder and Siegwart, Unified temporal and spatial calibration for multi-sensor systems, IROS 2013: the
-//     time offset between sensors.
+// Poses arrive later than declared by a constant: a pose declared for the time t shows p(t - delay), R_WB(t - delay),
+// interpolated between ends of control periods by Hermite cubics; before the start of a flight, the first pose.
+// [1] Furgale, Rehder and Siegwart, Unified temporal and spatial calibration for multi-sensor systems, IROS 2013.
 #pragma once
 
 #include "model/effects/effect.hpp"

@@ -1,7 +1,7 @@
 // The world frame of motion capture is tilted against the vertical by a small rotation vector e about its x and y:
 //   seen position = R(e) p, seen attitude = R(e) q
-// [1] Furgale, Rehder and Siegwart, Unified temporal and spatial calibration for multi-sensor systems, IROS 2013: the direction of gravity as an
-//     unknown of the calibration.
+// [1] Furgale, Rehder and Siegwart, Unified temporal and spatial calibration for multi-sensor systems, IROS 2013: the
+// direction of gravity as an unknown of the calibration.
 #pragma once
 
 #include "model/effects/beat_averaged_effect.hpp"

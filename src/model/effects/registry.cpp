@@ -27,7 +27,6 @@ CatalogueEffect effect_at() {
   return e;
 }
 
-/// Calls a stage that takes its parameters as an array.
 template <auto stage, std::size_t count, class... Further>
 void staged(const double* parameters, Further... further) {
   stage(*reinterpret_cast<const double(*)[count]>(parameters), further...);

@@ -55,7 +55,6 @@ using Effects = std::tuple<ComOffset, InertiaProducts, WingInertiaShape, WingDam
                            ClapAndFling, GroundEffect, CeilingEffect, AddedMass, WallEffect, BodyDrag, Tether, GyroBias,
                            AccelerometerMisalignment, VibrationRectification, MocapTilt, MarkerOffset, MocapDelay>;
 
-/// Effects that have a beat-averaged stage, in the order in which they act.
 using BeatAveragedEffects = std::tuple<ComOffset, InertiaProducts, CommandDelay, DriverBandwidth, BatteryThrust, Wind,
                                        GroundEffect, BodyDrag, Tether, FlappingCounterForce, TranslationalLift,
                                        StrokePlaneActuation, ThrustAxisTilt, MocapTilt, MarkerOffset>;
@@ -72,7 +71,6 @@ constexpr int states_of() {
   else return 0;
 }
 
-/// Number of rows of parameters before those of effect `I`; of all effects for I = kEffects.
 template <int I>
 constexpr int effect_rows_before() {
   if constexpr (I == 0) return 0;
@@ -82,7 +80,6 @@ inline constexpr int kEffectParameterRows = effect_rows_before<kEffects>();
 /// Number of rows that effects read: their parameters, then the SideConstants of the left and of the right side.
 inline constexpr int kEffectRows = kEffectParameterRows + 2 * kRows<SideConstants>;
 
-/// Number of rows of memory of the effects in `set`.
 template <int I = 0>
 constexpr int state_rows(std::uint64_t set) {
   if constexpr (I == kEffects) return 0;
@@ -104,26 +101,21 @@ struct CatalogueEffect {
   std::vector<double> values(const std::map<std::string, double>& given) const;
   /// Values of all parameters in a vehicle; the magnitudes are 0 if the vehicle does not have the effect.
   std::vector<double> values_of(const Vehicle& vehicle) const;
-  /// Whether any magnitude among these values differs from 0.
   bool acts(const std::vector<double>& values) const;
 };
 
 /// The effects within the beat. The index of an effect is also its bit in a block's set.
 const std::vector<CatalogueEffect>& effects();
-/// The effects that a vehicle may have: effects(); for a beat-averaged robot those with a beat-averaged stage; with
-/// articulated wings those of sensors.
+/// Effects that a vehicle may have: effects(); if beat-averaged, those with such a stage; if jointed, those of sensors.
 const std::vector<CatalogueEffect>& catalogue_of(const Vehicle& vehicle);
 /// Null if the vehicle's catalogue does not have the effect.
 const CatalogueEffect* find_effect(const Vehicle& vehicle, const std::string& id);
-/// Bits of the effects in Stage::sensor.
 std::uint64_t sensor_effects();
 /// Index of `id` in effects(), or -1.
 int effect_index(const char* id);
-/// Whether any kind of vehicle may have the effect.
 bool is_effect(const std::string& id);
 /// The group of an effect (EffectInfo::group), or its own id if it has no group.
 std::string group_of(const std::string& id);
-/// Ids of all effects of the same group in a catalogue, in the order of the catalogue.
 std::vector<std::string> whole_group(const std::vector<CatalogueEffect>& catalogue, const std::string& id);
 
 }  // namespace flappy::model

@@ -1,12 +1,12 @@
 // Circulation of a wing that rotates while it translates (Kramer effect); its force is normal to the wing:
 //   F = factor rho C_r |U| theta' c^2 per span,  C_r = pi (0.75 - x_0),  x_0 = 0: the wing turns about its leading edge
-// Thin-aerofoil theory: the circulation makes the flow tangent at 3/4 chord, which theta' > 0 moves by 0.75 c theta' towards -x on either stroke; the
-// force is towards +x. So it increases the force of a wing that pitches up and reduces that of a wing that pitches down. U = s w_z r - v_x is assumed
-// to have one sign along the wing, that at r_cp. Its moments are those of the planform: c^2 r^n, and, because the force is taken to act at mid-chord,
-// c/2 c^2 r^n about the leading edge, which added mass has as well.
-// [1] Sane, Dickinson, The aerodynamic effects of wing rotation and a revised quasi-steady model of flapping flight,
-//     J. Exp. Biol. 205, 2002 (after Fung 1969, Ellington 1984). C_r measured: 1.55 to 2.1 at x_0 = 0.25 for 1.57.
-// Valid for c theta' / U below about 1, so not at rest.
+// Thin-aerofoil theory: the circulation makes the flow tangent at 3/4 chord, which theta' > 0 moves by 0.75 c theta'
+// towards -x on either stroke; the force is towards +x. So a wing that pitches up gains force, one that pitches down
+// loses it. U = s w_z r - v_x is assumed to have one sign along the wing, that at r_cp. Moments: the planform's c^2
+// r^n, and, because the force is taken at mid-chord, c/2 c^2 r^n about the leading edge, as for added mass. Valid for c
+// theta' / U below about 1, so not at rest.
+// [1] Sane, Dickinson, The aerodynamic effects of wing rotation and a revised quasi-steady model of flapping flight, J.
+// Exp. Biol. 205, 2002 (after Fung 1969, Ellington 1984). C_r measured: 1.55 to 2.1 at x_0 = 0.25 for 1.57.
 #pragma once
 
 #include <numbers>

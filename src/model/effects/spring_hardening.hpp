@@ -1,6 +1,6 @@
-// A stroke spring that stiffens with deflection: -k x - k_3 x^3 with k_3 = k per_rad2, x from its rest angle.
-// [1] Nayfeh, Mook, Nonlinear Oscillations, 1979, ch. 4: Duffing's spring; resonance rises with the amplitude a by
-//     3/8 per_rad2 a^2 if the spring is the only store of energy. A negative magnitude softens; down to -1/x^2 the torque is still restoring.
+// A stroke spring that stiffens with deflection: -k x - k_3 x^3 with k_3 = k per_rad2, x from its rest angle. A
+// negative magnitude softens; down to -1/x^2 the torque still restores. [1] Nayfeh, Mook, Nonlinear Oscillations, 1979,
+// ch. 4: resonance rises with the amplitude a by 3/8 per_rad2 a^2 if the spring is the only store of energy.
 #pragma once
 
 #include "model/effects/effect.hpp"

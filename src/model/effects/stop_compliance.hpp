@@ -1,9 +1,10 @@
 // Stops of the wing's rotation as spring and damper instead of hard stops: a wing that is x beyond its stop feels
 //   tau = -(k x + d theta')  while that pushes it back      k = 1 / compliance     d = 2 damping_ratio sqrt(k I)
-// with I the wing's inertia about its leading edge. x and theta' are taken at the end of the step (implicit Euler): the torque with the old rate, and
-// h (k h + d) as inertia on the hinge. This is stable for any k, damps slightly more, and tends to the landing on the hard stop for k -> infinity.
-// [1] Hunt, Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42(2), 1975, sec. 1: the linear spring and
-//     damper from which they start. At 1.7 rad there is a hard stop again.
+// with I the wing's inertia about its leading edge. x and theta' are taken at the end of the step (implicit Euler): the
+// torque with the old rate, and h (k h + d) as inertia on the hinge. This is stable for any k, damps slightly more, and
+// tends to the landing on the hard stop for k -> infinity.
+// [1] Hunt, Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42(2), 1975,
+// sec. 1: the linear spring and damper from which they start. At 1.7 rad there is a hard stop again.
 #pragma once
 
 #include "model/effects/effect.hpp"

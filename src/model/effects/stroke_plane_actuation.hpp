@@ -1,8 +1,8 @@
 // A servo that pitches the robot by moving the stroke plane, or the wings' dihedral, also pushes it forward:
 //   F_x = m (shift s + swing ds/dt)     s: sum of the actuators that move the stroke plane
 // The first term is the tilt of the thrust, the second the air that the swung wings push.
-// [1] Karasek, Muijres, De Wagter, Remes, de Croon, A tailless aerial robotic flapper reveals that flies use torque coupling in rapid banked
-//     turns, Science 361, 2018: dihedral shifts the thrust against the centre of mass.
+// [1] Karasek, Muijres, De Wagter, Remes, de Croon, A tailless aerial robotic flapper reveals that flies use torque
+// coupling in rapid banked turns, Science 361, 2018: dihedral shifts the thrust against the centre of mass.
 #pragma once
 
 #include "model/effects/beat_averaged_effect.hpp"

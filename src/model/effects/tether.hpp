@@ -1,8 +1,7 @@
-// A cable that hangs from below the torso's origin to the ground: it pulls down with the weight of the length in the air, and weakly towards its
-// anchor,
-//   F_z = -line g h      F_x = -stiffness (x - anchor_x)      F_y = -stiffness (y - anchor_y)      h: height over the ground
-// [1] Irvine, Cable Structures, 1981, ch. 1: a slack line carries its own weight, and pulls sideways in proportion to small
-//     offsets. Neglects the line's inertia, damping and drag; below the ground h counts as 0.
+// A cable that hangs from below the torso's origin to the ground: its weight, and a weak pull towards its anchor,
+//   F_z = -line g h      F_x = -stiffness (x - anchor_x)      F_y = -stiffness (y - anchor_y)      h: height, >= 0
+// [1] Irvine, Cable Structures, 1981, ch. 1: a slack line carries its own weight, and pulls sideways in proportion to
+// small offsets. Neglects the line's inertia, damping and drag.
 #pragma once
 
 #include "model/effects/beat_averaged_effect.hpp"

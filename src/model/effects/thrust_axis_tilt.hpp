@@ -1,6 +1,5 @@
-// The thrust is turned from z of B by small angles about x and y, for example because wings or markers are not mounted straight:
-//   F_x = T y, F_y = -T x     T: thrust along z
-// [1] Goldstein, Classical Mechanics, ch. 4: small rotations.
+// The thrust is turned from z of B by small angles about x and y, as by crooked wings or markers: F_x = T y, F_y = -T
+// x, T: thrust along z. [1] Goldstein, Classical Mechanics, ch. 4: small rotations.
 #pragma once
 
 #include "model/effects/beat_averaged_effect.hpp"

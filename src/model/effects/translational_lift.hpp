@@ -1,9 +1,8 @@
-// Translational lift: wings of a robot that moves sideways have more lift,
-//   F_z = gain m v_h^2     v_h: speed in the air perpendicular to z of B
-// This is the even part of the influence of speed, because pressure is proportional to the square of velocity; the odd part cancels over a beat.
-// [1] Olejnik et al., An experimental study of wind resistance and power consumption in MAVs with a low-speed multi-fan wind system, 2022
-//     (arXiv 2202.06723): in forward flight the wings of a flapper have more lift, those of a quadrotor hardly.
-// The multibody model includes it without this effect.
+// Wings of a robot that moves sideways have more lift: F_z = gain m v_h^2, v_h: speed in the air perpendicular to z of
+// B. This is the even part of the influence of speed; the odd part cancels over a beat. The multibody model includes it
+// without this effect.
+// [1] Olejnik et al., An experimental study of wind resistance and power consumption in MAVs with a low-speed multi-fan
+// wind system, 2022 (arXiv 2202.06723): in forward flight a flapper's wings have more lift, a quadrotor's hardly.
 #pragma once
 
 #include "model/effects/beat_averaged_effect.hpp"

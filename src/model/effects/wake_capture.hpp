@@ -1,12 +1,12 @@
-// After a reversal, a wing meets the air that it had set in motion, which still moves in the old direction and decays within the half stroke: the
+// After a reversal, a wing meets the air that it had set in motion, which decays within the half stroke: the
 // blade-element force at the rate |psidot| + w less that at |psidot|,
 //   w = gain p exp(-t / (decay t_half))
-// t: time since the last reversal; t_half, p: duration and highest rate of the half stroke before it.
-// [1] Dickinson, Lehmann, Sane, Wing rotation and the aerodynamic basis of insect flight, Science 284, 1999: a peak of force
-//     just after reversal, where the wing itself hardly moves, of either sign with the timing of the rotation.
-// [2] Lehmann, The mechanisms of lift enhancement in insect flight, Naturwissenschaften 91, 2004: decays within a tenth to a
-//     fifth of the half stroke.
-// Phenomenological: the gain stands for the influence of amplitude and rotation. 0 before the second reversal of a flight.
+// t: time since the last reversal; t_half, p: duration and highest rate of the half stroke before it. 0 before the
+// second reversal of a flight. Phenomenological: the gain stands for the influence of amplitude and rotation.
+// [1] Dickinson, Lehmann, Sane, Wing rotation and the aerodynamic basis of insect flight, Science 284, 1999: a peak of
+// force just after reversal, where the wing itself hardly moves, of either sign with the timing of the rotation.
+// [2] Lehmann, The mechanisms of lift enhancement in insect flight, Naturwissenschaften 91, 2004: decays within a tenth
+// to a fifth of the half stroke.
 #pragma once
 
 #include "model/effects/effect.hpp"

@@ -1,9 +1,10 @@
-// Side force and roll moment near a vertical wall, in proportion to the lift; they decay with the clearance d of the torso:
+// Side force and roll moment near a vertical wall, in proportion to the lift L (along z of B); d: clearance of the
+// torso, 0 behind it:
 //   F = side_gain L exp(-d / length) n      M_x = roll_gain L exp(-d / length) n_y     n: the wall's normal; n_y in B
-// Positive gains push away from the wall and raise the wing that is farther from it. L: force of the wings along z of B.
-// [1] Robinson, Chung, Ryan, Computational investigation of micro rotorcraft near-wall hovering aerodynamics, ICUAS 2014:
-//     near a wall small rotors keep their thrust and gain a side force and a tilting moment, of either sign with the distance.
-// The exponential is that of the ground effect. Only the nearest wall counts; behind it d counts as 0.
+// Positive gains push away from the wall and raise the wing farther from it. Only the nearest wall counts.
+// [1] Robinson, Chung, Ryan, Computational investigation of micro rotorcraft near-wall hovering aerodynamics, ICUAS
+// 2014: small rotors keep their thrust and gain side force and tilting moment, of either sign with distance.
+// Exponential as for the ground.
 #pragma once
 
 #include "model/effects/effect.hpp"

@@ -1,10 +1,10 @@
 // Wind, constant and gusting, uniform over the whole vehicle, in W; it acts on the wings and on the drag of the body:
 //   (x, y, z) + sqrt(2/3) gust sum_k sin(w_k t + k j 2 pi / 3)     k = 0, 1, 2; j = 0, 1, 2 for x, y, z
 //   w_k = 0.618, 1, 1.732 / gust_time: no two in a ratio of whole numbers, so that gusts never repeat
-// Each axis has the given rms, and the axes are uncorrelated. No random numbers: a flight is the same every time.
-// [1] Shinozuka, Jan, Digital simulation of random processes and its applications, J. Sound Vib. 25(1), 1972: a random
-//     process as a sum of sines.
-// Assumes gusts that are long against the vehicle; neglects shear and the drift of the wake. Phases are 0 at the start of a flight.
+// Each axis has the given rms; the axes are uncorrelated. A flight is the same every time: phases are 0 at its start.
+// Assumes gusts that are long against the vehicle; neglects shear and the drift of the wake.
+// [1] Shinozuka, Jan, Digital simulation of random processes and its applications, J. Sound Vib. 25(1), 1972: sums of
+// sines.
 #pragma once
 
 #include "model/effects/beat_averaged_effect.hpp"

@@ -1,10 +1,9 @@
-// Windings that warm up, each motor separately, and increase in resistance:
+// Windings that warm up, each motor separately, and increase in resistance; cold at the start of a flight:
 //   R = R_0 (1 + 0.00393 dT)     time d(dT)/dt = rise R i^2 - dT     i = (V - K N phi') / R
-// with phi' the motor's rate about the stroke axis. R reduces both the torque per volt and the share of back-EMF in the damping. A flight starts
-// cold.
-// [1] Hughes, Drury, Electric Motors and Drives, 4th ed., 2013, ch. 3: losses and a motor's thermal time constant.
-// [2] Copper Wire Tables, Circular of the Bureau of Standards 31, 3rd ed., 1914: annealed copper, 0.00393 per K at 20 C.
-// One thermal mass for winding and case; neglects that magnets weaken with heat. `rise` is the whole thermal resistance.
+// with phi' the motor's rate about the stroke axis. R reduces torque per volt and the damping's share of back-EMF. One
+// thermal mass for winding and case, `rise` its whole thermal resistance; neglects that magnets weaken with heat.
+// [1] Hughes, Drury, Electric Motors and Drives, 4th ed., 2013, ch. 3. [2] Copper Wire Tables, Circular of the Bureau
+// of Standards 31, 3rd ed., 1914: annealed copper, 0.00393 per K at 20 C.
 #pragma once
 
 #include "model/effects/effect.hpp"

@@ -1,10 +1,11 @@
-// A wing has lost a share of its area at the tip, which reduces the moments of its planform and its mass. The chord is taken as linear along the
-// span, c = C (r00 + 12 (r11 - r00 / 2) (r - 1/2)), which gives the moments of the shipped wings to 0.3 %. The cut is at r_1: every moment loses its
-// integral from r_1 to 1, by Gauss's rule with three points, exact for these powers. The lost membrane has the wing's mean mass per area, and its
-// centre is in the middle of the chord.
-// [1] Muijres et al., Flies compensate for unilateral wing damage through modular adjustments of wing and body kinematics,
-//     Interface Focus 7, 20160103, 2017: force and moment scale with the second and third moment of the area that is left.
-// Valid for a straight cut of up to 0.3 of the area; the remaining edge is assumed to be as stiff as before.
+// A wing has lost a share of its area at the tip, by a straight cut at r_1, valid up to 0.3; this reduces its mass and
+// the moments of its planform. With a linear chord, c = C (r00 + 12 (r11 - r00 / 2) (r - 1/2)), within 0.3 % of the
+// shipped wings' moments, every moment loses its integral from r_1 to 1, by Gauss's rule with three points, exact for
+// these powers. The lost membrane has the wing's mean mass per area, centred at mid-chord; the remaining edge is as
+// stiff as before.
+// [1] Muijres et al., Flies compensate for unilateral wing damage through modular adjustments of wing and body
+// kinematics, Interface Focus 7, 20160103, 2017: force and moment scale with second and third moment of the area that
+// is left.
 #pragma once
 
 #include "model/effects/effect.hpp"
@@ -37,7 +38,6 @@ struct WingDamage {
     auto& com = wing.com_m;
     const double m = wing.mass_kg, per_area = m / w.r00, root = w.r00 - slope / 2;
     const double half = (i.xx + i.yy + i.zz) / 2, xx = half - i.xx;
-    // moments of mass of the wing about the shoulder, from which the lost part is subtracted
     double y = m * com.y, z = m * com.z;
     double yy = half - i.yy + m * com.y * com.y, zz = half - i.zz + m * com.z * com.z, yz = -i.yz + m * com.y * com.z;
     for (int k = -1; k <= 1; ++k) {

@@ -1,11 +1,9 @@
-// A wing that twists under load: the rotation angle falls behind linearly along the span, in proportion to the normal force,
-//   theta(r) = theta - twist F_N r / R
-// The air on the whole wing is evaluated with theta(r_cp), at the centre of pressure r_cp, so the effect is a mean. F_N > 0 pushes the trailing edge
-// towards +x, which reduces theta on both sides. F_N is that of the untwisted wing: one step of a fixed-point iteration, whose next step is smaller
-// by the factor twist dF_N/dtheta, 0.05 at the typical magnitude.
-// [1] Nakata, Liu, Aerodynamic performance of a hovering hawkmoth with flexible wings: a computational approach, Proc. R. Soc.
-//     B 279, 2012: passive twist, and its influence on force and efficiency. The linear law is ours.
-// Static deflection (the wing's own modes are far above the beat); the twist is limited to 0.5 rad.
+// A wing that twists under load, at most 0.5 rad, linearly along the span: theta(r) = theta - twist F_N r / R. The
+// whole wing is evaluated with theta(r_cp), so the effect is a mean. F_N > 0 pushes the trailing edge towards +x, which
+// reduces theta on both sides. F_N is that of the untwisted wing: one step of a fixed-point iteration, whose next is
+// smaller by twist dF_N/dtheta, 0.05 at the typical magnitude. Static: the wing's own modes are far above the beat.
+// [1] Nakata, Liu, Aerodynamic performance of a hovering hawkmoth with flexible wings: a computational approach, Proc.
+// R. Soc. B 279, 2012: passive twist, and its influence on force and efficiency. The linear law is ours.
 #pragma once
 
 #include "model/effects/effect.hpp"

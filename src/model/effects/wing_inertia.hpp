@@ -1,9 +1,9 @@
-// Mass distribution of the wings that differs from the vehicle file, alike on both sides: the centre of mass lies `chord_m` farther from the leading
-// edge, and the product of inertia between span and chord about the centre of mass is larger by `product` sqrt(I_yy I_zz):
+// Wings whose centre of mass lies `chord_m` farther from the leading edge than in the file, with another product of
+// inertia between span and chord; moments about the centre of mass are unchanged. Exact. Strokes then also turn the
+// wing:
 //   left: I_yz + product sqrt(I_yy I_zz)     right: the mirror image, with the other sign
-// It couples stroke and rotation: a wing that accelerates along its stroke then turns about its leading edge.
-// [1] Whitney, Wood, Aeromechanics of passive rotation in flapping flight, J. Fluid Mech. 660, 2010, sec. 2: the products of inertia drive passive
-//     rotation. Exact; the moments of inertia about the centre of mass are unchanged.
+// [1] Whitney, Wood, Aeromechanics of passive rotation in flapping flight, J. Fluid Mech. 660, 2010, sec. 2: the
+// products of inertia drive passive rotation.
 #pragma once
 
 #include "model/effects/effect.hpp"

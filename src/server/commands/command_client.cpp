@@ -40,7 +40,7 @@ JobStatus status_of(const JobStatusMessage& m) {
   return {m.id, m.kind, m.config, m.state, static_cast<int>(m.attempts), m.exit_code, m.progress, m.message, m.folder};
 }
 
-/// Checks a file name from the server, which need not be trusted. Throws io::InputError unless it stays below the folder.
+/// A file name from the server, which need not be trusted. Throws io::InputError unless it stays below the folder.
 fs::path safe(const std::string& name) {
   fs::path path(name);
   const bool odd = name.empty() || path.is_absolute() ||

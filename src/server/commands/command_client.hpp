@@ -17,12 +17,10 @@ class CommandClient {
 
   /// Sends a command and returns the server's answer. An empty id is replaced by a random one.
   CommandResult ask(Command command);
-  /// All jobs, newest first.
-  std::vector<JobStatus> list();
+  std::vector<JobStatus> list();  ///< newest first
   /// Calls `see` with each job that changes, until `see` or `keep_going` returns false.
   void watch(const std::function<bool(const JobStatus& job)>& see, const std::function<bool()>& keep_going);
-  /// Downloads the files of a job into `folder`, under their names, and returns their number. Calls `see` before each
-  /// download.
+  /// Downloads a job's files into `folder`, under their names, and returns their number. Calls `see` before each.
   std::size_t fetch(std::uint64_t job, const std::filesystem::path& folder,
                     const std::function<void(const JobFile&)>& see);
 

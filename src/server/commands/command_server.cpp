@@ -91,7 +91,6 @@ void CommandServer::answer(const Command& command) {
   results_.write(m);
 }
 
-/// Sends the list of files, or begins the transfer of one file.
 CommandResult CommandServer::fetch(const Command& command) {
   CommandResult r{command.id, true, command.job, ""};
   try {

@@ -1,12 +1,10 @@
-// Serves the queue of jobs over DDS. All topics are reliable; their types bound every string.
+// Serves the queue of jobs over DDS. All topics are reliable; their types bound every string. Rates are limited per
+// client process, whatever ids its commands have.
 //
 //   /flappy/jobs             JobStatus       each job when it changes, and all jobs after the command "list"
-//   /flappy/command          Command         subscribed where commands are enabled; for "fetch", config names a file below the job's folder,
-//                                            and an empty config asks for the list of files
+//   /flappy/command          Command         where enabled; for "fetch", config is a file of the job; empty: list them
 //   /flappy/command_result   CommandResult   answer to every command; for "list", job is the number of JobStatus sent
 //   /flappy/files            FileChunk       answer to "fetch"
-//
-// Rates are limited per client process, whatever ids its commands have.
 #pragma once
 
 #include <atomic>

@@ -53,12 +53,9 @@ FLAPPY_MESSAGE(FileChunk, flappy_msgs_msg_dds__FileChunk_)
 FLAPPY_MESSAGE(CommandResultMessage, flappy_msgs_msg_dds__CommandResult_)
 #undef FLAPPY_MESSAGE
 
-/// Turns "sensor_msgs::msg::dds_::Imu_" into "sensor_msgs/msg/Imu".
-std::string ros_name(const std::string& dds_name);
-/// Converts seconds to whole nanoseconds, rounded.
-Time time_of(double t_s);
+std::string ros_name(const std::string& dds_name);  ///< "sensor_msgs::msg::dds_::Imu_" -> "sensor_msgs/msg/Imu"
+Time time_of(double t_s);                           ///< to whole nanoseconds, rounded
 double seconds_of(const Time& t);
-/// Wall-clock time, for messages that belong to no flight.
-Time now();
+Time now();  ///< wall-clock time, for messages that belong to no flight
 
 }  // namespace flappy::server

@@ -17,12 +17,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// ROS 2 processes without multicast probe this many ports of a machine, and each of them uses one.
-constexpr int kMaxParticipants = 99;
-/// Most samples that are kept where none may be dropped.
-constexpr std::int32_t kMaxKept = 64;
-/// The longest time for which a slow reliable reader may block write().
-constexpr dds_duration_t kBlocks = DDS_MSECS(100);
+constexpr int kMaxParticipants = 99;                // ports of a machine that ROS 2 processes without multicast probe
+constexpr std::int32_t kMaxKept = 64;               // where no sample may be dropped
+constexpr dds_duration_t kBlocks = DDS_MSECS(100);  // longest time for which a slow reader may block write()
 
 struct QosDeleter {
   void operator()(dds_qos_t* q) const { dds_delete_qos(q); }
@@ -84,8 +81,7 @@ void hear_cyclone() {
   std::call_once(once, [&] { dds_set_log_sink(sink, nullptr); });
 }
 
-/// The domain of a configuration. The first participant of this process in it creates the domain with cyclone_xml(); a domain that is created
-/// this way does not read CYCLONEDDS_URI.
+/// The first participant of this process in a domain creates it with cyclone_xml(); it then ignores CYCLONEDDS_URI.
 std::shared_ptr<const Entity> domain_of(const io::DdsConfig& c) {
   static std::mutex mutex;
   static std::map<int, std::weak_ptr<const Entity>> domains;

@@ -1,4 +1,4 @@
-// Cyclone DDS used as ROS 2 uses it: names, quality of service, type hashes. Failures are caused by the user's network or keys: InputError.
+// Cyclone DDS as ROS 2 uses it: names, quality of service, type hashes. Failures of network or keys: InputError.
 #pragma once
 
 #include <dds/dds.h>
@@ -27,8 +27,7 @@ inline constexpr Quality kSensorData{false, false, 5}, kReliable{true, false, 10
 /// For commands, their results and files: server and client use the same quality.
 inline constexpr Quality kAnswers{true, false, 1000}, kPieces{true, false, kAllOfIt};
 
-/// For example "/flappy/pose" for slot 0 and "/flappy_3/pose" for slot 3.
-std::string topic_name(const std::string& name_space, std::size_t slot, const std::string& name);
+std::string topic_name(const std::string& name_space, std::size_t slot, const std::string& name);  ///< "/flappy_3/pose"
 
 /// Cyclone DDS's XML configuration of interfaces and peers; empty where the environment configures it.
 std::string cyclone_xml(const io::DdsConfig& config);
@@ -80,8 +79,7 @@ class Writer {
  public:
   Writer(const Participant& p, const std::string& name, const Quality& quality)
       : writer_(detail::make_writer(p, descriptor<M>(), name, quality)) {}
-  /// Copies the message with the text and lists that it points to. Returns false where it could not be handed over
-  /// within 0.1 s.
+  /// Copies the message and what it points to. Returns false where it could not be handed over within 0.1 s.
   bool write(const M& message) const { return detail::write(writer_, &message); }
   std::size_t readers() const { return detail::matched(writer_, true); }
   const Entity& entity() const { return writer_; }
@@ -95,8 +93,7 @@ class Reader {
  public:
   Reader(const Participant& p, const std::string& name, const Quality& quality)
       : reader_(detail::make_reader(p, descriptor<M>(), name, quality)) {}
-  /// Calls `see(message, info)` for each message that has arrived and returns their number. `see` must copy what it
-  /// keeps.
+  /// Calls `see(message, info)`, which must copy what it keeps, for each message that has arrived; returns how many.
   std::size_t take(const auto& see) const {
     return detail::take(reader_, [&](const void* m, const dds_sample_info_t& i) { see(*static_cast<const M*>(m), i); });
   }
@@ -112,8 +109,7 @@ class WaitSet {
  public:
   explicit WaitSet(const Participant& p);
   void add(const Entity& reader);
-  /// Returns false where none arrived within `at_most`.
-  bool wait(std::chrono::nanoseconds at_most) const;
+  bool wait(std::chrono::nanoseconds at_most) const;  ///< false: none arrived
 
  private:
   Entity set_;

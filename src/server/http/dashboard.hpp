@@ -23,8 +23,7 @@ inline constexpr std::size_t kMaxOfRequest = 16'384;  ///< bytes of a request, i
 
 class Dashboard {
  public:
-  /// Starts to listen, in threads of its own. Throws io::InputError where config.http.listen is malformed or cannot be
-  /// bound.
+  /// Listens in threads of its own. Throws io::InputError where config.http.listen is malformed or cannot be bound.
   Dashboard(const Queue& queue, const LiveState& watched, const ServerConfig& config);
   ~Dashboard();
   Dashboard(const Dashboard&) = delete;

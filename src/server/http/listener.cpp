@@ -70,7 +70,7 @@ class PatientStream : public httplib::Stream {
   std::size_t left_ = kMaxOfRequest;
 };
 
-/// Discards what the client still sends; otherwise closing would reset the connection and the client might not see the answer.
+/// Discards what the client still sends; otherwise closing would reset the connection and might lose the answer.
 void close_after_answer(socket_t socket) {
   shutdown(socket, SHUT_WR);
   std::array<char, 4096> rest;

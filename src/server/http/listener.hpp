@@ -1,5 +1,5 @@
-// cpp-httplib's server with limits that it lacks: a client that is slow to send its request or to take the answer is cut off; connections beyond
-// the capacity are closed instead of kept; each connection serves one request.
+// cpp-httplib's server with limits that it lacks: a client that is slow to send its request or to take the answer is
+// cut off; connections beyond the capacity are closed instead of kept; each connection serves one request.
 #pragma once
 
 #include <httplib.h>
@@ -12,7 +12,7 @@
 
 namespace flappy::server {
 
-/// Runs calls on `threads` threads and queues up to `waiting` more. Further calls run at once in the caller, with turned_away() true.
+/// Queues up to `waiting` calls for `threads` threads; further calls run in the caller, with turned_away() true.
 class BoundedPool : public httplib::TaskQueue {
  public:
   BoundedPool(std::size_t threads, std::size_t waiting);
@@ -33,8 +33,7 @@ class BoundedPool : public httplib::TaskQueue {
 
 class Listener : public httplib::Server {
  public:
-  /// Up to `threads` requests are answered at a time. A whole request has to arrive, and each piece of an answer to be
-  /// taken, within `patience_s`.
+  /// Answers `threads` requests at a time; `patience_s`: for a whole request, and for each piece of an answer.
   Listener(std::size_t threads, double patience_s);
   /// Raises the backlog of connections from httplib's 5 to 128. Call it once the listener is bound.
   void widen();

@@ -1,4 +1,4 @@
-// The files of the dashboard's page (src/server/http/web and parts of src/view/web), embedded in the program when it is built.
+// The dashboard's files (src/server/http/web and parts of src/view/web), embedded in the program when it is built.
 #pragma once
 
 #include <map>
@@ -6,7 +6,6 @@
 
 namespace flappy::server {
 
-/// [file name] text of the file.
-extern const std::map<std::string_view, std::string_view> kWeb;
+extern const std::map<std::string_view, std::string_view> kWeb;  ///< [file name] text of the file
 
 }  // namespace flappy::server

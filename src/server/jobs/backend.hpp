@@ -17,9 +17,8 @@ enum class Life { alive, gone, unknown };
 class Backend {
  public:
   virtual ~Backend() = default;
-  /// Starts the supervisor of `job`, which the queue has as running, in `folder`; the supervisor inherits `lock`. Tells
-  /// the queue the process or the Slurm job that runs it. Throws std::system_error or io::InputError where the start
-  /// fails.
+  /// Starts the supervisor of `job`, which the queue has as running; it inherits `lock`. Tells the queue the process or
+  /// the Slurm job. Throws std::system_error or io::InputError where the start fails.
   virtual void start(Queue& queue, const Job& job, const std::filesystem::path& folder,
                      const std::vector<std::string>& supervisor, const JobLock& lock) = 0;
   /// Whether the last attempt of `job` still runs; this server or an earlier one may have started it.

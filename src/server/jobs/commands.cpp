@@ -26,7 +26,6 @@ void check_length(const char* what, const std::string& text, std::size_t most) {
                          " characters; accepted: at most " + std::to_string(most));
 }
 
-/// Checks a command before it is executed: lengths, the id, the number of overrides and the verb.
 void check(const Command& c) {
   check_length("id", c.id, kMaxOfId);
   check_length("client", c.client, kMaxOfId);

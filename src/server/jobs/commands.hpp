@@ -1,5 +1,4 @@
-// Commands of clients to the queue, independent of the transport that delivers them. Every string is bounded, rates are limited, and every
-// command is answered. A refusal is also logged, at most once a second.
+// Commands of clients to the queue, over any transport. Strings are bounded, rates limited, every command is answered.
 #pragma once
 
 #include <cstdint>
@@ -44,7 +43,6 @@ struct JobStatus {
 };
 JobStatus status_of(const Job& job);
 
-/// A file in a job's folder.
 struct JobFile {
   std::string name;
   std::uint64_t bytes = 0;
@@ -59,16 +57,12 @@ class Commands {
   Commands(Queue& queue, const ServerConfig& config, std::filesystem::path programs,
            std::vector<JobType> kinds = server::job_types());
 
-  /// Never throws because of what a client sent. list and fetch are only accepted here; the caller then answers them
-  /// with the functions below.
+  /// Never throws because of what a client sent. Only accepts list and fetch; the functions below answer them.
   CommandResult execute(const Command& command);
 
-  /// The newest kMaxListed jobs, newest first.
-  std::vector<JobStatus> statuses() const;
-  /// Throws io::InputError where there is no such job.
-  std::vector<JobFile> files(std::uint64_t job) const;
-  /// Reads at most kMaxOfChunk bytes from `offset` on; empty at the end. Throws io::InputError where `file` is not a
-  /// file below the job's folder.
+  std::vector<JobStatus> statuses() const;              ///< the newest kMaxListed, newest first
+  std::vector<JobFile> files(std::uint64_t job) const;  ///< throws io::InputError for an unknown job
+  /// At most kMaxOfChunk bytes; empty at the end. Throws io::InputError where `file` is no file below the job's folder.
   std::string chunk(std::uint64_t job, const std::string& file, std::uint64_t offset) const;
 
  private:

@@ -1,4 +1,4 @@
-// SQLite behind three small types. Faults of the file or its disk throw io::InputError, which names the file; others std::runtime_error.
+// SQLite behind three small types. Faults of file or disk throw io::InputError with its name; others runtime_error.
 #pragma once
 
 #include <concepts>
@@ -19,17 +19,14 @@ class Statement {
   Statement(const Statement&) = delete;
   Statement& operator=(const Statement&) = delete;
 
-  /// Binds `values` to the placeholders of the statement, in their order.
   template <class... Values>
   Statement& bind(const Values&... values) {
     int place = 0;
     (bind_one(++place, values), ...);
     return *this;
   }
-  /// Advances to the next row; false at the end.
-  bool step();
-  /// Executes a statement whose rows, if any, are of no interest.
-  void run();
+  bool step();  ///< to the next row; false at the end
+  void run();   ///< ignores rows
 
   std::int64_t integer(int column) const;
   double number(int column) const;

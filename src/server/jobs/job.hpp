@@ -7,7 +7,7 @@
 //     v           v
 //   paused <------'        paused --> queued       (resume)
 //
-// A job that is queued or paused may be cancelled, too; a queued job that cannot be started fails. done and cancelled are final.
+// A queued or paused job may be cancelled; a queued job that cannot be started fails. done and cancelled are final.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +25,7 @@ enum class State { queued, running, paused, done, failed, cancelled };
 inline constexpr State kStates[] = {State::queued, State::running, State::paused,
                                     State::done,   State::failed,  State::cancelled};
 const char* name_of(State state);
-/// Throws std::invalid_argument where `name` names no state.
-State state_named(const std::string& name);
+State state_named(const std::string& name);  ///< throws std::invalid_argument for any other name
 
 /// Whether the table above allows the transition.
 bool may_become(State from, State to);
@@ -61,9 +60,8 @@ struct Job {
   std::optional<int> exit_code;
   double progress = 0;  ///< 0 to 1
   std::string message;
-  std::string folder;  ///< name below the output folder
-  // Unix time; 0: not yet.
-  double submitted_s = 0, started_s = 0, ended_s = 0;
+  std::string folder;                                  ///< name below the output folder
+  double submitted_s = 0, started_s = 0, ended_s = 0;  ///< Unix time; 0: not yet
 };
 
 /// An item of a job's history: the state, when the job came to it, and why.

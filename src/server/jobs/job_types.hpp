@@ -1,4 +1,4 @@
-// The job types, in one table. A job type turns the names that a client sends into the command line of one of our programs; nothing that a
+// The job types. Each turns the names that a client sends into the command line of one of our programs; nothing that a
 // client sends is used as a path, an option or a command.
 //
 //   job type   config                                       overrides
@@ -42,11 +42,9 @@ inline constexpr const char* kProgress = "progress.json";  ///< overwritten whil
 
 struct JobType {
   std::string name;
-  /// Makes the command line of an attempt; train resumes the run that an earlier attempt left. Throws io::InputError
-  /// where the config or an override is not accepted.
+  /// Makes an attempt's command line; train resumes an earlier run. io::InputError for a refused config or override.
   std::function<std::vector<std::string>(const Launch&)> command;
-  /// Whether its result.json says that the program stopped early. Otherwise every attempt that was asked to stop counts
-  /// as stopped early.
+  /// Whether result.json says that the program stopped early; otherwise every attempt that was asked to stop did.
   bool says_stopped = false;
 };
 

@@ -1,4 +1,4 @@
-// Checks names that clients send. A name selects a file below a folder and nothing else: it cannot be an absolute path or an option, and cannot
+// Checks names that clients send. A name selects a file below a folder: it cannot be an absolute path or an option, nor
 // leave the folder by ".." or through a symbolic link.
 #pragma once
 
@@ -7,12 +7,11 @@
 
 namespace flappy::server {
 
-/// Returns the file or folder `name` below `folder`, as an absolute path without symbolic links. Throws io::InputError, which begins with
-/// `what`, where `name` is malformed, or nothing of that name lies below the folder.
+/// The absolute path of `name` without symbolic links. Throws io::InputError, which begins with `what`, where `name` is
+/// malformed or nothing of that name lies below the folder.
 std::filesystem::path below(const std::filesystem::path& folder, const std::string& name, const std::string& what);
 
-/// Throws io::InputError unless `override` is KEY=VALUE and its value cannot name a file in another folder: printable ASCII without slash,
-/// backslash and "..".
+/// Throws io::InputError unless KEY=VALUE of printable ASCII whose value cannot name a file in another folder.
 void check_override(const std::string& override);
 
 }  // namespace flappy::server

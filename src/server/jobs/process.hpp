@@ -1,4 +1,4 @@
-// Processes that outlive the server that started them: how to identify them, see whether they live, and signal them and no others.
+// Processes that outlive the server that started them: identifies them, and signals them and no others.
 #pragma once
 
 #include <filesystem>
@@ -10,19 +10,16 @@
 
 namespace flappy::server {
 
-/// Identifies the current boot of this machine.
 std::string boot_id();
-/// Identifies the process that has this pid now; nothing where there is none.
-std::optional<Process> process_of(std::int64_t pid);
+std::optional<Process> process_of(std::int64_t pid);  ///< nothing where there is none
 /// Signals exactly this process. Returns false where it is gone, even if another process has its pid by now.
 bool signal_process(const Process& process, int signal);
 
-/// An exclusive lock of a job's folder, held by one attempt. Every process that is started with the descriptor shares the lock, which is
-/// released when the last of them ends, however it ends. So no process of an attempt can live without holding the lock.
+/// An exclusive lock of a job's folder. All processes of an attempt inherit the descriptor and so share the lock, which
+/// is released when the last of them ends, however it ends.
 class JobLock {
  public:
-  /// Returns nothing where another process holds the lock. Throws io::InputError where the folder cannot be opened or
-  /// locked.
+  /// Nothing where another process holds the lock. Throws io::InputError where the folder cannot be opened or locked.
   static std::optional<JobLock> take(const std::filesystem::path& folder);
   ~JobLock();
   JobLock(JobLock&& other) noexcept;
@@ -35,8 +32,8 @@ class JobLock {
   int descriptor_;
 };
 
-/// Starts a program, found along PATH, in a process group of its own; returns its pid. It has no input, appends its output to `log`, has
-/// `lock` (if not null) as descriptor 3, and has SIGINT and SIGTERM blocked. Throws std::system_error where the start fails.
+/// Starts a program, found along PATH, in a process group of its own; returns its pid. It has no input, appends its
+/// output to `log`, has `lock` (if any) as descriptor 3, and SIGINT and SIGTERM blocked. Throws std::system_error.
 std::int64_t start_process(const std::vector<std::string>& command, const JobLock* lock,
                            const std::filesystem::path& log);
 /// Whether a child process has ended. Reaps it, so call it no more once it returned true.

@@ -36,7 +36,7 @@ using Guard = std::lock_guard<std::mutex>;
 
 double now_s() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
 
-/// Retries for half a second: a server that was killed while it started a child leaves the lock to that child until the child's exec.
+/// Retries for half a second: the child of a killed server may hold the lock until its exec.
 std::unique_ptr<io::FolderLock> take(const std::filesystem::path& folder) {
   constexpr int kTries = 50;
   constexpr std::chrono::milliseconds kBetween{10};
@@ -83,7 +83,6 @@ std::vector<Job> read_jobs(Statement rows) {
 
 std::string called(std::uint64_t id) { return "job " + std::to_string(id); }
 
-/// Throws io::InputError, which names the states from which a job can become `to`.
 [[noreturn]] void refuse(const Job& job, State to) {
   std::vector<std::string> accepted;
   for (const State from : kStates)
@@ -292,7 +291,6 @@ Job Queue::existing(std::uint64_t id, State wanted) const {
   throw io::InputError(called(id) + ": is " + name_of(job.state) + "; accepted: a job that is " + name_of(wanted));
 }
 
-/// Changes the state of a job; throws io::InputError where may_become() forbids it.
 void Queue::move(const Job& job, State to, const std::string& why) {
   if (!may_become(job.state, to)) refuse(job, to);
   Transaction all(database_);
@@ -304,7 +302,7 @@ void Queue::move(const Job& job, State to, const std::string& why) {
   changed();
 }
 
-/// Records what a running job has to do. Throws io::InputError where the job is being cancelled, which nothing else may replace.
+/// Records what a running job has to do. Throws io::InputError if it is being cancelled, which nothing may replace.
 void Queue::want(const Job& job, Wanted wanted, const std::string& why) {
   if (job.wanted == Wanted::cancel && wanted != Wanted::cancel)
     throw io::InputError(called(job.id) + ": is being cancelled; accepted: to wait for its end");

@@ -1,5 +1,5 @@
-// The queue: every job that was ever submitted and the history of its states, in one SQLite file. When a call that changes it returns, the
-// change is on the disk; when the call throws, nothing has changed.
+// The queue: every job that was ever submitted and the history of its states, in one SQLite file. When a call that
+// changes it returns, the change is on the disk; when it throws, nothing has changed.
 #pragma once
 
 #include <chrono>
@@ -24,7 +24,7 @@ struct Ending {
   bool crashed = false;
 };
 
-/// Thread-safe. Throws io::InputError for an unknown job, a change that the job's state forbids, and a file that cannot be written.
+/// Thread-safe. Throws io::InputError for an unknown job, a change that its state forbids, and a failure to write.
 class Queue {
  public:
   /// Opens `folder`/queue.sqlite, or creates it, and locks `folder` for this process.
@@ -38,15 +38,11 @@ class Queue {
   void resume(std::uint64_t id);
   void cancel(std::uint64_t id);
 
-  /// Throws io::InputError where there is no such job.
   Job job(std::uint64_t id) const;
-  /// The newest `most` jobs, newest first.
-  std::vector<Job> jobs(std::size_t most) const;
-  /// All jobs in a state, oldest first.
-  std::vector<Job> jobs_in(State state) const;
+  std::vector<Job> jobs(std::size_t most) const;  ///< newest first
+  std::vector<Job> jobs_in(State state) const;    ///< oldest first
   std::vector<Transition> history(std::uint64_t id) const;
-  /// 16 random hexadecimal digits, which identify this queue.
-  const std::string& name() const { return name_; }
+  const std::string& name() const { return name_; }  ///< 16 random hexadecimal digits
 
   // Calls of the runner and its backend.
   /// Moves a job from queued to running: counts an attempt, and forgets the process of the last one.
@@ -58,8 +54,7 @@ class Queue {
   void report(std::uint64_t id, double progress, const std::string& message);
   void end(std::uint64_t id, const Ending& ending);
 
-  /// The number of changes since this object was made. wait_for_change returns it once it differs from `seen`, or after
-  /// `most`.
+  /// Changes since this object was made. wait_for_change returns once it differs from `seen`, or after `most`.
   std::uint64_t changes() const;
   std::uint64_t wait_for_change(std::uint64_t seen, std::chrono::milliseconds most) const;
 

@@ -14,8 +14,7 @@ inline constexpr std::size_t kMaxClients = 1024;  ///< clients with a bucket of 
 class TokenBucket {
  public:
   TokenBucket(double rate_hz, double most) : rate_hz_(rate_hz), most_(most), tokens_(most) {}
-  /// Takes a token; false where there is none.
-  bool take(double now_s);
+  bool take(double now_s);  ///< false: there is none
   bool is_full(double now_s) const;
 
  private:
@@ -23,13 +22,12 @@ class TokenBucket {
   double at_s_ = -1;
 };
 
-/// A token bucket for each client and one for all of them. Memory is bounded: a client whose bucket is full again is forgotten; where none can
-/// be forgotten, further clients share a bucket. Only one thread at a time may use it.
+/// A token bucket for each client and one for all. Memory is bounded: a client whose bucket is full again is forgotten;
+/// where none can be, further clients share a bucket. Only one thread at a time may use it.
 class RateLimit {
  public:
   explicit RateLimit(const RateConfig& config);
-  /// Whether a command of `client` is within both limits. A client over its own limit takes nothing from the common
-  /// bucket.
+  /// Whether a command is within both limits. A client over its own limit takes nothing from the common bucket.
   bool take(const std::string& client, double now_s);
   std::size_t clients() const { return clients_.size(); }
 

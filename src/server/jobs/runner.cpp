@@ -155,7 +155,7 @@ Ending Runner::ending_of(const Job& job) const {
           (exit->message.empty() ? "" : ": ") + exit->message);
 }
 
-/// Queues a job again that could not be started through no fault of its own. The delay doubles each time, up to kLongestDelay_s.
+/// Queues a job again that could not be started through no fault of its own; the delay doubles up to kLongestDelay_s.
 void Runner::put_off(const Job& job, const std::string& why) {
   Delay& delay = delays_[job.id];
   delay.length_s = delay.length_s == 0 ? kFirstDelay_s : std::min(2 * delay.length_s, kLongestDelay_s);

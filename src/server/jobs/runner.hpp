@@ -1,11 +1,12 @@
-// Runs the jobs of a queue, each in a process of its own, so that a crash costs one job. All state is in the queue and in the jobs' folders, so
-// a new runner can take over from one that was killed at any moment:
+// Runs each job of a queue in a process of its own, so that a crash costs one job. All state is in the queue and in the
+// jobs' folders, so a new runner can take over from one that was killed at any moment:
 //
-//   start     the runner locks the job's folder, then marks the job as running in the queue, then starts the supervisor, which inherits the lock
-//   alive     a process holds the lock of the folder: our child, or one that a killed server started and that we adopt
-//   end       the lock is free; attempt_N.exit and result.json in the folder say how the attempt ended; then the queue records it
+//   start  the runner locks the folder, marks the job as running, then starts the supervisor, which inherits the lock
+//   alive  a process holds the lock: our child, or one that a killed server started and that we adopt
+//   end    the lock is free; attempt_N.exit and result.json say how the attempt ended; then the queue records it
 //
-// If the runner is killed before the supervisor starts, the next runner starts the job again; if later, it adopts the job or reads its end.
+// If the runner is killed before the supervisor starts, the next runner starts the job again; if later, it adopts the
+// job or reads its end.
 #pragma once
 
 #include <filesystem>
@@ -36,8 +37,7 @@ class Runner {
 
   /// Updates all running jobs and starts as many queued ones as config.at_once allows.
   void step();
-  /// Calls step() while keep_going() is true. Then local jobs are stopped cleanly and queued again; jobs in Slurm go
-  /// on.
+  /// Calls step() while keep_going(). Then stops local jobs cleanly and queues them again; jobs in Slurm go on.
   void run(const std::function<bool()>& keep_going);
 
  private:

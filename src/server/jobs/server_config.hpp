@@ -29,7 +29,6 @@ struct HttpConfig {
   double patience_s = 5;           ///< time limit for a whole request, and for each piece of an answer to be taken
 };
 
-/// Rates of commands that are accepted.
 struct RateConfig {
   double per_client_hz = 5, all_hz = 50;
   double burst_s = 4;  ///< a bucket holds the tokens of this many seconds

@@ -1,6 +1,6 @@
-// Submits jobs with sbatch, under a name that identifies queue and job. If the server is killed before it has recorded sbatch's answer, the next
-// server finds the job by its name; while sbatch itself still runs, it holds the lock of the job's folder; and Slurm runs at most one job of
-// a name at a time (singleton). The supervisor writes the exit code into the folder, which all nodes share.
+// Submits jobs with sbatch, under a name of queue and job. If the server is killed before it has recorded sbatch's
+// answer, the next finds the job by its name; a running sbatch holds the lock of the job's folder; Slurm runs one job
+// of a name at a time (singleton). The supervisor writes the exit code into the folder, which all nodes share.
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
@@ -100,7 +100,7 @@ class SlurmBackend : public Backend {
 
   std::string name_of(const Job& job) const { return "flappy-" + queue_ + "-" + std::to_string(job.id); }
 
-  /// Runs one of Slurm's programs and returns its stdout; nothing where it fails.
+  /// Stdout of one of Slurm's programs; nothing where it fails.
   static std::optional<std::string> ask(const std::vector<std::string>& command) {
     try {
       const io::Finished finished = io::run(command);

@@ -48,7 +48,7 @@ std::optional<Json> read(const fs::path& file) {
   }
 }
 
-/// Copies a program's output from a pipe to the supervisor's own stdout, which is the log, until the log has kMaxOfLog bytes.
+/// Copies a program's output from a pipe to the log (the supervisor's stdout), until that has kMaxOfLog bytes.
 class Copy {
  public:
   Copy(int from, bool keeps_last_line) : from_(from), keeps_last_line_(keeps_last_line) {}

@@ -1,12 +1,13 @@
-// The supervisor of a job: a process between the server and the job's program. It starts the program, waits for it, and writes its exit code to
-// the disk. A killed server cannot wait for its children, and its successor is not their parent; the supervisor outlives the server, so no
-// exit code is lost. The program is killed when its supervisor dies; the supervisor ends when its program does.
+// The supervisor of a job: a process that starts the job's program, waits for it, and writes its exit code to the disk.
+// It outlives the server, because a killed server cannot wait for its children, and its successor is not their parent.
+// The program is killed when its supervisor dies; the supervisor ends when its program does.
 //
 //   JOB/job.log          output of the program and its supervisor, up to kMaxOfLog
 //   JOB/attempt_N.began  {"pid", "start_ticks", "boot_id"} of the supervisor, written before the program starts
-//   JOB/attempt_N.exit   {"code" or "signal", "message"}, written once the program ended; message is the last line of its stderr
+//   JOB/attempt_N.exit   {"code" or "signal", "message": last line of its stderr}, written once the program ended
 //
-// The supervisor passes SIGINT on to the program, which stops cleanly; on SIGTERM it kills the program and its process group.
+// The supervisor passes SIGINT on to the program, which stops cleanly; on SIGTERM it kills the program and its process
+// group.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +23,6 @@ namespace flappy::server {
 inline constexpr std::uint64_t kMaxOfLog = 64'000'000;  ///< bytes, all attempts together
 inline constexpr const char* kLogName = "job.log";
 
-/// How a program ended.
 struct Exit {
   int code = 0;    ///< exit code
   int signal = 0;  ///< signal that ended it; 0: none

@@ -1,8 +1,6 @@
-// Records a robot's ROS 2 topics into a flight log: writes the messages unchanged to an MCAP file, then imports that file by the mapping
-// (docs/reference/import.md), which names the topics.
-//
-// The type of a topic is the one that its writer announces. If the program is killed, the file stays readable up to about its last second,
-// and `flappy-gap import` makes the log from it.
+// Records a robot's ROS 2 topics into a flight log: writes the messages unchanged to an MCAP file, then imports that by
+// the mapping (docs/reference/import.md), which names the topics. A topic's type is the one that its writer announces.
+// After a kill, the file is readable up to about its last second, and `flappy-gap import` makes the log from it.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +31,7 @@ struct Recorded {
 /// Longer messages are refused: no sensor sample is that long.
 inline constexpr std::size_t kMaxBytes = 65'536;
 
-/// Throws InputError where the type of a topic is not supported or the messages make no flight log; the MCAP file stays.
+/// Throws InputError where a type is not supported or the messages make no flight log; the MCAP file stays.
 Recorded record(const io::DdsConfig& dds, const flightlog::Mapping& mapping, const RecordOptions& options);
 
 }  // namespace flappy::server

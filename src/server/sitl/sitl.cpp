@@ -15,8 +15,7 @@
 namespace flappy::server {
 namespace {
 
-/// Latched, so that an autopilot that joins late still gets the messages.
-constexpr Quality kFlight{true, true, 64};
+constexpr Quality kFlight{true, true, 64};  // latched, so that an autopilot that joins late still gets the messages
 enum Wish : std::uint8_t { kNothing = 0, kHover = 1, kManoeuvre = 2, kOver = 255 };
 
 /// A sample and the time when it arrives, its latency after it was taken.
@@ -127,7 +126,6 @@ class Flight {
     return period_ == std::llround(options_.manoeuvre_s / fleet_.period_s()) ? kManoeuvre : kNothing;
   }
 
-  /// Publishes the samples that have arrived by now, then the tick with their numbers.
   void tell(Wish wish) {
     const auto arrived = [&](auto& queue, std::uint32_t& count) {
       for (; !queue.empty() && queue.front().arrives_s <= now_s() + 1e-9; queue.pop_front(), ++count)
@@ -170,7 +168,6 @@ class Flight {
     return answered || take_inputs();
   }
 
-  /// Queues the samples that the sensors took in the period just flown.
   void sense() {
     const flight::Sensors& sensors = config_.fleet.sensors;
     for (const auto& s : fleet_.imu_samples(0)) {

@@ -1,12 +1,12 @@
-// Software in the loop: the simulator plays the robot of an autopilot. It publishes sensor samples and flies by the inputs that come back.
+// Software in the loop: the simulator plays an autopilot's robot; it publishes samples and flies by the inputs it gets.
 //
-//   /flappy/imu, pose, joint_states, battery   see flapper_topics.hpp; poses come from motion capture, stamps are sampling times
-//   /flappy/tick                               Tick, after the samples: the number of samples that have arrived by this control period
-//   /clock                                     flight time
-//   /flappy/wing_input                         WingInput, subscribed: inputs of the wing beat for the period of its tick
+//   /flappy/imu, pose, joint_states, battery   flapper_topics.hpp; poses of motion capture, stamped by sampling time
+//   /flappy/tick         Tick, after the samples: the number of samples that have arrived by this control period
+//   /clock               flight time
+//   /flappy/wing_input   WingInput, subscribed: inputs of the wing beat for the period of its tick
 //
-// In lock step, a period is flown once its input has arrived, so the flight is reproducible to the byte whatever the computer's speed. In real
-// time, a period lasts as long as on the robot: an input that has not arrived by its end is missed, and the last input holds.
+// In lock step, a period is flown once its input has arrived, so the flight is reproducible to the byte. In real time,
+// an input that has not arrived by the end of its period is missed, and the last input holds.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +34,7 @@ struct SitlResult {
   std::uint64_t hash = 0;  ///< hash of the simulation's final state
 };
 
-/// Throws io::InputError where no autopilot appears, where an input is missing in lock step, and where the task sets motor voltages.
+/// Throws io::InputError where no autopilot appears, lock step misses an input, or the task sets motor voltages.
 SitlResult fly_sitl(const rollout::FlyConfig& config, const SitlOptions& options);
 
 }  // namespace flappy::server

@@ -10,7 +10,7 @@ namespace {
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr char kWorld[] = "world";
 
-/// Removes const for a message's char*; write() only reads the text.
+/// For char* of messages, of which write() only reads the text.
 char* text(const char* of) { return const_cast<char*>(of); }
 
 Header header(double t_s, const char* frame) { return {time_of(t_s), text(frame)}; }

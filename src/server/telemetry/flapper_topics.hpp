@@ -1,9 +1,9 @@
 // The topics of one flapper, under /flappy, /flappy_1 and on:
 //
 //   pose           PoseStamped   torso origin and attitude in "world"; best effort, like other sensor data
-//   imu            Imu           angular rates and specific force in the torso's frame, covariances from the declared noise; no attitude
+//   imu            Imu           angular rates and specific force in the torso's frame, declared noise; no attitude
 //   joint_states   JointState    left_stroke, left_rotation, right_stroke, right_rotation: rad, rad/s
-//   wing_input     WingInput     inputs set by controller and actor; if the actor sets voltages, the voltages, and NaN for the rest
+//   wing_input     WingInput     inputs set by controller and actor; if the actor sets voltages, these, the rest NaN
 //   battery        BatteryState  where it is known
 //   motors         JointState    published with battery: effort is the current in A of left_motor and right_motor
 //   driver         WingInput     inputs that a simulated driver applied, with its voltages and phase

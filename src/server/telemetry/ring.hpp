@@ -1,4 +1,4 @@
-// A lock-free queue from one producer thread, which must not wait, to one consumer thread. Items that do not fit are dropped and counted.
+// A lock-free queue from one producer thread, which must not wait, to one consumer thread. Drops and counts the excess.
 #pragma once
 
 #include <array>
@@ -9,8 +9,7 @@
 
 namespace flappy::server {
 
-/// kSize: a power of 2.
-template <class T, std::size_t kSize>
+template <class T, std::size_t kSize>  // kSize: a power of 2
 class Ring {
  public:
   /// For the producer only. Returns false, and counts the item as dropped, where the ring is full.

@@ -46,7 +46,6 @@ void Telemetry::write(const rollout::FlightSample& sample) {
   ++shown_;
 }
 
-/// Publishes the training progress and the diagnostics, and takes commands.
 void Telemetry::serve() {
   std::optional<TrainingSample> training;
   {

@@ -1,12 +1,11 @@
-// Publishes the watched flappers of a training, an evaluation or flights while they run: the topics of each flapper (flapper_topics.hpp),
-// and
+// Publishes the watched flappers of a training, an evaluation or flights while they run: flapper_topics.hpp, and
 //
 //   /clock                   rosgraph_msgs/Clock     flight time of the first watched flapper
 //   /flappy/training         TrainingMetrics         progress of a training
-//   /flappy/watch            Watch                   subscribed where commands are enabled: the flapper to show in the first slot
+//   /flappy/watch            Watch                   subscribed where commands are enabled: flapper of the first slot
 //   /diagnostics             DiagnosticArray         once a second: number of samples shown and dropped
 //
-// The flight thread puts samples into a ring and goes on; a separate thread publishes them. Samples that do not fit are dropped and counted.
+// The flight thread puts samples into a ring; another thread publishes them. What does not fit is dropped and counted.
 #pragma once
 
 #include <atomic>
@@ -28,8 +27,7 @@ struct TrainingSample {
 class Telemetry : public rollout::Watch {
  public:
   Telemetry(const io::DdsConfig& config, const flight::Sensors& sensors);
-  /// Publishes what is left in the ring.
-  ~Telemetry() override;
+  ~Telemetry() override;  ///< publishes what is left in the ring
 
   void see(const rollout::FlightSample& sample) override;
   /// Publishes the newest sample within a tenth of a second; older ones may be skipped.

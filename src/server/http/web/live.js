@@ -1,4 +1,4 @@
-// Draws the watched flapper and its recent path in 3D. Telemetry does not describe the vehicle, so the shipped hummingbird is drawn.
+// Draws the watched flapper and its recent path in 3D: the shipped hummingbird, as telemetry does not tell the vehicle.
 import {kHummingbird} from "./geometry.js";
 import {Scene} from "./scene.js";
 
