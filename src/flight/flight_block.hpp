@@ -45,11 +45,11 @@ struct FlightSpace {
   sim::Block<T>& body;
   sim::BlockEffects<T> effects;
   FlightBlock<T>& flight;
-  T* ring;   // [slot][row of Increment][lane]
-  T* queue;  // [slot][row of MocapSample][lane]
+  T* ring;   // IMU increments that the estimator may still apply, [slot][row of Increment][lane]
+  T* queue;  // motion-capture poses in transit, [slot][row of MocapSample][lane]
   T* past;   // earlier observations, [action ago][row of the observation][lane]; unused without a history
   Tap<T> tap;
-  sim::Ahead ahead;
+  sim::Ahead ahead;  // memory of the next block, which the first physics steps prefetch
 };
 
 /// Stages of a control period, in order.
@@ -60,6 +60,7 @@ template <class T>
 struct FlightPlan {
   sim::StepBlock<T> step;
   const sim::StepPlan* physics;
+  // from here to ahead_s: the Period of this control period (schedule.hpp)
   std::int64_t first_step;
   const Slice* slices;
   const Correction* corrections;
@@ -84,12 +85,13 @@ struct FlightPlan {
   std::uint32_t action_repeat;  // control periods per action
   std::uint32_t period;  // control periods since the fleet began: counter of the exploration noise's random numbers
   bool explores;
-  T noise_kept, noise_fresh;  // weights of the last noise and of a new standard normal in the next noise
-  T noise_low, noise_more;    // standard deviation for the fleet's first flapper, and its increment per flapper
-  std::uint32_t first_flapper;
+  T noise_kept, noise_fresh;        // weights of the last noise and of a new standard normal in the next noise
+  T noise_low, noise_more;          // standard deviation for the fleet's first flapper, and its increment per flapper
+  std::uint32_t first_flapper;      // number of the fleet's first flapper, from which noise_more counts
   std::uint64_t* cycles = nullptr;  // processor cycles of each Stage, for a benchmark on one thread
 };
 
+/// Flies a block through one control period, all stages in order. Blocks may fly on different threads.
 template <class T>
 using FlyBlock = void (*)(const FlightSpace<T>&, const FlightPlan<T>&);
 

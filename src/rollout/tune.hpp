@@ -44,6 +44,7 @@ struct TuneResult {
   unsigned generations = 0;
 };
 
+/// Calls `progress` after each generation with the best so far; false stops. Gains stay within e^+-3 of their start.
 TuneResult tune(const TuneConfig& config, const std::function<bool(const TuneResult&)>& progress);
 
 }  // namespace flappy::rollout

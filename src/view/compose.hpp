@@ -14,11 +14,13 @@ namespace flappy::view {
 enum class Kind { flight, run, evaluation, diagnosis, identification, benchmark };
 
 /// A flight log; a run folder or a folder of runs; results of flappy-eval, flappy-gap diagnose (or its folder),
-/// flappy-identify forces or flappy-blind score (its folder, or score.csv). Throws InputError for anything else.
+/// flappy-identify forces or flappy-blind score (its folder, or score.csv). Throws InputError for anything else, also
+/// for a folder of flight logs, which composed() expands.
 Kind recognised(const std::filesystem::path& path);
 
 /// Sections in the order of the paths; all flights share one, at the place of the first. A folder of flight logs gives
-/// its first kMaxFlights. Throws io::InputError for a path that is given twice, and for whatever a section refuses.
+/// its first kMaxFlights. Throws io::InputError for a path that is given twice, for options of flights without a flight,
+/// and for whatever a section refuses.
 std::vector<Section> composed(const std::vector<std::filesystem::path>& given, const FlightOptions& options,
                               Packing& packing);
 

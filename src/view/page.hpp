@@ -5,7 +5,8 @@
 //   figure     figure.hpp
 //   table      {"title", "head": [...], "rows": [[cell, ...]], "note"}   cell: a text, or {"text", "at": JSON pointer}
 //   flights    flight_section.hpp; anatomy, cases: sections.hpp
-//   matrix     {"title", "rows", "columns", "values": [[x|null]], "texts", "marked", "least", "most", "tilted", "note"}
+//   matrix     {"title", "rows", "columns", "values": [[x|null]], "texts", "note"}, optional: "least", "most", "marked",
+//              "tilted". Texts fill the cells; values shade them from least (0) to most; marked rings a cell.
 //   heading    {"text"}
 // Foreign text enters as JSON without any "<", and the page makes text nodes of it, so it is never read as markup.
 #pragma once
@@ -50,7 +51,7 @@ std::string page_text(const std::string& title, const std::vector<Section>& sect
 
 /// JSON that is safe within <script>: "<", ">" and "&" become \u003c, \u003e, \u0026.
 std::string json_in_html(const Json& json);
-/// Text that is safe within an element or an attribute.
+/// Text that is safe within an element or an attribute in double quotes; it leaves single quotes as they are.
 std::string text_in_html(std::string_view text);
 /// Our modules as one script: each after the modules that it imports, without import lines and the word export.
 std::string joined_modules();

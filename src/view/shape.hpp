@@ -2,6 +2,7 @@
 //
 //   {"name", "mass_kg", "profile_m": [[height, radius], ...], "left": wing, "right": wing}
 //   wing  {"shoulder_m": [x, y, z], "outline_m": [[span, chord], ...]}   trailing edge, root to tip (leading: straight)
+//   Span points outward along y of B, chord down along -z from the leading edge; both begin at the shoulder.
 // or, for a beat-averaged vehicle,
 //   {"name", "mass_kg", "body_m": [x, y, z]}                             semi-axes of an ellipsoid
 //

@@ -10,7 +10,7 @@ namespace flappy::blind {
 
 std::unique_ptr<Family> make_family_a();
 
-/// The case of an assignment, with exact declarations. With `conventions`, Family::fly then changes some in the log.
+/// True robot and sensors of an assignment. Assignment::conventions draws other sensors; fly() then misdeclares them.
 Case case_of(const Assignment& a);
 
 }  // namespace flappy::blind

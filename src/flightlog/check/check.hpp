@@ -35,7 +35,7 @@ struct CheckReport {
 
 CheckReport check_flight(const FlightLog& log);
 
-/// One report for each flight of one robot; also compares their declared inputs with one another.
+/// One report for each flight. Flights that declare the same inputs are compared in their findings "input NAME".
 std::vector<CheckReport> check_flights(const std::vector<FlightLog>& logs);
 
 }  // namespace flappy::flightlog

@@ -31,7 +31,7 @@ struct ScoredHypothesis {
   Fit fit;                                ///< effects and parameters; without a residual if fitted only linearly
   /// The largest deviation of an effect by the place from the catalogue's law. None: the law factor does not exceed 1.
   std::optional<FreeBlock> other_law;
-  Residuals held_out;  ///< [flight], with the fit to the other flights; empty if not fitted by simulation
+  Residuals held_out;  ///< [flight], fitted to the others, a lone one to itself; empty if not fitted by simulation
   /// Effects of another hypothesis whose fit predicts for this one: its own effects and further ones, whose gain may be
   /// due to chance. Empty: its own fit predicts.
   std::vector<std::string> predicted_with;
@@ -55,22 +55,25 @@ struct Inference {
   bool complete = true;                      ///< false: stopped by `progress`
   std::vector<ScoredHypothesis> hypotheses;  ///< the most probable first
   Verdict verdict;
-  std::size_t concluded = 0;  ///< index of the most probable hypothesis of the verdict
-  std::vector<std::string> untestable;
-  Fit parameters;                      ///< the parameters fitted without effects
-  Eigen::VectorXd corrected;           ///< coordinates of the corrected vehicle, fitted without background magnitudes
-  std::vector<double> minors;          ///< variates for sim::Randomisation::set_minors
-  std::vector<SensorFinding> sensors;  ///< errors of declared sensors, given the conclusion
-  std::optional<Validation> validation;
-  Residuals nominal;             ///< residuals of the vehicle file
-  Residuals refit;               ///< residuals with parameters fitted to the other flights, without effects
-  std::vector<double> noise_sd;  ///< [group] standard deviation of the noise of a row
+  std::size_t concluded = 0;            ///< index of the most probable hypothesis of the verdict
+  std::vector<std::string> untestable;  ///< effects that change no row; only for a beat-averaged vehicle
+  Fit parameters;                       ///< the parameters fitted without effects
+  /// Coordinates of the corrected vehicle, fitted without background magnitudes: of the Hypothesis of `uncertain` with
+  /// `minors` and the effects of predicting().
+  Eigen::VectorXd corrected;
+  std::vector<double> minors;            ///< variates for sim::Randomisation::set_minors
+  std::vector<SensorFinding> sensors;    ///< errors of declared sensors, given the conclusion
+  std::optional<Validation> validation;  ///< only for a beat-averaged vehicle (DiagnosisPolicy::validate)
+  Residuals nominal;                     ///< residuals of the vehicle file
+  Residuals refit;                       ///< residuals with parameters fitted to the other flights, without effects
+  std::vector<double> noise_sd;  ///< [channel and coefficient of the beat] standard deviation of the noise of a row
 
   const ScoredHypothesis& conclusion() const { return hypotheses[concluded]; }
   /// The hypothesis whose fit predicts for the conclusion (ScoredHypothesis::predicted_with).
   const ScoredHypothesis& predicting() const;
 };
 
+/// Runs all stages on the flights of one robot. After a stop it decides among the hypotheses fitted by then.
 Inference infer(const Flights& flights, const sim::Randomisation& uncertain, const InferenceOptions& options);
 
 }  // namespace flappy::gap

@@ -29,25 +29,27 @@ class RobotFit {
   const Fit& parameters() const { return parameters_; }
   /// The vehicle file under the same noise; without columns.
   const Fit& nominal() const { return nominal_; }
+  /// Magnitudes of all effects but withheld ones, those of an effect together; without any whose simulation diverges.
   const std::vector<MagnitudeColumn>& magnitudes() const { return magnitudes_; }
 
-  /// Background magnitudes of all effects. An effect with a magnitude for each wing has two: the difference of the
-  /// wings, and the part that both share, as an error of a wing model is the same in both. `shapes`: also with other
-  /// shape parameters.
+  /// Background magnitudes of all effects: one for each magnitude, and for each side of the file's value. An effect with
+  /// a magnitude for each wing has two: the difference of the wings, and the part that both share, as an error of a wing
+  /// model is the same in both. `shapes`: also with other shape parameters.
   std::vector<Background> background(const ModelDiscrepancy& discrepancy, bool shapes) const;
   /// Change of the prediction for one prior sd of each error of declared sensors, then of each minor draw of the
   /// vehicle.
   Regressors nuisance_regressors() const;
   /// Nats by which an effect's magnitudes are more probable a priori than as its background.
+  /// `magnitudes`: in prior standard deviations. Positive favours the effect.
   double beyond_background(const std::string& effect, const Eigen::VectorXd& magnitudes, const Scales& scales) const;
-  /// Errors of declared sensors, given a fit. `fitter`: with the scales of the fit.
+  /// The IMU's lag, then each error of declared sensors on which the flights have information, given a fit. `fitter`: with the scales of the fit.
   std::vector<SensorFinding> sensors(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit) const;
 
-  /// Evidence of a hypothesis with its own scales, searched from `start`. `unknown_penalty_nats`: as in
-  /// Evidence::weigh.
+  /// Evidence of a hypothesis with its own scales, searched from `start` and from prior scales of its effects'
+  /// backgrounds, and with its law factor. `unknown_penalty_nats`: as in Evidence::weigh.
   ScaledEvidence weigh(const Hypothesis& hypothesis, const Fit& fit, const Scales& start,
                        std::optional<double> unknown_penalty_nats = {}) const;
-  /// Scales given a fit, searched from `start` and from scales at which one effect's background is much larger.
+  /// Scales given a fit: searched from `start`, then from a larger background of one effect while the evidence grows.
   Scales find_scales(const Hypothesis& hypothesis, const Fit& fit, const Scales& start) const;
 
  private:

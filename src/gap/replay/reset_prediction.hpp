@@ -20,10 +20,13 @@ class ResetPrediction final : public PredictedFlight {
   const std::string& name() const override { return recording_.name; }
   std::size_t beats() const override { return recording_.beats; }
   double beats_Hz() const override { return recording_.log.header.flapping_Hz; }
+  /// Force needs mocap in the beat and the IMU in two more on each side; path and turn need mocap, the others a log.
   bool covers(std::size_t beat, int channel) const override;
+  /// Coefficient 0 is the mean of a beat, the others are its harmonics; path and turn have only the mean.
   bool has_rows(int channel, int coefficient) const override { return channel < kPathX || coefficient == 0; }
   const Rows& measured() const override { return measured_; }
   const Rows& signal() const override { return signal_; }
+  /// Takes 1 to kVehicles vehicles (reset_kernel.hpp). The rows of a vehicle whose simulation diverges are empty.
   std::vector<Rows> predict(const std::vector<const VehicleHypothesis*>& vehicles) const override;
   void weigh(Rows& rows) const override;
   Rows declared_noise(std::uint64_t seed) const override;
@@ -34,7 +37,7 @@ class ResetPrediction final : public PredictedFlight {
   const DiagnosisPolicy& policy() const override { return kWingPolicy; }
   const Recording* recording() const override { return &recording_; }
   std::shared_ptr<const PredictedFlight> with_log(flightlog::FlightLog log) const override;
-  /// The last kMaxCorrected results are cached.
+  /// Undoes errors of sensors in the log. Caches the last kMaxCorrected results; several threads may call it.
   std::shared_ptr<const PredictedFlight> corrected(const EffectValues& sensors) const override;
   static constexpr std::size_t kMaxCorrected = 8;
 

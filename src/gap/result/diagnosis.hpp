@@ -16,7 +16,7 @@ struct Estimate {
   std::string unit;  ///< for example "kg/m"; "": dimensionless
 };
 
-/// Share of the closable gap that a hypothesis closes (gap/localise/closure.hpp).
+/// Share that a hypothesis closes of the loss of refitted parameters above that of noise (gap/localise/closure.hpp).
 struct Closure {
   double value = 0, low = 0, high = 0;
 };
@@ -31,10 +31,11 @@ struct RankedHypothesis {
   std::vector<std::string> effects;
   std::string group;       ///< groups of the effects, joined by +; for another kind, its name
   bool remainder = false;  ///< something unknown is missing in addition to the effects
+  /// log_evidence (nats) includes log_prior; the probability tempers the evidence (gap/diagnose/verdict.hpp).
   double probability = 0, log_evidence = 0, log_prior = 0;
-  std::vector<Estimate> parameters;  ///< magnitudes, then shape parameters, of the effects
+  std::vector<Estimate> parameters;  ///< effect by effect: its magnitudes, then its shape parameters
   std::optional<double> loss;        ///< mean loss in held-out flights; none: it was not fitted by simulation
-  double loss_gain_sd = 0;           ///< standard deviation of its gain over the loss of the parameters alone
+  double loss_gain_sd = 0;           ///< standard deviation of (loss of the parameters alone - loss)
   std::optional<Closure> closure;
 };
 
@@ -77,8 +78,7 @@ struct UnexplainedTerm {
   std::string channel;
   int harmonic = 0;      ///< harmonic of the beat; 0: its mean
   std::string function;  ///< function of the regime to which the residual is proportional
-  std::string
-      regime;  ///< quantity that the function depends on: always, amplitude, velocity, height, heading, time, ...
+  std::string regime;    ///< quantity that the function depends on: always, amplitude, velocity, height, time, ...
   double times_prior_scale = 0;  ///< scale of the block over that of the robot; for other_law, the law factor
   double gain_nats = 0;          ///< gain of evidence
 };
@@ -97,7 +97,7 @@ struct Course {
 
 struct NextExperiment {
   std::string manoeuvre;  ///< name of a configuration in configs/gap/experiments
-  /// The most probable hypothesis and the one best separated from it: effects joined by +, or a kind.
+  /// The most probable hypothesis without an unknown cause, and its best separated rival: effects by +, or a kind.
   std::vector<std::string> separates;
   double expected_nats = 0;  ///< expected evidence between these two
   double information = 0;    ///< expected information on all hypotheses, nats
@@ -140,6 +140,7 @@ struct Diagnosis {
   bool complete = true;                      ///< false: stopped before every effect was weighed
   Verdict verdict;
   std::vector<RankedHypothesis> hypotheses;  ///< those with effects, then the others; each by falling probability
+  /// Terms of the conclusion's remainder; without one, those of the hypothesis unknown, even an improbable one.
   std::vector<UnexplainedTerm> unexplained;  ///< the largest gain first
   std::vector<std::string> jointly_with;     ///< effects that are fitted jointly with the unexplained terms
   std::optional<UnexplainedTerm> other_law;  ///< largest deviation of a named effect from the law of the catalogue
@@ -154,7 +155,8 @@ struct Diagnosis {
   std::vector<std::string> untestable;                          ///< effects that cannot show in these logs
   std::optional<Validation> validation;                         ///< only for a beat-averaged vehicle
   std::vector<ClosedLoop> closed_loop;
-  std::optional<NextExperiment> next;  ///< none if fewer than two hypotheses are probable enough
+  /// None for a beat-averaged vehicle, a stopped diagnosis, no safe manoeuvre, or fewer than two probable hypotheses.
+  std::optional<NextExperiment> next;
 };
 
 const char* name_of(HypothesisKind kind);

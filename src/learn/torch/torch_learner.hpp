@@ -28,7 +28,7 @@ class TorchLearner {
   /// Computes the gradients for batch.rows, on the calling thread only. `share`: of these rows in the whole batch, by
   /// which gradients and metrics are multiplied.
   virtual UpdateMetrics differentiate(const Replay& replay, const Batch& batch, double share) = 0;
-  /// Does the step of Adam after differentiate().
+  /// Does the step of Adam after differentiate(). If the actor learns, it also moves the targets by tau to the weights.
   virtual void step(const Batch& batch) = 0;
   /// The gradients, count() numbers, for the exchange between ranks before step().
   virtual void get_gradients(std::span<float> numbers) const = 0;

@@ -4,6 +4,7 @@
 //   /flappy/training         TrainingMetrics         progress of a training
 //   /flappy/watch            Watch                   subscribed where commands are enabled: flapper of the first slot
 //   /diagnostics             DiagnosticArray         once a second: number of samples shown and dropped
+//   In these names, /flappy stands for the namespace of the configuration.
 //
 // The flight thread puts samples into a ring; another thread publishes them. What does not fit is dropped and counted.
 #pragma once
