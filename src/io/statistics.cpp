@@ -55,8 +55,9 @@ Interval wilson_interval(std::size_t successes, std::size_t count) {
 
 double t_tail(double t, double freedom) { return f_tail(t * t, 1, freedom); }
 
-double f_tail(double f, double above, double below) {
-  return boost::math::ibeta(below / 2, above / 2, below / (below + above * std::max(0.0, f)));
+double f_tail(double f, double numerator_freedom, double denominator_freedom) {
+  const double a = numerator_freedom, b = denominator_freedom;
+  return boost::math::ibeta(b / 2, a / 2, b / (b + a * std::max(0.0, f)));
 }
 
 double chi2_tail(double x, double freedom) { return boost::math::gamma_q(freedom / 2, std::max(0.0, x) / 2); }

@@ -1,4 +1,4 @@
-// Replay memory: the newest transitions, a row of float each, so that a sample reads one place in memory.
+// Replay memory of the newest transitions. Each is one row of floats, so that a sample reads one place in memory.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace flappy::learn {
 
-/// Number of transitions that an update processes together; the batch is a multiple of it.
+/// Number of transitions that an update processes together; the size of a batch is a multiple of it.
 inline constexpr std::size_t kChunk = 64;
 
 struct TransitionShape {
@@ -35,8 +35,9 @@ class Replay {
 
   /// Adds a transition. When the memory is full, it replaces the oldest one.
   void add(const Transition& transition);
-  /// add() in two steps: threads put() at once with different `ahead` (0 <= ahead < capacity); then one calls advance()
-  /// with their number. No thread may sample in between.
+  /// add() in two steps, for several threads. Each calls put(), which writes the row `ahead` rows after cursor(), with
+  /// a number of its own, 0 <= ahead < capacity. Then one thread calls advance(count) with the number of rows written.
+  /// No thread may sample in between.
   void put(std::size_t ahead, const Transition& transition);
   void advance(std::size_t count);
 
@@ -48,13 +49,15 @@ class Replay {
   std::size_t bytes() const { return rows_.size() * sizeof(float); }
   const float* row(std::size_t i) const { return &rows_[i * layout_.row]; }
 
-  /// Samples members `first` (even) to `first + out.size() - 1` of an update's batch, as rows, uniformly among those
-  /// held. Depends only on seed, update, number in the batch, and size().
+  /// Draws the row numbers of members `first` to `first + out.size() - 1` of an update's batch into `out`, uniformly
+  /// from the rows held, with replacement. `first` is even, because numbers are drawn in pairs. A member's row depends
+  /// only on seed, update, its position in the batch, and size().
   void sample(std::uint64_t seed, std::uint64_t update, std::size_t first, std::span<std::uint32_t> out) const;
 
   /// The rows held, for checkpoints.
   std::span<const float> rows() const { return {rows_.data(), size_ * layout_.row}; }
-  /// Restores saved rows and cursor. Throws std::invalid_argument if they do not fit this memory.
+  /// Restores saved rows and cursor. Throws std::invalid_argument if the length of `rows` or the cursor is impossible
+  /// for this shape and capacity.
   void restore(std::span<const float> rows, std::size_t cursor);
 
  private:

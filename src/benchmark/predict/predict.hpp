@@ -1,4 +1,5 @@
-// The diagnosing side of the blind benchmark. It gets a Question and nothing else of a case.
+// The diagnosing side of the blind benchmark. It reads the flights and files that a Question names, or the default
+// files of configs, and never a label.
 #pragma once
 
 #include <filesystem>
@@ -11,9 +12,10 @@
 
 namespace flappy::benchmark {
 
+/// The answer of one of the simpler methods that the diagnosis is compared with.
 struct Baseline {
-  std::vector<std::string> named;    ///< effects; empty: the parameters explain the flights
-  std::vector<std::string> ranking;  ///< all effects that it ranks, the most likely first
+  std::vector<std::string> named;    ///< ids of the effects that it says are present; empty: none
+  std::vector<std::string> ranking;  ///< ids of effects, the most likely first; may lack effects that it cannot judge
 };
 
 inline constexpr const char* kBaselines[] = {"largest_residual", "best_rmse", "stlsq", "black_box"};
@@ -21,24 +23,28 @@ inline constexpr const char* kBaselines[] = {"largest_residual", "best_rmse", "s
 /// The prediction of a case, made before its label is opened.
 struct Prediction {
   gap::Diagnosis diagnosis;
-  std::map<std::string, Baseline> baselines;  ///< by name (kBaselines)
+  std::map<std::string, Baseline> baselines;  ///< by name; all but "black_box", which the scorer adds
   std::vector<double> features;               ///< features of the residuals, for the black box (baselines.hpp)
-  std::string corrected;                      ///< text of the corrected vehicle file; empty: the data are faulty
-  bool crashed = false;                       ///< the robot crashed in the flight to be diagnosed
+  std::string corrected;                      ///< text of the corrected vehicle file; empty if the logs are faulty
+  bool crashed = false;                       ///< the robot crashed in the proposed flight, so nothing was predicted
 };
+
 /// Whether a verdict gives no single answer: it is a group, or its probability is below one half.
 bool abstains(const gap::Verdict& verdict);
 
 struct Question {
   std::vector<std::filesystem::path> flights;  ///< folders of logs
+  /// TOML files. Empty priors, discrepancy or verdict: those of configs/gap or configs/gap/beat_averaged.
   std::filesystem::path vehicle, priors, discrepancy, verdict;
   std::vector<std::string> withheld;  ///< effects to leave out of the catalogue
-  bool baselines = true;
-  std::filesystem::path experiments;  ///< manoeuvres, one of which is proposed if the verdict abstains; empty: none
+  bool baselines = true;              ///< also compute Prediction::baselines and ::features
+  /// Folder of manoeuvres (*.toml), one of which is proposed if the verdict abstains; empty: none.
+  std::filesystem::path experiments;
 };
 using Predictor = std::function<Prediction(const Question&)>;
 
-/// Diagnoses on one thread, as flappy-gap does (gap/diagnose/diagnose.hpp).
+/// Diagnoses on one thread, as flappy-gap does (gap/diagnose/diagnose.hpp). Throws io::InputError for a file or log
+/// that is not accepted.
 Prediction predict(const Question& question);
 
 }  // namespace flappy::benchmark

@@ -60,7 +60,7 @@ void CommandServer::run() {
       if (io::steady_seconds() - looked_s < std::chrono::duration<double>(kQueueLook).count()) continue;
       looked_s = io::steady_seconds();
       show_changes(false);
-      look();
+      read_watched();
     } catch (const std::exception& e) {  // not the fault of a client; the queue goes on
       io::log(io::LogLevel::error, std::string("dds: ") + e.what());
       std::this_thread::sleep_for(kQueueLook);
@@ -174,7 +174,7 @@ void CommandServer::show_changes(bool all) {
 }
 
 /// Updates the live state from the topics of the watched flapper; the velocity is the difference of two poses.
-void CommandServer::look() {
+void CommandServer::read_watched() {
   bool any = false;
   imu_.take([&](const Imu& m, const dds_sample_info_t&) {
     state_.w_WB_B_rad_s = {m.angular_velocity.x, m.angular_velocity.y, m.angular_velocity.z};

@@ -1,10 +1,13 @@
-// Serves the queue of jobs over DDS. All topics are reliable; their types bound every string. Rates are limited per
-// client process, whatever ids its commands have.
+// Serves the queue of jobs over DDS. All topics are reliable, and every string of their types has a greatest length.
+// The rate of commands is limited for each client process.
 //
-//   /flappy/jobs             JobStatus       each job when it changes, and all jobs after the command "list"
-//   /flappy/command          Command         where enabled; for "fetch", config is a file of the job; empty: list them
-//   /flappy/command_result   CommandResult   answer to every command; for "list", job is the number of JobStatus sent
-//   /flappy/files            FileChunk       answer to "fetch"
+// The topics of the namespace "flappy" (DdsConfig::name_space):
+//
+//   /flappy/jobs             JobStatus       each job within 0.1 s of a change; after the verb "list" the newest 1000
+//   /flappy/command          Command         only if DdsConfig::commands; "fetch" asks for file `config` of the
+//                                            job, or for the list of its files if it is empty
+//   /flappy/command_result   CommandResult   answer to every command; for "list", `job` is the number of JobStatus sent
+//   /flappy/files            FileChunk       a piece of a fetched file, or without data for each file of the list
 #pragma once
 
 #include <atomic>
@@ -21,7 +24,8 @@ namespace flappy::server {
 
 class CommandServer {
  public:
-  /// Starts to answer, in a thread of its own. Also sets `watched` from the topics of the watched flapper.
+  /// Starts to answer, in a thread of its own, until destroyed; does not look at config.enabled. The thread also reads
+  /// the topics pose, imu and battery of the namespace into `watched`. `commands` and `watched` must outlive it.
   CommandServer(const io::DdsConfig& config, Commands& commands, LiveState& watched);
   ~CommandServer();
 
@@ -38,13 +42,13 @@ class CommandServer {
   CommandResult fetch(const Command& command);
   void send_pieces();
   void show_changes(bool all);
-  void look();
+  void read_watched();
 
   Commands& commands_;
   LiveState& watched_;
   Participant participant_;
   Writer<JobStatusMessage> jobs_;
-  std::optional<Reader<CommandMessage>> asked_;  // empty where commands are disabled
+  std::optional<Reader<CommandMessage>> asked_;  // empty if commands are disabled
   Writer<CommandResultMessage> results_;
   Writer<FileChunk> files_;
   Reader<PoseStamped> pose_;

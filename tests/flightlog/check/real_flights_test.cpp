@@ -1,5 +1,5 @@
 // Flights that others measured, where FLAPPY_REAL_DATA names the folder that has them: flapper/*.csv.gz of federicoangioni/flappingModel,
-// nanobench/*.csv.gz of syediu/nanobench-iros2026. docs/reference/import.md says what is found in them.
+// nanobench/*.csv.gz of syediu/nanobench-iros2026. docs/results/real_flights.md says what is found in them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
