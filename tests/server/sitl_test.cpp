@@ -137,12 +137,12 @@ void answer(int domain, const std::function<std::optional<WingInput>(const Tick&
 }
 
 TEST(Sitl, RefusesWhatIsNoNumberAndWhatIsForAnotherPeriod) {
-  const FlyConfig flown = led(escape(), 0.02);
+  const FlyConfig flown = led(escape(), 0.2);  // long, for on a busy machine the first answers come late
   std::thread other([&] {
     answer(flown.dds.domain, [](const Tick& t) {
       WingInput u{};
-      u.tick = t.tick == 5 ? 4 : t.tick;
-      u.amplitude_v = t.tick == 3 ? std::nan("") : 10;
+      u.tick = t.tick % 10 == 5 ? t.tick - 1 : t.tick;
+      u.amplitude_v = t.tick % 10 == 3 ? std::nan("") : 10;
       return u;
     });
   });
@@ -150,7 +150,8 @@ TEST(Sitl, RefusesWhatIsNoNumberAndWhatIsForAnotherPeriod) {
   o.lock_step = false;
   const SitlResult r = fly_sitl(flown, o);
   other.join();
-  EXPECT_EQ(r.refused, 1U);
+  EXPECT_GE(r.refused, 1U);
+  EXPECT_LE(r.refused, 10U) << "no others";
   EXPECT_GE(r.stray, 1U);
   EXPECT_GE(r.missed, 2U);
 }
