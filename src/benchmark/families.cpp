@@ -42,20 +42,40 @@ bool in_catalogue(const blind::FamilyEffect& effect) { return !effect.id.starts_
 
 std::uint64_t seed_of_draw(std::uint64_t seed, std::uint64_t draw) { return seed * blind::kTries + draw; }
 
+namespace {
+
+/// Flies until the robot crashes; how it did, or none.
+std::optional<std::string> fly_session(const Family& family, const blind::Assignment& a,
+                                       std::vector<blind::FamilyFlight>& flights) {
+  flights.clear();
+  while (flights.size() < Family::kFlights) {
+    flights.push_back(family.fly(a, flights.size()));
+    if (flights.back().crashed) return "flight " + std::to_string(flights.size()) + " " + flights.back().how;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
 FlownRobot fly_drawn(const Family& family, blind::Assignment a, std::uint64_t seed,
-                     const std::function<void(blind::Assignment&)>& prepare) {
+                     const std::function<void(blind::Assignment&)>& prepare,
+                     std::optional<blind::Assignment> reference) {
   FlownRobot robot;
   for (; robot.draw < blind::kTries; ++robot.draw) {
     a.seed = seed_of_draw(seed, robot.draw);
     if (prepare) prepare(a);
-    robot.flights.clear();
-    while (robot.flights.size() < Family::kFlights && (robot.flights.empty() || !robot.flights.back().crashed))
-      robot.flights.push_back(family.fly(a, robot.flights.size()));
-    if (!robot.flights.back().crashed) {
+    std::optional<std::string> lost;
+    if (reference) {
+      reference->seed = a.seed;
+      lost = fly_session(family, *reference, robot.reference);
+      if (lost) *lost += " of the reference";
+    }
+    if (!lost) lost = fly_session(family, a, robot.flights);
+    if (!lost) {
       robot.assignment = std::move(a);
       return robot;
     }
-    robot.lost.push_back("flight " + std::to_string(robot.flights.size()) + " " + robot.flights.back().how);
+    robot.lost.push_back(*lost);
   }
   throw blind::NeverFlies("--seed " + std::to_string(seed) + ": " + std::to_string(blind::kTries) +
                           " robots in a row crashed; accepted: effects of smaller magnitude, less randomisation");

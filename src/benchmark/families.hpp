@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,14 +26,16 @@ struct FlownRobot {
   std::uint64_t draw = 0;         ///< number of the draw of its seed
   std::vector<std::string> lost;  ///< how the robots of the earlier draws crashed
   blind::Assignment assignment;   ///< with the seed of the draw
-  std::vector<blind::FamilyFlight> flights;
+  std::vector<blind::FamilyFlight> flights, reference;
 };
 
 std::uint64_t seed_of_draw(std::uint64_t seed, std::uint64_t draw);
 
 /// Draws robots until one flies all its flights, like blind::fly_sampled, with the draw's seed in `a`, which `prepare`
-/// may then change. blind::NeverFlies after 20 draws.
+/// may then change. `reference`: another session, which the same robot has to fly, too. blind::NeverFlies after 20
+/// draws.
 FlownRobot fly_drawn(const blind::Family& family, blind::Assignment a, std::uint64_t seed,
-                     const std::function<void(blind::Assignment&)>& prepare = {});
+                     const std::function<void(blind::Assignment&)>& prepare = {},
+                     std::optional<blind::Assignment> reference = {});
 
 }  // namespace flappy::benchmark

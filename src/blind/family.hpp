@@ -34,8 +34,12 @@ struct ProposedFlight {
 struct Assignment {
   std::filesystem::path vehicle_file;                   ///< the declared vehicle; each family has its own reader
   std::vector<std::pair<std::string, double>> effects;  ///< id, magnitude: 1 is typical of a 12 g robot, at most 4
-  std::uint64_t seed = 0;             ///< draws the robot, its sensors, and random properties of its effects
+  std::uint64_t seed = 0;  ///< draws the robot, its sensors, and random properties of its effects
+  /// Session of flights. In session 0 the robot is as drawn. A later one has programmes and noise of its own, and what
+  /// changes harmlessly from day to day has changed: weather, a warm winding, a battery put back, ...
+  std::size_t session = 0;
   bool hover = false;                 ///< hover only; else rich flights, which vary place, speed and inputs
+  bool calm = false;                  ///< flight 0 hovers, flights 1 and 2 follow slow paths; replaces rich flights
   bool own_parameters = false;        ///< draws each parameter of each body independently; else the file's values
   bool conventions = false;           ///< draws declarations within the habits of laboratories; else they are exact
   bool power = false, wings = false;  ///< whether currents and wing angles are logged

@@ -23,7 +23,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct FamilyOptions {
-  std::string family;  ///< empty: family A with its own options
+  std::string family;     ///< empty: family A with its own options
+  std::string reference;  ///< folder for a session without effects that the robot flies before; empty: none
+  bool calm_reference = false;
   bool hover = false, own_parameters = false, conventions = false;
 };
 
@@ -37,15 +39,26 @@ Json fly_family(const RobotOptions& o, const FamilyOptions& f) {
   for (const BlindEffect& e : effects_of(o.effects)) a.effects.emplace_back(e.id, e.magnitude);
   a.hover = f.hover, a.own_parameters = f.own_parameters, a.conventions = f.conventions;
   a.power = o.power, a.wings = o.wings;
-  const benchmark::FlownRobot robot = benchmark::fly_drawn(family, a, o.seed);
+  std::optional<Assignment> reference;
+  if (!f.reference.empty()) {
+    reference = a;
+    reference->effects.clear();
+    reference->calm = f.calm_reference;
+    a.session = 1;
+  }
+  const benchmark::FlownRobot robot = benchmark::fly_drawn(family, a, o.seed, {}, reference);
   for (std::size_t draw = 0; draw < robot.lost.size(); ++draw)
     std::printf("draw %zu: %s; the next draw\n", draw, robot.lost[draw].c_str());
   Json folders = Json::array();
-  for (std::size_t k = 0; k < Family::kFlights; ++k) {
-    folders.push_back((std::filesystem::path(o.out) / ("flight_" + std::to_string(k + 1))).string());
-    flightlog::write_flight_log(folders.back().get<std::string>(), robot.flights[k].log);
-    std::printf("%s: %g s\n", folders.back().get<std::string>().c_str(), Family::kFlight_s);
-  }
+  const auto write_all = [&](const std::vector<FamilyFlight>& flights, const std::string& to) {
+    for (std::size_t k = 0; k < flights.size(); ++k) {
+      folders.push_back((std::filesystem::path(to) / ("flight_" + std::to_string(k + 1))).string());
+      flightlog::write_flight_log(folders.back().get<std::string>(), flights[k].log);
+      std::printf("%s: %g s\n", folders.back().get<std::string>().c_str(), Family::kFlight_s);
+    }
+  };
+  write_all(robot.reference, f.reference);
+  write_all(robot.flights, o.out);
   return {{"family", f.family}, {"seed", o.seed}, {"draw", robot.draw}, {"crashes", robot.lost}, {"flights", folders}};
 }
 
@@ -94,6 +107,9 @@ int main(int argc, char** argv) {
       .shows_default();
   fly.option("--family", of.family, kFamily);
   fly.flag("--hover", of.hover, "as --programme hover");
+  fly.option("--reference", of.reference,
+             "of a family: folder for a session of the same robot without the effects, flown before");
+  fly.flag("--calm-reference", of.calm_reference, "the reference hovers and follows slow paths");
   fly.flag("--own-parameters", of.own_parameters, "of a family: draw the parameters of each body");
   fly.flag("--conventions", of.conventions, "of a family: draw sensors and declarations as laboratories have them");
   fly.option("--out", robot.out, "folder for flight_1, flight_2, flight_3").required();

@@ -83,7 +83,7 @@ void Robot::update_drive(double dt_s) {
     const double current = x_.drawn_C / dt_s;
     x_.charge_C += x_.drawn_C;
     x_.battery_rc_V += dt_s / kSlow_s * (kSlow_ohm * current - x_.battery_rc_V);
-    x_.battery_V = kBattery_V - magnitude * (kSlope_V_C * x_.charge_C + x_.battery_rc_V + kSeries_ohm * current);
+    x_.battery_V = full_V_ - magnitude * (kSlope_V_C * x_.charge_C + x_.battery_rc_V + kSeries_ohm * current);
   }
   x_.drawn_C = 0;
   bool brush_open = false;

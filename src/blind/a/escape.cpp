@@ -17,7 +17,7 @@ flight::Setpoint<double> hold(const Vector3d& position_m, double heading_rad) {
   return s;
 }
 
-Waypoint start_of(const flight::StartRange& range, std::uint64_t seed, std::size_t number) {
+Waypoint start_of(const flight::StartRange& range, std::uint64_t seed, std::uint64_t number) {
   Random random(seed, 100 * number + 171);
   const auto draw = [&](const flight::Spread& s) { return s.centre + s.half * (2 * random.uniform() - 1); };
   Waypoint w;
@@ -34,7 +34,7 @@ class Escaper {
   Escaper(const Case& c, std::size_t number, const EscapeRules& rules, const Waypoint& start)
       : rules_(rules),
         driver_(c.vehicle.driver),
-        view_(c.seed, number),
+        view_(c.seed, flight_number(c.session, number)),
         start_(hold(start.position_m, start.heading_rad)) {
     const auto& at = rules.task.path.front().coefficients;
     goal_ = hold({at[0][0], at[1][0], at[2][0] + kHeight_m}, at[3][0]);
@@ -111,7 +111,7 @@ class Escaper {
 }  // namespace
 
 Escape escape(const Case& c, std::size_t number, const EscapeRules& rules) {
-  const Waypoint at = start_of(rules.task.start, c.seed, number);
+  const Waypoint at = start_of(rules.task.start, c.seed, flight_number(c.session, number));
   Torso start;
   start.position_m = at.position_m;
   start.attitude = turned_by({0, 0, at.heading_rad});

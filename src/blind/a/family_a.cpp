@@ -1,6 +1,7 @@
 #include "blind/a/family_a.hpp"
 
 #include "blind/a/sampled_robot.hpp"
+#include "blind/a/session.hpp"
 
 namespace flappy::blind {
 namespace {
@@ -160,7 +161,7 @@ void misdeclare(flightlog::FlightHeader& h, std::uint64_t seed) {
 /// Leads the torso along the path; harmonics, by beats, of the accelerations that a free torso would have there.
 Contrast led(const Case& c, std::size_t flight, const std::vector<Torso>& path,
              const std::vector<std::array<double, 2>>& volts) {
-  Robot robot(c.vehicle, flight_room(), c.magnitudes, c.seed, flight);
+  Robot robot = robot_of(c, flight);
   const auto& at = c.sensors->imu.position_m;
   const double beats_per_step = kRobotStep_s * c.vehicle.driver.flapping_Hz, trim = kTrim_s / kRobotStep_s;
   Contrast out;
@@ -244,12 +245,13 @@ Case case_of(const Assignment& a) {
   for (const auto& [id, magnitude] : a.effects) effects.push_back({id, magnitude});
   c.magnitudes = Magnitudes(effects);
   c.seed = a.seed;
-  c.programme = a.hover ? Programme::hover : Programme::rich;
+  c.programme = a.hover ? Programme::hover : a.calm ? Programme::calm : Programme::rich;
   c.proposed = a.proposed;
   c.power = a.power;
   c.wings = a.wings;
   c.sensors = a.conventions ? drawn_sensors(a) : sensors_of(a.seed, a.power, a.wings);
   if (a.own_parameters) draw_parameters(c.vehicle, a.seed);
+  begin_session(c, a.session);
   return c;
 }
 

@@ -104,6 +104,12 @@ flightlog::FlightHeader header_of(const Case& c, const SensorSet& sensors, const
 
 Room flight_room() { return {}; }
 
+Robot robot_of(const Case& c, std::size_t flight) {
+  Robot robot(c.vehicle, flight_room(), c.magnitudes, c.seed, flight_number(c.session, flight));
+  robot.charge(c.battery_V);
+  return robot;
+}
+
 namespace {
 
 Aim aim_of(const ProposedFlight& flight, double t_s) {
@@ -122,8 +128,9 @@ Aim aim_of(const ProposedFlight& flight, double t_s) {
 }  // namespace
 
 RobotFlight fly(const Case& c, std::size_t flight, const Watch& watch) {
-  const Plan plan(c.programme, flight, flight_room(), c.seed);
-  RobotController pilot(c.vehicle.driver, c.seed, flight);
+  const std::uint64_t number = flight_number(c.session, flight);
+  const Plan plan(c.programme, flight, flight_room(), c.seed, number);
+  RobotController pilot(c.vehicle.driver, c.seed, number);
 
   // It trims at 1 m in the first two fifths of kTrim_s, then moves to where the log begins.
   const auto asked = [&](double t_s) { return c.proposed ? aim_of(*c.proposed, t_s) : plan.at(t_s); };
@@ -156,10 +163,11 @@ RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double du
                 const Steer& steer, const Watch& watch) {
   const Room room = flight_room();
   const SensorSet sensors = c.sensors ? *c.sensors : sensors_of(c.seed, c.power, c.wings);
-  Robot robot(c.vehicle, room, c.magnitudes, c.seed, flight);
-  RobotImu imu(sensors, c.magnitudes, c.seed, flight, kRobotStep_s);
-  RobotMocap mocap(sensors, c.magnitudes, c.seed, flight);
-  Random power_random(c.seed, 100 * flight + 161), wings_random(c.seed, 100 * flight + 162);
+  const std::uint64_t number = flight_number(c.session, flight);
+  Robot robot = robot_of(c, flight);
+  RobotImu imu(sensors, c.magnitudes, c.seed, number, kRobotStep_s);
+  RobotMocap mocap(sensors, c.magnitudes, c.seed, number);
+  Random power_random(c.seed, 100 * number + 161), wings_random(c.seed, 100 * number + 162);
   RobotFlight f;
   f.log.header = header_of(c, sensors, room);
   f.log.command.inputs.emplace();

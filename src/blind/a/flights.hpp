@@ -17,11 +17,16 @@ struct Case {
   std::string vehicle_file, vehicle_sha256;  ///< declared in the log
   Magnitudes magnitudes;
   std::uint64_t seed = 0;
+  std::size_t session = 0;
   Programme programme = Programme::rich;
   bool power = false, wings = false;
+  double battery_V = kBattery_V;             ///< when full
   std::optional<SensorSet> sensors;          ///< if absent, drawn from the seed (sensors_of)
   const ProposedFlight* proposed = nullptr;  ///< replaces the programme; null: none
 };
+
+/// Number of a flight in random streams: other numbers in each session. `flight` is below a million.
+inline std::uint64_t flight_number(std::size_t session, std::size_t flight) { return 1'000'000 * session + flight; }
 
 struct RobotFlight {
   bool crashed = false;
@@ -34,6 +39,9 @@ struct RobotFlight {
 };
 
 Room flight_room();
+
+/// The robot as it starts a flight.
+Robot robot_of(const Case& c, std::size_t flight);
 
 /// Called before each step, trimming included, with the commanded voltages (left, right).
 using Watch = std::function<void(const Robot& robot, const std::array<double, 2>& volts)>;

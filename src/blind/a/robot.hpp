@@ -77,6 +77,8 @@ class Robot {
 
   /// Moves the torso; all other states, as wings, currents and heat, stay.
   void place_torso(const Torso& torso) { x_.torso = torso; }
+  /// Exchanges the battery for a full one, of kBattery_V if never called.
+  void charge(double full_V) { x_.battery_V = full_V_ = full_V; }
   /// Fixes the torso, as on a test stand.
   void hold_torso(bool held) { held_ = held; }
 
@@ -164,7 +166,7 @@ class Robot {
 
   Room room_;
   Magnitudes magnitudes_;
-  double step_s_, density_kg_m3_, mass_kg_ = 0, motion_gain_ = 1;
+  double step_s_, density_kg_m3_, mass_kg_ = 0, motion_gain_ = 1, full_V_ = kBattery_V;
   bool held_ = false;
   Body torso_;
   std::array<Side, 2> side_;

@@ -36,8 +36,8 @@ double& input(Inputs& u, int k) {
 
 }  // namespace
 
-Plan::Plan(Programme programme, std::size_t flight, const Room& room, std::uint64_t seed) {
-  Random random(seed, 100 * flight + 141);
+Plan::Plan(Programme programme, std::size_t flight, const Room& room, std::uint64_t seed, std::uint64_t number) {
+  Random random(seed, 100 * number + 141);
   const double low = room.ground_z_m + 0.08, high = room.ceiling_z_m - 0.09;
   const auto add = [&](double t_s, double x, double y, double z, double heading = 0) {
     waypoints_.push_back({t_s, {x, y, z}, heading});
@@ -45,6 +45,14 @@ Plan::Plan(Programme programme, std::size_t flight, const Room& room, std::uint6
   double share = 0;  // of kRms that the flight is excited with
   if (programme == Programme::hover) {
     add(0, 0, 0, 0.5);
+  } else if (programme == Programme::calm) {
+    // around a rectangle, upright or level; its legs of 2.5 s stay below 0.2 m/s and 0.3 rad/s
+    const double x = random.between(0.15, 0.25) * random.sign(), other = random.between(0.15, 0.25);
+    const double turn = random.between(0.2, 0.4) * random.sign(), y = other * random.sign();
+    add(0, 0, 0, 0.5);
+    if (flight == 1) add(2.5, 0, 0, 0.5 + other), add(5, x, 0, 0.5 + other, turn), add(7.5, x, 0, 0.5, turn);
+    if (flight == 2) add(2.5, x, 0, 0.5, turn), add(5, x, y, 0.5), add(7.5, 0, y, 0.5, -turn);
+    if (flight > 0) add(10, 0, 0, 0.5);
   } else if (flight == 0) {
     add(0, 0, 0, 0.5);
     share = 1;

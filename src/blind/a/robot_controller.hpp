@@ -9,7 +9,7 @@
 
 namespace flappy::blind {
 
-enum class Programme { rich, hover };
+enum class Programme { rich, hover, calm };
 inline constexpr std::size_t kFlights = 3;
 inline constexpr double kFlight_s = 10, kTrim_s = 5, kControl_s = 2e-3;
 
@@ -33,7 +33,8 @@ struct Aim {
 /// Target and excitation of a flight, on the clock of its log; before t = 0 the target is the first waypoint.
 class Plan {
  public:
-  Plan(Programme programme, std::size_t flight, const Room& room, std::uint64_t seed);
+  /// `number`: the flight's in random streams (flight_number).
+  Plan(Programme programme, std::size_t flight, const Room& room, std::uint64_t seed, std::uint64_t number);
   Aim at(double t_s) const;
   /// Inputs that are added to the controller's output; none before t = 0.
   Inputs excitation(double t_s) const;

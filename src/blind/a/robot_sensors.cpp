@@ -100,7 +100,7 @@ RobotMocap::RobotMocap(const SensorSet& set, const Magnitudes& magnitudes, std::
   if (const double magnitude = magnitudes[Effect::mocap_tilt]; magnitude > 0)
     tilt_ = turned_by(0.01 * magnitude * fixed.level());
   const Vector3d normals = fixed.normals();
-  marker_m_ = 2e-3 * magnitudes[Effect::marker_offset] * normals / std::sqrt(normals.squaredNorm());
+  marker_m_ = set.marker_m + 2e-3 * magnitudes[Effect::marker_offset] * normals / std::sqrt(normals.squaredNorm());
 }
 
 std::optional<RobotMocap::Sample> RobotMocap::look(const Torso& torso, double t_s) {
@@ -122,8 +122,8 @@ std::optional<RobotMocap::Sample> RobotMocap::look(const Torso& torso, double t_
     // the calibration is worse towards the edges of the volume
     s.position_m += 0.05 * magnitude * s.position_m * s.position_m.head<2>().squaredNorm();
   s.position_m = tilt_ * s.position_m + noise_m;
-  s.attitude = (tilt_ * torso.attitude * turned_by(noise_rad)).normalized();
-  s.arrival_s = t_s + set_.mocap.latency_s + jitter_s;
+  s.attitude = (tilt_ * torso.attitude * set_.marker_turned * turned_by(noise_rad)).normalized();
+  s.arrival_s = t_s + set_.mocap.latency_s + set_.mocap_late_s + jitter_s;
   if (const double magnitude = magnitudes_[Effect::mocap_delay]; magnitude > 0)
     s.arrival_s += magnitude * (5e-3 + 2e-4 * std::clamp(delay_random_.normal(), -3.0, 3.0));
   s.arrival_s = std::max(s.arrival_s, last_s_ + 1e-5);

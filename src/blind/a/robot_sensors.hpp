@@ -15,6 +15,9 @@ struct SensorSet {
   std::optional<flightlog::WingsHeader> wings;
   double imu_low_pass_hz = 0, imu_transport_s = 0;  ///< true values behind `imu`'s bandwidth and latency
   Matrix3d imu_turned = Matrix3d::Identity();       ///< from B to the IMU's axes
+  Vector3d marker_m = Vector3d::Zero();             ///< of the tracked marker body, in B
+  Quaterniond marker_turned = Quaterniond::Identity();
+  double mocap_late_s = 0;  ///< beyond the declared latency
 };
 
 /// Derives the declared bandwidth and latency from the IMU's rate, low-pass and transport delay.

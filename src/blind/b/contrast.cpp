@@ -21,9 +21,10 @@ Vector3d at_imu(const Robot& robot, const Felt& felt, const Vector3d& place) {
 /// The torso is led along the path while the drivers get the sent inputs.
 Contrast led(const Assignment& a, const Case& c, std::size_t flight, double trim_s, const Path& path,
              const std::vector<Beat>& sent) {
-  Robot robot(c.parameters, c.effect_magnitudes, c.room, a.seed, flight);
+  const std::uint64_t drawn = draw_number(flight, a.session);
+  Robot robot(c.parameters, c.effect_magnitudes, c.room, a.seed, drawn);
   std::copy(path.pose.front().begin(), path.pose.front().end(), robot.state().begin());
-  Radio radio(a.seed, flight, c.effect_magnitudes[kCommandDropout], -trim_s);
+  Radio radio(a.seed, drawn, c.effect_magnitudes[kCommandDropout], -trim_s);
   SoftMount mount(c.effect_magnitudes[kSoftImuMount]);
   Contrast out;
   const double beat_s = 1 / c.parameters.flapping_Hz;
@@ -76,7 +77,7 @@ FamilyFlight fly_programme(const Assignment& a, std::size_t number, const Times&
                            std::vector<Beat>* sent) {
   const Case c = make_case(a);
   const Programme programme(a, number, c.parameters, c.room);
-  Flight flight(a, c, number, programme.start_m(), programme.start_heading_rad(), times.trim_s);
+  Flight flight(a, c, draw_number(number, a.session), programme.start_m(), programme.start_heading_rad(), times.trim_s);
   flight.record(path);
   Beat beat;
   FamilyFlight out;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "blind/b/session.hpp"
+
 namespace flappy::blind::b {
 
 Case make_case(const Assignment& a) {
@@ -17,6 +19,7 @@ Case make_case(const Assignment& a) {
   c.header.ambient = {c.parameters.density_kg_m3, c.room.ground_z_m, c.room.ceiling_z_m, {{0, c.room.wall_y_m, 0, -1}}};
   c.sensors = draw_sensors(a, c.parameters.side[0].motor.voltage_limit_V, c.header);
   if (a.own_parameters) draw_parameters(a.seed, c.parameters);
+  if (a.session > 0) change(draw_session(a.seed, a.session), c.parameters, c.sensors);
   return c;
 }
 

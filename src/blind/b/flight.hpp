@@ -33,6 +33,7 @@ class Radio {
 /// A robot with its sensors and pilot, advanced by ticks from t = -trim_s on.
 class Flight {
  public:
+  /// `flight`: the number under which it draws.
   Flight(const Assignment& a, const Case& c, std::uint64_t flight, const Vector3d& start_m, double heading_rad,
          double trim_s);
 

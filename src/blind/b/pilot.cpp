@@ -122,14 +122,15 @@ Programme::Programme(const Assignment& a, std::uint64_t flight, const RobotParam
     legs_.push_back({-1e3, 1, Vector3d(x, y, z), facing});
     return;
   }
-  Random random(a.seed, flight, Stream::kProgramme);
+  Random random(a.seed, draw_number(flight, a.session), Stream::kProgramme);
   const double heading = random.uniform(-kPi, kPi);
+  const double turn_rad_s = a.calm ? 0.25 : 3;
   double now = 0, facing = heading;
   Vector3d at = Vector3d::Zero();
   const auto go = [&](const Vector3d& to, double speed, double turn, double wait) {
     facing += turn;
     // The peak speed of a smooth leg is 1.875 times its mean.
-    const double lasts = std::max({0.3, 1.875 * (to - at).norm() / speed, 1.875 * std::abs(turn) / 3});
+    const double lasts = std::max({0.3, 1.875 * (to - at).norm() / speed, 1.875 * std::abs(turn) / turn_rad_s});
     legs_.push_back({now, lasts, to, facing});
     now += lasts + wait;
     at = to;
@@ -137,10 +138,23 @@ Programme::Programme(const Assignment& a, std::uint64_t flight, const RobotParam
   const auto about = [&](double x, double y, double z, double r) {
     return Vector3d(x + random.uniform(-r, r), y + random.uniform(-r, r), z);
   };
-  if (a.hover) {
+  if (a.hover || (a.calm && flight == 0)) {
     const std::array<double, 3> heights = {0.4, 0.8, 0.6};
     at = Vector3d(0, 0, heights[flight % 3]);
     legs_.push_back({-1e3, 1, at, heading});
+    return;
+  }
+  if (a.calm) {
+    // Far from all surfaces; flight 2 also rises and sinks.
+    at = about(0, -0.2, 0.8, 0.1);
+    legs_.push_back({-1e3, 1, at, heading});
+    now = random.uniform(0.2, 0.8);
+    while (now < 10.5) {
+      const double height = flight == 2 ? random.uniform(0.5, 1.2) : at.z();
+      const Vector3d next = about(-0.5 * at.x(), -0.2 - 0.5 * (at.y() + 0.2), height, 0.25);
+      const double speed = random.uniform(0.1, 0.16);
+      go(next, speed, random.uniform(-0.4, 0.4), 0.3);
+    }
     return;
   }
   const double ceiling = room.ceiling_z_m - f.above_m, wall = room.wall_y_m - f.around_m;

@@ -67,7 +67,8 @@ class Pilot {
 /// Path and heading of a flight, and the excitation added to the pilot's inputs.
 class Programme {
  public:
-  /// Flights 0 near the ground, 1 near the ceiling, 2 along the wall, with legs in free air. Hover stays.
+  /// Flights 0 near the ground, 1 near the ceiling, 2 along the wall, with legs in free air. Hover stays. Calm flights:
+  /// 0 hovers, 1 and 2 follow slow legs in free air, without excitation.
   Programme(const Assignment& a, std::uint64_t flight, const RobotParameters& parameters, const Surroundings& room);
   Vector3d start_m() const { return legs_.front().to; }
   double start_heading_rad() const { return legs_.front().heading; }

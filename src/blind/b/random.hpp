@@ -19,8 +19,14 @@ enum class Stream : std::uint64_t {
   kPower,
   kWings,
   kStart,
+  kSession,
   kEffect = 100,  ///< plus the number of the effect
 };
+
+/// Number under which a flight of a session draws; in session 0 the flight's own.
+inline std::uint64_t draw_number(std::uint64_t flight, std::size_t session) {
+  return flight + (static_cast<std::uint64_t>(session) << 32U);
+}
 
 class Random {
  public:

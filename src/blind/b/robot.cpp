@@ -29,6 +29,7 @@ Robot::Robot(RobotParameters parameters, const EffectMagnitudes& effect_magnitud
       room_(room),
       gusts_(seed, flight, Stream::kEffect, kWind),
       slow_(plant_.fresh()) {
+  supply_ = plant_.parameters().full_supply;
   felt_.acceleration = {Vector3d::Zero(), Vector3d::Zero()};
   felt_.support = {Vector3d::Zero(), Vector3d::Zero()};
   felt_.motion = {Vector3d::Zero(), Vector3d::Zero()};
@@ -72,7 +73,8 @@ void Robot::advance_slow() {
     const double load = load_As_ / kTick_s;
     charge_As_ += load_As_;
     relaxed_A_ += (load - relaxed_A_) * kTick_s / kRelaxes_s;
-    supply_ = std::max(0.2, 1 - a[kBatterySag] * (0.01 * load + 0.01 * relaxed_A_ + 0.05 / 60 * charge_As_) / kHover_A);
+    const double sags = a[kBatterySag] * (0.01 * load + 0.01 * relaxed_A_ + 0.05 / 60 * charge_As_) / kHover_A;
+    supply_ = std::max(0.2, f.full_supply - sags);
   }
   load_As_ = 0;
   if (a.any(kWind)) {

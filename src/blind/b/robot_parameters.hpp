@@ -44,6 +44,7 @@ struct RobotParameters {
   std::string file, sha256;  ///< declared in the log
   double density_kg_m3 = 0, flapping_Hz = 0, hold_s = 0;
   double amplitude_limit_V = 0, difference_limit_V = 0, bias_limit_V = 0, split_cycle_limit = 0;
+  double full_supply = 1;  ///< voltage of the full battery over the nominal one
   double below_m = 0, above_m = 0, around_m = 0;
   Link torso;
   std::array<Side, 2> side;  ///< left, right

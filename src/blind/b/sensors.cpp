@@ -16,13 +16,13 @@ double in_steps(double x, double step) { return step * std::round(x / step); }
 
 Vector3d normals(Random& random) { return {random.normal(), random.normal(), random.normal()}; }
 
+}  // namespace
+
 Matrix3d turned(const Vector3d& rotation) {
   const double angle = rotation.norm();
   if (angle == 0) return Matrix3d::Identity();
   return Eigen::AngleAxisd(angle, rotation / angle).toRotationMatrix();
 }
-
-}  // namespace
 
 SoftMount::SoftMount(double magnitude)
     : frequency_rad_s_(magnitude > 0 ? std::min(kTurn * 90 / std::sqrt(magnitude), 0.8 / kStep_s) : 0) {}
@@ -219,6 +219,10 @@ void Sensors::mocap_step(const Robot& robot, double time) {
   Vector3d position = robot.position();
   if (effect_magnitudes_.any(kMarkerOffset))
     position += attitude * (effect_magnitudes_[kMarkerOffset] * effect_magnitudes_.marker_m);
+  if (!truth_.marker_m.isZero(0)) {
+    position += attitude * truth_.marker_m;
+    attitude = attitude * Eigen::Quaterniond(truth_.marker_turn);
+  }
   if (swapped < 6e-4) {
     position += Vector3d(0.03 * std::cos(where), 0.03 * std::sin(where), 0.01);
     attitude = attitude * Eigen::Quaterniond(Eigen::AngleAxisd(kTurn / 3, Vector3d::UnitZ()));

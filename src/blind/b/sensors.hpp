@@ -16,6 +16,9 @@ namespace flappy::blind::b {
 
 enum class Sample { kInstant, kMean, kHeld };
 
+/// Matrix of a rotation vector.
+Matrix3d turned(const Vector3d& rotation_rad);
+
 /// Soft mount of the IMU: an oscillator of 90 Hz over the square root of the magnitude; rigid at magnitude 0.
 class SoftMount {
  public:
@@ -35,6 +38,8 @@ struct SensorTruth {
   Vector3d imu_place_m = Vector3d::Zero();
   Matrix3d imu_turn = Matrix3d::Identity();  ///< from B to the IMU
   double gyro_noise_rad_s = 0.05, accel_noise_m_s2 = 0.5;
+  Vector3d marker_m = Vector3d::Zero();         ///< displacement of the markers in B since session 0
+  Matrix3d marker_turn = Matrix3d::Identity();  ///< turn of the markers in B since session 0
   double mocap_rate_hz = 200, mocap_late_s = 0.015, position_noise_m = 1e-4, attitude_noise_rad = 5e-3;
   double power_rate_hz = 500, power_late_s = 2e-4, voltage_noise_V = 0.02, current_noise_A = 5e-3;
   int power_step = kStepsPerTick / 2;  ///< step of the tick that samples currents; 0: before the driver switches

@@ -5,7 +5,6 @@
 namespace flappy::blind::c {
 namespace {
 
-constexpr double kCopper_1_K = 0.00393;  // temperature coefficient of copper's resistance (effect catalogue)
 constexpr double kWindingToAir_K_W = 45, kWinding_J_K = 0.35;  // typical of a 6 mm coreless motor, not measured
 constexpr double kHover_A = 0.19;                              // battery current of a hovering nominal robot
 constexpr double kInternal_ohm = 1.2, kBuffer_s = 5e-3;
@@ -43,7 +42,9 @@ Drive::Drive(const RobotParameters& parameters, const Magnitudes& magnitudes, st
       ripple_(0.08 * magnitudes[Effect::kCommutatorRipple]),
       shared_ohm_(1.5 * magnitudes[Effect::kSharedSupply]),
       jitter_s_(0.4e-3 * magnitudes[Effect::kDriverJitter]),
-      random_(seed, "driver", flight) {
+      random_(seed, "driver", flight),
+      full_V_(kBattery_V * parameters.supply),
+      battery_V_(full_V_) {
   Random once(seed, "gears");
   for (double& phase : gear_phase_) phase = once.uniform(0, 2 * M_PI);
 }
@@ -91,7 +92,7 @@ std::array<double, 2> Drive::torques(double now_s, double step_s, const std::arr
     load_A_ += step_s / kBuffer_s * (drawn_A - load_A_);
     charge_As_ += step_s * load_A_;
     battery_V_ =
-        kBattery_V * std::max(0.3, 1 - sag_ * 0.05 * charge_As_ / (60 * kHover_A)) - sag_ * kInternal_ohm * load_A_;
+        full_V_ * std::max(0.3, 1 - sag_ * 0.05 * charge_As_ / (60 * kHover_A)) - sag_ * kInternal_ohm * load_A_;
   }
   return torques;
 }

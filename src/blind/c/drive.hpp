@@ -12,6 +12,8 @@
 
 namespace flappy::blind::c {
 
+inline constexpr double kCopper_1_K = 0.00393;  ///< temperature coefficient of copper (effect catalogue)
+
 struct Inputs {
   double amplitude_V = 0, difference_V = 0, bias_V = 0, split_cycle = 0;
 };
@@ -49,7 +51,7 @@ class Drive {
   Random random_;
   std::vector<Update> waiting_;
   std::array<double, 2> applied_{}, once_{}, twice_{}, voltages_{}, currents_{}, warmth_K_{};
-  double battery_V_ = kBattery_V, charge_As_ = 0, load_A_ = 0, bus_A_ = 0;
+  double full_V_, battery_V_, charge_As_ = 0, load_A_ = 0, bus_A_ = 0;
 };
 
 }  // namespace flappy::blind::c

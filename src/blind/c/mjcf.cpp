@@ -129,7 +129,7 @@ std::string mjcf_text(const RobotParameters& parameters, const Build& build, dou
   std::string text =
       "<mujoco model=\"flapper\">\n<compiler angle=\"radian\" inertiafromgeom=\"false\"/>\n<option timestep=\"" +
       numbers({step_s}) + "\" gravity=\"0 0 " + numbers({-Mechanism::kGravity_m_s2}) + "\" density=\"" +
-      numbers({parameters.density_kg_m3}) + "\" viscosity=\"" + numbers({kViscosity_Pa_s}) +
+      numbers({parameters.density_kg_m3 * parameters.air}) + "\" viscosity=\"" + numbers({kViscosity_Pa_s}) +
       "\" integrator=\"Euler\" solver=\"Newton\" tolerance=\"1e-12\" iterations=\"30\">\n<flag "
       "contact=\"disable\"/>\n</option>\n"
       "<worldbody>\n<body name=\"torso\">\n<freejoint name=\"torso\"/>\n";

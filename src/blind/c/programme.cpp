@@ -1,10 +1,11 @@
 // Rich flights visit one surface (0 ground, 1 ceiling, 2 wall) between legs through free air. Excitation: random levels
-// of 0.2 s each, plus two tones below the beat's frequency.
+// of 0.2 s each, plus two tones below the beat's frequency. Calm flights 1 and 2 stray through free air.
 #include "blind/c/programme.hpp"
 
 #include <algorithm>
 
 #include "blind/c/air.hpp"
+#include "blind/c/session.hpp"
 
 namespace flappy::blind::c {
 namespace {
@@ -20,21 +21,32 @@ double smooth_bend(double x) { return 60 * x * (1 - x) * (1 - 2 * x); }
 }  // namespace
 
 Programme::Programme(const Assignment& a, std::size_t flight, const RobotParameters& parameters)
-    : proposed_(a.proposed), hover_(a.hover) {
+    : proposed_(a.proposed), quiet_(a.hover || a.calm) {
   if (proposed_) {
     const auto goal = proposed_->goal(0);
     const Eigen::Vector3d at(goal[0], goal[1], goal[2]);
     legs_.push_back({-1e3, 0, at, at, goal[3], goal[3]});
     return;
   }
-  Random random(a.seed, "programme", flight);
+  Random random(a.seed, "programme", stream_of(a, flight));
+  const bool hover = a.hover || (a.calm && flight == 0);
   const double height = random.uniform(0.5, 1.0), heading = random.uniform(-0.6, 0.6);
   Eigen::Vector3d start(random.uniform(-0.3, 0.3), random.uniform(-0.3, 0.2),
-                        hover_ ? random.uniform(0.4, 1.4) : height);
-  if (!hover_ && flight == 1) start.z() += 0.5;
-  if (!hover_ && flight == 2) start.y() += 0.3;
+                        hover ? random.uniform(0.4, 1.4) : height);
+  if (!quiet_ && flight == 1) start.z() += 0.5;
+  if (!quiet_ && flight == 2) start.y() += 0.3;
   legs_.push_back({-1e3, 0.4, start, start, heading, heading});
-  if (hover_) return;
+  if (hover) return;
+  if (quiet_) {
+    while (legs_.back().until_s < Family::kFlight_s) {
+      const double x = random.uniform(-0.6, 0.6), y = random.uniform(-0.5, 0.4), z = random.uniform(0.5, 1.5);
+      const double far = random.uniform(0.2, 0.4), turn = random.uniform(-0.6, 0.6), speed = random.uniform(0.1, 0.2);
+      const Eigen::Vector3d from = legs_.back().to_W, way = Eigen::Vector3d(x, y, z) - from;
+      const double part = std::min(far, way.norm());  // a short leg is slower, so none takes less than 2.3 s
+      add_leg(from + part * way.normalized(), legs_.back().to_heading + turn, std::min(speed, 0.8 * part), 0.3);
+    }
+    return;
+  }
   const auto near = [&] {
     const double close = random.uniform(0.03, 0.10);
     Eigen::Vector3d at(random.uniform(-0.6, 0.6), random.uniform(-0.5, 0.4), random.uniform(0.5, 1.5));
@@ -68,12 +80,12 @@ Programme::Programme(const Assignment& a, std::size_t flight, const RobotParamet
   }
 }
 
-void Programme::add_leg(const Eigen::Vector3d& to_W, double heading, double speed_m_s) {
+void Programme::add_leg(const Eigen::Vector3d& to_W, double heading, double speed_m_s, double turn_rad_s) {
   const Leg& last = legs_.back();
   const double mean_m_s = speed_m_s / smooth_rate(0.5);  // the speed is highest half way
-  const double takes_s =
-      std::max({0.6, (to_W - last.to_W).norm() / mean_m_s, std::abs(heading - last.to_heading) * smooth_rate(0.5) / 3.0,
-                std::abs(to_W.z() - last.to_W.z()) * smooth_rate(0.5) / 0.45});
+  const double takes_s = std::max({0.6, (to_W - last.to_W).norm() / mean_m_s,
+                                   std::abs(heading - last.to_heading) * smooth_rate(0.5) / turn_rad_s,
+                                   std::abs(to_W.z() - last.to_W.z()) * smooth_rate(0.5) / 0.45});
   legs_.push_back({last.until_s, last.until_s + takes_s, last.to_W, to_W, last.to_heading, heading});
 }
 
@@ -113,7 +125,7 @@ Inputs Programme::excitation(double t_s) const {
     const auto [amplitude, difference, bias, split] = proposed_->excitation(t_s);
     return {amplitude, difference, bias, split};
   }
-  if (hover_) return {};
+  if (quiet_) return {};
   std::array<double, 4> sum{};
   for (std::size_t input = 0; input < 4; ++input) {
     const std::size_t level = std::min(static_cast<std::size_t>(t_s / kLevel_s), levels_[input].size() - 1);

@@ -1,7 +1,38 @@
 #include "blind/c/robot.hpp"
 
+#include "blind/c/session.hpp"
+
 namespace flappy::blind::c {
 namespace {
+
+/// Adds a point mass, or takes it away if negative.
+void add_mass(RigidBody& body, double mass_kg, const Eigen::Vector3d& at_m) {
+  const double whole_kg = body.mass_kg + mass_kg;
+  const Eigen::Vector3d d = at_m - body.com_m;
+  body.inertia_kg_m2 +=
+      body.mass_kg * mass_kg / whole_kg * (d.squaredNorm() * Eigen::Matrix3d::Identity() - d * d.transpose());
+  body.com_m += mass_kg / whole_kg * d;
+  body.mass_kg = whole_kg;
+}
+
+RobotParameters changed(RobotParameters f, const SessionChange& day) {
+  const double battery_kg = 0.3 * f.torso.mass_kg;
+  const Eigen::Vector3d tray_m(0, 0, -0.01);
+  add_mass(f.torso, -battery_kg, tray_m);
+  add_mass(f.torso, battery_kg + day.tape_kg, tray_m + day.battery_m);
+  f.air = day.air;
+  f.supply = day.supply;
+  for (std::size_t side = 0; side < 2; ++side) {
+    Side& of = f.sides[side];
+    of.motor.resistance_ohm *= day.winding[side];
+    of.motor.friction_Nm *= day.friction[side];
+    of.stroke.friction_Nm *= day.friction[side];
+    of.motor.damping_Nm_s *= day.damping[side];
+    of.stroke.damping_Nm_s *= day.damping[side];
+    of.spring.rest_rad += day.rest_rad[side];
+  }
+  return f;
+}
 
 /// Effects that only change parameters.
 RobotParameters faulty(RobotParameters f, const Magnitudes& magnitudes, std::uint64_t seed) {
@@ -50,12 +81,13 @@ Build build_of(const Magnitudes& magnitudes, std::uint64_t seed) {
 Robot::Robot(const Assignment& a, std::size_t flight)
     : magnitudes_(a.effects), parameters_(read_parameters(a.vehicle_file)) {
   if (a.own_parameters) parameters_ = drawn_parameters(parameters_, a.seed);
+  if (a.session > 0) parameters_ = changed(std::move(parameters_), session_change(a));
   parameters_ = faulty(std::move(parameters_), magnitudes_, a.seed);
   steps_ = static_cast<std::size_t>(std::max(1.0, std::ceil(parameters_.hold_s / Mechanism::kStep_s - 1e-6)));
   step_s_ = parameters_.hold_s / static_cast<double>(steps_);
   mechanism_ = std::make_unique<Mechanism>(parameters_, build_of(magnitudes_, a.seed), step_s_);
-  drive_ = std::make_unique<Drive>(parameters_, magnitudes_, a.seed, flight);
-  air_ = std::make_unique<Air>(parameters_, magnitudes_, a.seed, flight);
+  drive_ = std::make_unique<Drive>(parameters_, magnitudes_, a.seed, stream_of(a, flight));
+  air_ = std::make_unique<Air>(parameters_, magnitudes_, a.seed, stream_of(a, flight));
   for (std::size_t side = 0; side < 2; ++side) {
     const Motor& motor = parameters_.sides[side].motor;
     friction_Nm_[side] =

@@ -51,6 +51,7 @@ struct RobotParameters {
   std::string file_name;
   double density_kg_m3 = 0, flapping_Hz = 0, hold_s = 0, amplitude_limit_V = 0, difference_limit_V = 0,
          bias_limit_V = 0, split_cycle_limit = 0, below_m = 0, above_m = 0, around_m = 0;
+  double air = 1, supply = 1;  ///< density of the air and voltage of the full battery over those declared
   RigidBody torso;
   std::array<Side, 2> sides;  ///< left, right
 

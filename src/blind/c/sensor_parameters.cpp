@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "blind/c/sensors.hpp"
+#include "blind/c/session.hpp"
 
 namespace flappy::blind::c {
 namespace {
@@ -75,6 +76,17 @@ void declare_loosely(SensorParameters& f, const Robot& robot, Random random) {
   }
 }
 
+/// What is declared and what the cameras believe stay.
+void change(SensorParameters& f, const SessionChange& day) {
+  const Eigen::Matrix3d mounting = turned(day.imu_turn_rad), glued = turned(day.markers_turn_rad);
+  f.imu.gyro_axes = f.imu.gyro_axes * mounting;
+  f.imu.accel_axes = f.imu.accel_axes * mounting;
+  f.imu.gyro_bias += day.gyro_bias_rad_s;
+  for (Eigen::Vector3d& marker : f.mocap.markers_m) marker = glued * marker + day.markers_m;
+  f.imu.latency_s += day.imu_late_s;
+  f.mocap.latency_s += day.mocap_late_s;
+}
+
 }  // namespace
 
 SensorParameters sensor_parameters(const Assignment& a, const Robot& robot) {
@@ -100,6 +112,7 @@ SensorParameters sensor_parameters(const Assignment& a, const Robot& robot) {
   f.mocap.markers_m = {Eigen::Vector3d(0.022, 0.004, 0.020), Eigen::Vector3d(-0.020, 0.008, 0.028),
                        Eigen::Vector3d(0.003, 0.021, -0.012), Eigen::Vector3d(-0.005, -0.022, -0.006)};
   for (Eigen::Vector3d& marker : f.mocap.markers_m) marker += 2e-3 * random.normal3();
+  f.mocap.model_m = f.mocap.markers_m;
   for (std::size_t i = 0; i < 6; ++i) {
     const double around = M_PI / 3 * static_cast<double>(i) + random.uniform(-0.3, 0.3), up = random.uniform(0.2, 0.6);
     f.mocap.cameras_W[i] =
@@ -129,6 +142,7 @@ SensorParameters sensor_parameters(const Assignment& a, const Robot& robot) {
                                      f.power.current_noise};
   if (a.wings) h.wings = flightlog::WingsHeader{rate(f.wings.steps), f.wings.noise_rad};
   if (a.conventions) declare_loosely(f, robot, Random(a.seed, "conventions"));
+  if (a.session > 0) change(f, session_change(a));
   return f;
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "blind/c/session.hpp"
+
 namespace flappy::blind::c {
 namespace {
 
@@ -23,11 +25,11 @@ Sensors::Sensors(const Assignment& a, std::size_t flight, const Robot& robot, Se
     : f_(std::move(parameters)),
       power_(a.power),
       wings_(a.wings),
-      imu_noise_(a.seed, "imu", flight),
-      mocap_noise_(a.seed, "mocap", flight),
-      power_noise_(a.seed, "power", flight),
-      wing_noise_(a.seed, "wings", flight),
-      walk_(a.seed, "gyro walk", flight) {
+      imu_noise_(a.seed, "imu", stream_of(a, flight)),
+      mocap_noise_(a.seed, "mocap", stream_of(a, flight)),
+      power_noise_(a.seed, "power", stream_of(a, flight)),
+      wing_noise_(a.seed, "wings", stream_of(a, flight)),
+      walk_(a.seed, "gyro walk", stream_of(a, flight)) {
   const Magnitudes& magnitudes = robot.magnitudes();
   bias_magnitude_ = 0.03 * magnitudes[Effect::kGyroBias];
   rectification_ = 1e-3 * magnitudes[Effect::kVibrationRectification];
@@ -104,14 +106,15 @@ void Sensors::mocap(const Robot& robot, double t_s) {
   const Motion now = robot.mechanism().motion();
   std::array<Eigen::Vector3d, 4> seen_W, model_B;
   std::size_t seen = 0;
-  for (const Eigen::Vector3d& marker : f_.mocap.markers_m) {
+  for (std::size_t i = 0; i < f_.mocap.markers_m.size(); ++i) {
+    const Eigen::Vector3d& marker = f_.mocap.markers_m[i];
     const Eigen::Vector3d noise = f_.mocap.marker_noise_m * mocap_noise_.normal3();
     std::size_t cameras = 0;
     for (const Eigen::Vector3d& camera : f_.mocap.cameras_W)
       cameras += (now.R_WB * marker.normalized()).dot(camera) > -0.45;
     if (cameras < 2) continue;
     seen_W[seen] = now.position_W + now.R_WB * marker + noise;
-    model_B[seen++] = marker - marker_offset_;
+    model_B[seen++] = f_.mocap.model_m[i] - marker_offset_;
   }
   const double loss = mocap_noise_.uniform(), length = mocap_noise_.uniform();
   if (lost_ > 0) --lost_;

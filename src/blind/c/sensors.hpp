@@ -26,8 +26,8 @@ struct SensorParameters {
   struct Mocap {
     std::size_t steps = 50;
     double latency_s = 0.01, marker_noise_m = 2e-4, loss = 0.004;
-    std::array<Eigen::Vector3d, 4> markers_m;
-    std::array<Eigen::Vector3d, 6> cameras_W;  ///< directions to the cameras
+    std::array<Eigen::Vector3d, 4> markers_m, model_m;  ///< true, and as the cameras' software believes
+    std::array<Eigen::Vector3d, 6> cameras_W;           ///< directions to the cameras
   } mocap;
   struct Power {
     std::size_t steps = 10;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <string>
@@ -13,6 +14,7 @@
 #include "blind/b/escape.hpp"
 #include "blind/b/family_b_tests.hpp"
 #include "blind/b/flight.hpp"
+#include "blind/b/session.hpp"
 #include "flightlog/flight_log.hpp"
 #include "io/parallel.hpp"
 #include "refusal.hpp"
@@ -173,6 +175,223 @@ TEST(FamilyBFlight, IsTheSameOnAnyThread) {
   for (const std::string& each : again) EXPECT_TRUE(each == once);
   a.seed = 4;
   EXPECT_FALSE(bytes(fly_programme(a, 2, brief).log) == once);
+}
+
+/// Flown briefly, with currents and wing angles.
+FamilyFlight flown_in(std::size_t session, std::size_t flight) {
+  Assignment a = assignment({{"wind", 1}});
+  a.own_parameters = a.conventions = a.power = a.wings = true;
+  a.session = session;
+  return fly_programme(a, flight, {0.1, 0.15});
+}
+
+TEST(FamilyBSession, ZeroIsWhatWasFlownBeforeThereWereSessions) {
+  Assignment a = assignment();
+  a.own_parameters = true;
+  // first frame of motion capture, then the fourth sample of the accelerometer's z
+  const std::array<std::array<double, 4>, 3> before = {{{-0.067494619, -0.054661208, 0.341815413, 21.583916},
+                                                        {-0.100226694, -0.173758181, 1.572063329, 21.904849},
+                                                        {-0.485915972, 0.556238638, 0.890731841, 21.483325}}};
+  for (std::size_t flight = 0; flight < 3; ++flight) {
+    const flightlog::FlightLog log = fly_programme(a, flight, {0.1, 0.15}).log;
+    EXPECT_NEAR(log.mocap.x_m[0], before[flight][0], 1e-7);
+    EXPECT_NEAR(log.mocap.y_m[0], before[flight][1], 1e-7);
+    EXPECT_NEAR(log.mocap.z_m[0], before[flight][2], 1e-7);
+    EXPECT_NEAR(log.imu.accel_z_m_s2[3], before[flight][3], 1e-5);
+  }
+}
+
+TEST(FamilyBSession, HasOtherRowsUnderTheSameHeader) {
+  for (std::size_t flight = 0; flight < 3; ++flight) {
+    const flightlog::FlightLog drawn = flown_in(0, flight).log, one = flown_in(1, flight).log;
+    const flightlog::LogFiles before = flightlog::flight_log_files(drawn), after = flightlog::flight_log_files(one);
+    ASSERT_EQ(before.size(), after.size());
+    for (const auto& [name, text] : before)
+      EXPECT_EQ(after.at(name) == text, name == flightlog::log_file::kHeader) << name << " of flight " << flight;
+    // nothing but a stream of its own moves the first sample of the wings
+    EXPECT_NE(one.wings->t_s.front(), drawn.wings->t_s.front());
+    EXPECT_TRUE(bytes(flown_in(1, flight).log) == bytes(one));
+    EXPECT_FALSE(bytes(flown_in(2, flight).log) == bytes(one));
+  }
+}
+
+TEST(FamilyBSession, KeepsTheRobotsEffectsAndTheKindsOfFlights) {
+  Assignment a = assignment({{"com_offset", 1}});
+  const Case drawn = make_case(a);
+  a.session = 1;
+  EXPECT_NE(draw_number(0, 1), draw_number(1, 0));
+  const Case later = make_case(a);
+  EXPECT_EQ(later.effect_magnitudes.com_m, drawn.effect_magnitudes.com_m);
+  EXPECT_EQ(later.effect_magnitudes.wind_direction_rad, drawn.effect_magnitudes.wind_direction_rad);
+  EXPECT_NE(later.parameters.torso.mass_kg, drawn.parameters.torso.mass_kg);
+  const auto start = [&](std::size_t session, std::size_t flight) {
+    a.session = session;
+    return Programme(a, flight, drawn.parameters, drawn.room).start_m();
+  };
+  for (std::size_t flight = 0; flight < 3; ++flight) {
+    EXPECT_EQ(start(1, flight).z(), start(0, flight).z());
+    EXPECT_NE(start(1, flight), start(0, flight));
+    EXPECT_LT((start(1, flight) - start(0, flight)).norm(), 0.3);
+  }
+}
+
+/// Root mean square of what 200 robots draw, in shares of its bound; fails where a draw is 0 or out of bounds.
+double spread(double bound, const std::function<double(const SessionChange&)>& drawn) {
+  double squares = 0;
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    const double x = drawn(draw_session(seed, 1)) / bound;
+    EXPECT_LE(std::abs(x), 1 + 1e-12) << seed;
+    EXPECT_NE(x, 0) << seed;
+    EXPECT_NE(x * bound, drawn(draw_session(seed, 2))) << seed;
+    squares += x * x / 200;
+  }
+  return std::sqrt(squares);
+}
+
+TEST(FamilyBSession, DrawsWithinItsBounds) {
+  const std::vector<std::pair<double, std::function<double(const SessionChange&)>>> uniform = {
+      {3, [](const auto& c) { return c.warmer_K; }},
+      {0.012, [](const auto& c) { return c.pressure; }},
+      {0.004, [](const auto& c) { return c.mass; }},
+      {0.15e-3, [](const auto& c) { return c.com_m.z(); }},
+      {0.0035, [](const auto& c) { return c.full_supply; }},
+      {0.0035, [](const auto& c) { return c.brush[0]; }},
+      {0.0035, [](const auto& c) { return c.brush[1]; }},
+      {0.09, [](const auto& c) { return c.wear[0]; }},
+      {0.09, [](const auto& c) { return c.wear[1]; }},
+      {0.05, [](const auto& c) { return c.grease[0]; }},
+      {0.05, [](const auto& c) { return c.grease[1]; }},
+      {0.2 * kDegree, [](const auto& c) { return c.rest_angle_rad[0]; }},
+      {0.2 * kDegree, [](const auto& c) { return c.rest_angle_rad[1]; }},
+      {0.2 * kDegree, [](const auto& c) { return c.imu_turn_rad.norm(); }},
+      {0.1 * kDegree, [](const auto& c) { return c.marker_turn_rad.norm(); }},
+      {0.35e-3, [](const auto& c) { return c.marker_m.norm(); }},
+      {0.4e-3, [](const auto& c) { return c.mocap_late_s; }},
+      {0.1e-3, [](const auto& c) { return c.imu_late_s; }}};
+  for (std::size_t i = 0; i < uniform.size(); ++i)
+    EXPECT_NEAR(spread(uniform[i].first, uniform[i].second), std::sqrt(1.0 / 3), 0.07) << i;
+  for (int axis = 0; axis < 2; ++axis)
+    EXPECT_NEAR(spread(0.18e-3, [&](const auto& c) { return c.com_m[axis]; }), 0.5, 0.06) << "of a disc";
+  EXPECT_LE(spread(0.18e-3, [](const auto& c) { return c.com_m.template head<2>().norm(); }), 1);
+}
+
+TEST(FamilyBSession, ChangesRobotAndSensorsByLessThanEffectsOfAFifth) {
+  const RobotParameters before = nominal();
+  double density = 0, resistance = 0, thinner = 0;
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    const SessionChange by = draw_session(seed, 1);
+    RobotParameters f = before;
+    SensorTruth sensors;
+    change(by, f, sensors);
+    const Motor &was = before.side[1].motor, &is = f.side[1].motor;
+    const double denser = f.density_kg_m3 / before.density_kg_m3 - 1, more = is.resistance_ohm / was.resistance_ohm - 1;
+    EXPECT_LT(std::abs(denser), 0.024) << "less than at the ceiling";
+    EXPECT_LT(std::abs(more), 0.02) << "less than a winding heats up";
+    density += denser * denser / 200, resistance += more * more / 200;
+    EXPECT_LT(std::abs(is.torque_constant_Nm_A / was.torque_constant_Nm_A - 1), 0.007);
+    EXPECT_LT(std::abs(is.friction_Nm / was.friction_Nm - 1), 0.2);
+    EXPECT_LT(std::abs(is.damping_Nm_s / was.damping_Nm_s - 1), 0.12);
+    EXPECT_NE(is.friction_Nm / was.friction_Nm, f.side[0].motor.friction_Nm / before.side[0].motor.friction_Nm);
+    EXPECT_NEAR(f.torso.mass_kg / before.torso.mass_kg, 1 + by.mass, 1e-12);
+    EXPECT_EQ(f.torso.com_m, before.torso.com_m + by.com_m);
+    EXPECT_EQ(f.side[0].rest_angle_rad, by.rest_angle_rad[0]);
+    EXPECT_NEAR(Eigen::AngleAxisd(sensors.imu_turn).angle(), by.imu_turn_rad.norm(), 1e-9);
+    EXPECT_NEAR(sensors.mocap_late_s - SensorTruth{}.mocap_late_s, by.mocap_late_s, 1e-12);
+    EXPECT_NEAR(sensors.imu_late_s - SensorTruth{}.imu_late_s, by.imu_late_s, 1e-12);
+    if (std::abs(by.warmer_K) > 1) EXPECT_GT(more * by.warmer_K, 0) << "warm windings resist more";
+    thinner -= denser * by.warmer_K;
+  }
+  EXPECT_GT(thinner, 0) << "warm air is thin";
+  EXPECT_NEAR(std::sqrt(density), 0.0091, 0.0015);
+  EXPECT_NEAR(std::sqrt(resistance), 0.0071, 0.0012);
+}
+
+TEST(FamilyBSession, MovesTheMarkersAndTheSupply) {
+  const Assignment a = assignment();
+  const auto first = [&](const Case& c) {
+    Flight flight(a, c, 0, {0, 0, 1}, 0.5, 0);
+    while (flight.ticks() < 60) flight.tick(flight.pilot().trim());
+    return flight.log(0.06).mocap;
+  };
+  Case moved = make_case(a);
+  const flightlog::MocapStream before = first(moved);
+  moved.sensors.marker_m = {0.3e-3, 0.1e-3, -0.2e-3};
+  moved.sensors.marker_turn = turned({1e-3, 0, 1e-3});
+  const flightlog::MocapStream after = first(moved);
+  EXPECT_NEAR(after.x_m[0] - before.x_m[0], 0.3e-3 * std::cos(0.5) - 0.1e-3 * std::sin(0.5), 3e-5);
+  EXPECT_NEAR(after.y_m[0] - before.y_m[0], 0.3e-3 * std::sin(0.5) + 0.1e-3 * std::cos(0.5), 3e-5);
+  const Eigen::Quaterniond was(before.qw[0], before.qx[0], before.qy[0], before.qz[0]),
+      is(after.qw[0], after.qx[0], after.qy[0], after.qz[0]);
+  EXPECT_NEAR(was.angularDistance(is), 1e-3 * std::sqrt(2), 1e-5);
+
+  RobotParameters f = nominal();
+  f.full_supply = 0.997;
+  Robot robot(f, effect_magnitudes_of({{"battery_sag", 1}}, 3), open_air(), 1, 0);
+  EXPECT_EQ(robot.supply(), 0.997);
+  robot.drive({0, 0});
+  EXPECT_EQ(robot.supply(), 0.997) << "nothing flows yet";
+}
+
+TEST(FamilyBSession, LosesPacketsAtItsOwnTimes) {
+  Assignment a = assignment({}, 5);  // both early
+  const Times brief{0.2, 0.55};
+  std::array<double, 2> lost{};
+  for (a.session = 0; a.session < 2; ++a.session) {
+    const Contrast c = contrast_of(a, 0, "outside_command_dropout", 1, brief);
+    std::size_t first = 0;
+    while (first < c.change.size() && std::ranges::all_of(c.change[first], [](double x) { return x == 0; })) ++first;
+    ASSERT_LT(first, c.change.size());
+    lost[a.session] = c.beat_s[first];
+    Random random(a.seed, draw_number(0, a.session), Stream::kEffect, kCommandDropout);
+    EXPECT_NEAR(lost[a.session], random.uniform(0.3, 1) - brief.trim_s, 0.03);
+  }
+  EXPECT_GT(std::abs(lost[1] - lost[0]), 0.06);
+}
+
+TEST(FamilyBCalm, FliesSlowlyWithoutExcitation) {
+  Assignment a = assignment();
+  a.calm = true;
+  for (a.seed = 0; a.seed < 50; ++a.seed)
+    for (std::size_t flight = 0; flight < 3; ++flight) {
+      const Programme programme(a, flight, nominal(), {});
+      double way = 0;
+      for (double t = 0; t < 10; t += 0.01) {
+        const Target now = programme.target(t), next = programme.target(t + 0.01);
+        ASSERT_LT(now.velocity_m_s.norm(), 0.161);
+        ASSERT_LT(std::abs(next.heading_rad - now.heading_rad) / 0.01, 0.251);
+        ASSERT_TRUE(now.position_m.cwiseAbs().y() < 0.8 && now.position_m.z() > 0.39 && now.position_m.z() < 1.3);
+        const Beat more = programme.excitation(t);
+        ASSERT_EQ(std::abs(more.amplitude_V) + std::abs(more.bias_V) + std::abs(more.split_cycle), 0);
+        ASSERT_EQ(more.difference_V, 0);
+        way += 0.01 * now.velocity_m_s.norm();
+      }
+      if (flight == 0) EXPECT_EQ(way, 0);
+      else EXPECT_GT(way, 0.3);
+    }
+  a.seed = 3, a.hover = true;
+  EXPECT_EQ(Programme(a, 1, nominal(), {}).target(9).velocity_m_s.norm(), 0) << "hover stays";
+}
+
+TEST(FamilyBCalm, StaysSlow) {
+  std::vector<double> fastest(5);
+  std::vector<char> crashed(5);
+  io::parallel_for(5, 0, [&](std::size_t i) {
+    Assignment a = assignment({}, 1 + i);
+    a.calm = a.own_parameters = a.conventions = true;
+    a.session = i % 3;
+    Path path;
+    crashed[i] = fly_programme(a, 1 + i % 2, {1.5, 2.5}, &path).crashed;
+    constexpr std::size_t kOver = 4000, kFrom = 30000;  // 0.2 s, after the trimming; in steps
+    for (std::size_t at = kFrom; at + kOver < path.pose.size(); at += 100) {
+      const auto &p = path.pose[at], &q = path.pose[at + kOver];
+      fastest[i] = std::max(fastest[i], Vector3d(q[0] - p[0], q[1] - p[1], q[2] - p[2]).norm() / (kOver * kStep_s));
+    }
+  });
+  for (std::size_t i = 0; i < 5; ++i) {
+    EXPECT_FALSE(crashed[i]) << i;
+    EXPECT_LT(fastest[i], 0.25) << i;
+    EXPECT_GT(fastest[i], 0.05) << i;
+  }
 }
 
 TEST(FamilyBConventions, AreExactOrWithinBounds) {

@@ -4,9 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "blind/c/contrast.hpp"
 #include "blind/c/escape.hpp"
 #include "blind/c/flight.hpp"
+#include "blind/c/mjcf.hpp"
+#include "blind/c/session.hpp"
 #include "io/parallel.hpp"
 
 namespace flappy::blind::c {
@@ -486,6 +490,250 @@ TEST(FamilyC, FiguresAreDrawnApartAndPhysical) {
   EXPECT_NEAR(spread[0], 0.03, 0.005);
   EXPECT_NEAR(spread[1], 0.07, 0.01);
   EXPECT_NEAR(spread[2], 0.3e-3, 0.05e-3);
+}
+
+/// A robot whose every random stream acts.
+Assignment busy(std::size_t session) {
+  Assignment a = plain();
+  a.effects = {{"wind", 1}, {"gyro_bias", 1}, {"outside_driver_jitter", 1}};
+  a.own_parameters = a.conventions = true;
+  a.session = session;
+  return a;
+}
+
+/// Sum of voltages, positions, IMU, power and wings.
+std::array<double, 5> sums(const flightlog::FlightLog& log) {
+  const auto sum = [](std::initializer_list<const flightlog::Column*> columns) {
+    double all = 0;
+    for (const flightlog::Column* column : columns) all = std::accumulate(column->begin(), column->end(), all);
+    return all;
+  };
+  const flightlog::ImuStream& i = log.imu;
+  return {sum({&log.command.left_voltage_V, &log.command.right_voltage_V}),
+          sum({&log.mocap.x_m, &log.mocap.y_m, &log.mocap.z_m}),
+          sum({&i.gyro_x_rad_s, &i.gyro_y_rad_s, &i.gyro_z_rad_s, &i.accel_x_m_s2, &i.accel_y_m_s2, &i.accel_z_m_s2}),
+          sum({&log.power->battery_V, &log.power->left_current_A, &log.power->right_current_A}),
+          sum({&log.wings->left_stroke_rad, &log.wings->right_rotation_rad})};
+}
+
+TEST(FamilyC, SessionZeroFliesAsBeforeThereWereSessions) {
+  // Recorded then. Last bits differ between processors, and may change a few of a converter's digits.
+  const std::array<std::array<double, 5>, 3> before = {{{6.84122008, 13.5307602, 470.904819, 1849.23176, 9.42088043},
+                                                        {2.24850082, 11.5664431, 510.253421, 1849.39732, 8.64324231},
+                                                        {-25.1292884, 9.66115198, 527.784637, 1848.51096, 7.4074262}}};
+  const std::array<double, 5> near = {1e-5, 1e-6, 0.02, 2e-3, 1e-6};
+  for (std::size_t flight = 0; flight < 3; ++flight) {
+    const std::array<double, 5> now = sums(short_log(busy(0), flight));
+    for (std::size_t i = 0; i < 5; ++i) EXPECT_NEAR(now[i], before[flight][i], near[i]) << flight << " " << i;
+  }
+  // the robot to the last bit
+  const Robot robot(busy(0), 0);
+  const RobotParameters drawn = drawn_parameters(nominal(), busy(0).seed);
+  EXPECT_EQ(mjcf_text(robot.parameters(), {}, 1e-4), mjcf_text(drawn, {}, 1e-4));
+  EXPECT_EQ(session_change(busy(0)).air, 1);
+  EXPECT_EQ(stream_of(busy(0), 2), 2U);
+  EXPECT_NE(stream_of(busy(1), 2), 2U);
+}
+
+TEST(FamilyC, SessionsDifferInAllRowsButDeclareTheSame) {
+  for (std::size_t flight = 0; flight < 3; ++flight) {
+    const flightlog::FlightLog first = short_log(busy(0), flight), second = short_log(busy(1), flight);
+    EXPECT_EQ(second, short_log(busy(1), flight));
+    EXPECT_EQ(second.header, first.header);
+    const auto zeroth = sums(first), one = sums(second), two = sums(short_log(busy(2), flight));
+    for (std::size_t i = 0; i < 5; ++i)
+      EXPECT_TRUE(zeroth[i] != one[i] && one[i] != two[i] && two[i] != zeroth[i]) << i;
+  }
+}
+
+TEST(FamilyC, FlightsOfEverySessionKeepTheirKind) {
+  for (std::size_t session = 0; session < 6; ++session) {
+    Assignment a = plain();
+    a.session = session;
+    std::array<double, 3> clearance = {1, 1, 1};
+    for (std::size_t flight = 0; flight < 3; ++flight) {
+      const Programme programme(a, flight, nominal());
+      EXPECT_EQ(programme.start_W() == Programme(plain(), flight, nominal()).start_W(), session == 0);
+      for (double t = 0; t < 10; t += 0.01) {
+        const Eigen::Vector3d at = programme.target(t).position_W;
+        clearance[flight] = std::min(clearance[flight], std::array{at.z(), 2 - at.z(), 1 - at.y()}[flight]);
+      }
+    }
+    for (const double closest : clearance) EXPECT_LT(closest, 0.22) << session;
+  }
+}
+
+TEST(FamilyC, SessionChangesAreBoundedAndAsWideAsStated) {
+  struct Spread {
+    double bound, sd, rms = 0, largest = 0, smallest = 1;
+  };
+  // in the order of `values`
+  std::vector<Spread> spreads = {{0.027, 0.0109},  {0.007, 0.0040},    {0.0296, 0.0107}, {0.12, 0.04},
+                                 {0.165, 0.048},   {0.0062, 0.0035},   {3.5e-5, 2.0e-5}, {6e-4, 3.5e-4},
+                                 {4e-4, 2.3e-4},   {4e-4, 2.3e-4},     {0.0035, 0.0027}, {5e-3, 3.9e-3},
+                                 {3.5e-4, 2.7e-4}, {0.00175, 0.00135}, {1e-4, 0.58e-4},  {3e-4, 1.73e-4}};
+  constexpr int count = 200;
+  for (std::uint64_t seed = 0; seed < count; ++seed) {
+    Assignment a = plain();
+    a.seed = seed;
+    a.session = 1 + seed % 3;
+    const SessionChange day = session_change(a);
+    const std::vector<double> values = {day.air - 1,
+                                        day.supply - 1,
+                                        day.winding[seed % 2] - 1,
+                                        day.friction[seed % 2] - 1,
+                                        day.damping[seed % 2] - 1,
+                                        day.rest_rad[seed % 2],
+                                        day.tape_kg,
+                                        day.battery_m.x(),
+                                        day.battery_m.y(),
+                                        day.battery_m.z(),
+                                        day.imu_turn_rad.norm(),
+                                        day.gyro_bias_rad_s.norm(),
+                                        day.markers_m.norm(),
+                                        day.markers_turn_rad.norm(),
+                                        day.imu_late_s,
+                                        day.mocap_late_s};
+    ASSERT_EQ(values.size(), spreads.size());
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      spreads[i].rms += values[i] * values[i] / count;
+      spreads[i].largest = std::max(spreads[i].largest, std::abs(values[i]));
+      spreads[i].smallest = std::min(spreads[i].smallest, std::abs(values[i]));
+    }
+    EXPECT_NE(day.winding[0], day.winding[1]);
+    EXPECT_NE(day.rest_rad[0], day.rest_rad[1]);
+  }
+  for (std::size_t i = 0; i < spreads.size(); ++i) {
+    EXPECT_LE(spreads[i].largest, spreads[i].bound) << i;
+    EXPECT_GT(spreads[i].smallest, 0) << i;
+    EXPECT_NEAR(std::sqrt(spreads[i].rms) / spreads[i].sd, 1, 0.15) << i;
+  }
+}
+
+TEST(FamilyC, SessionsChangeTheRobotAndItsSensorsAsDrawn) {
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    Assignment a = plain(), b = plain();
+    a.own_parameters = a.conventions = b.own_parameters = b.conventions = true;
+    a.seed = b.seed = seed;
+    b.session = 2;
+    const SessionChange day = session_change(b);
+    const Robot first(a, 0), second(b, 0);
+    const RobotParameters &f = first.parameters(), &g = second.parameters();
+    EXPECT_NEAR(second.mechanism().model().opt.density, f.density_kg_m3 * day.air, 1e-12);
+    EXPECT_NEAR(second.drive().battery_V(), Drive::kBattery_V * day.supply, 1e-12);
+    for (std::size_t side = 0; side < 2; ++side) {
+      const Side &s = f.sides[side], &t = g.sides[side];
+      EXPECT_NEAR(t.motor.resistance_ohm / s.motor.resistance_ohm, day.winding[side], 1e-12);
+      EXPECT_NEAR(t.motor.friction_Nm / s.motor.friction_Nm, day.friction[side], 1e-12);
+      EXPECT_NEAR(t.stroke.friction_Nm / s.stroke.friction_Nm, day.friction[side], 1e-12);
+      EXPECT_NEAR(t.motor.damping_Nm_s / s.motor.damping_Nm_s, day.damping[side], 1e-12);
+      EXPECT_NEAR(t.stroke.damping_Nm_s / s.stroke.damping_Nm_s, day.damping[side], 1e-12);
+      EXPECT_NEAR(t.spring.rest_rad - s.spring.rest_rad, day.rest_rad[side], 1e-12);
+    }
+    // 0.3 of the torso moves with the battery; effects of magnitude 0.2 are larger
+    EXPECT_NEAR(g.torso.mass_kg - f.torso.mass_kg, day.tape_kg, 1e-12);
+    const Eigen::Vector3d moved = g.torso.com_m - f.torso.com_m;
+    EXPECT_LT((moved - 0.3 * day.battery_m).norm(), 0.05e-3);
+    EXPECT_LT(moved.head<2>().norm() * f.torso.mass_kg / f.mass_kg(), 0.2e-3);
+    const Eigen::Matrix3d inertia = g.torso.inertia_kg_m2 - f.torso.inertia_kg_m2;
+    EXPECT_GT(std::abs(inertia(0, 2)), 0);
+    EXPECT_LT(std::max(std::abs(inertia(0, 1)), std::abs(inertia(0, 2))), 0.01 * f.torso.inertia_kg_m2(0, 0));
+    EXPECT_TRUE(is_physical(g.torso.inertia_kg_m2));
+
+    const SensorParameters s = sensor_parameters(a, first), t = sensor_parameters(b, second);
+    EXPECT_EQ(t.declared, s.declared);
+    EXPECT_EQ(t.mocap.model_m, s.mocap.markers_m);
+    for (std::size_t i = 0; i < 4; ++i)
+      EXPECT_LT((t.mocap.markers_m[i] - s.mocap.markers_m[i] - day.markers_m -
+                 day.markers_turn_rad.cross(s.mocap.markers_m[i]))
+                    .norm(),
+                1e-7);
+    const auto turn = [](const Eigen::Matrix3d& from, const Eigen::Matrix3d& to) {
+      const Eigen::AngleAxisd by(Eigen::Matrix3d(from.inverse() * to));
+      return Eigen::Vector3d(by.angle() * by.axis());
+    };
+    EXPECT_LT((turn(s.imu.gyro_axes, t.imu.gyro_axes) - day.imu_turn_rad).norm(), 1e-9);
+    EXPECT_LT((turn(s.imu.accel_axes, t.imu.accel_axes) - day.imu_turn_rad).norm(), 1e-9);
+    EXPECT_LT((t.imu.gyro_bias - s.imu.gyro_bias - day.gyro_bias_rad_s).norm(), 1e-12);
+    EXPECT_NEAR(t.imu.latency_s - s.imu.latency_s, day.imu_late_s, 1e-12);
+    EXPECT_NEAR(t.mocap.latency_s - s.mocap.latency_s, day.mocap_late_s, 1e-12);
+
+    // an effect keeps its direction
+    a.effects = b.effects = {{"com_offset", 1}};
+    const Eigen::Vector3d off = Robot(a, 0).parameters().torso.com_m - f.torso.com_m,
+                          still = Robot(b, 0).parameters().torso.com_m - g.torso.com_m;
+    EXPECT_LT((off - still).norm(), 0.01 * off.norm());
+  }
+}
+
+TEST(FamilyC, SessionsHaveNoiseOfTheirOwnAndGluedMarkersShiftThePose) {
+  // one robot at rest, with the same sensors in both sessions
+  const Robot robot(with("gyro_bias", 1), 0);
+  SensorParameters parameters = sensor_parameters(plain(), robot);
+  const auto log = [&](std::size_t session) {
+    Assignment a = plain();
+    a.session = session;
+    Sensors sensors(a, 0, robot, parameters);
+    for (int i = 0; i < 1000; ++i) sensors.after_step(robot, robot.step_s() * i);
+    flightlog::FlightLog seen;
+    sensors.finish(seen, 1);
+    return seen;
+  };
+  const flightlog::FlightLog first = log(0), second = log(1);
+  EXPECT_EQ(log(1), second);
+  EXPECT_NE(second.imu.accel_x_m_s2, first.imu.accel_x_m_s2);
+  EXPECT_NE(second.mocap.x_m, first.mocap.x_m);
+  EXPECT_NE(second.power->battery_V, first.power->battery_V);
+  EXPECT_NE(second.wings->left_stroke_rad, first.wings->left_stroke_rad);
+  parameters.imu.gyro_noise = parameters.mocap.marker_noise_m = 0;
+  EXPECT_NE(log(1).imu.gyro_x_rad_s, log(0).imu.gyro_x_rad_s) << "the walk of the gyro's bias";
+  EXPECT_NEAR(log(1).mocap.x_m[0], 0, 1e-9);
+  for (Eigen::Vector3d& marker : parameters.mocap.markers_m) marker.x() += 1e-3;
+  EXPECT_NEAR(log(1).mocap.x_m[0], 1e-3, 1e-9);
+}
+
+TEST(FamilyC, CalmFlightsAreSlowSmoothAndSafe) {
+  Assignment a = plain();
+  a.calm = true;
+  Assignment hover = plain();
+  hover.hover = true;
+  EXPECT_EQ(short_log(a, 0), short_log(hover, 0));
+  for (a.seed = 0; a.seed < 60; ++a.seed)
+    for (std::size_t flight = 1; flight < 3; ++flight) {
+      const Programme programme(a, flight, nominal());
+      double way_m = 0, turned_rad = 0;
+      Target last = programme.target(0);
+      for (int i = 1; i <= 2000; ++i) {
+        const double t = 0.005 * i;
+        const Target now = programme.target(t);
+        EXPECT_LE(now.velocity_W.norm(), 0.2 + 1e-9);
+        EXPECT_LT((now.position_W - last.position_W).norm(), 0.0011);
+        EXPECT_LT((now.velocity_W - last.velocity_W).norm(), 0.005 * 0.3);
+        EXPECT_LE(std::abs(now.heading_rad - last.heading_rad), 0.005 * 0.3 + 1e-9);
+        EXPECT_TRUE(std::abs(now.position_W.x()) <= 0.6 && std::abs(now.position_W.y() + 0.05) <= 0.45 &&
+                    std::abs(now.position_W.z() - 1) <= 0.5);
+        const Inputs more = programme.excitation(t);
+        EXPECT_EQ(std::abs(more.amplitude_V) + std::abs(more.difference_V) + std::abs(more.bias_V) +
+                      std::abs(more.split_cycle),
+                  0);
+        way_m += (now.position_W - last.position_W).norm();
+        turned_rad += std::abs(now.heading_rad - last.heading_rad);
+        last = now;
+      }
+      EXPECT_GT(way_m, 0.3);
+      EXPECT_GT(turned_rad, 0);
+    }
+  a.own_parameters = true;
+  io::parallel_for(4, 2, [&](std::size_t i) {
+    Assignment one = a;
+    one.seed = i;
+    one.session = i % 2;
+    const Flown flown = fly_one(one, 1 + i / 2, true, {0.7, 2.3});
+    EXPECT_FALSE(flown.flight.crashed) << flown.flight.how;
+    const std::size_t beat = 588, start = 14000;  // steps; t = 0
+    for (std::size_t step = start; step + beat < flown.path.size(); step += beat)
+      EXPECT_LT((flown.path[step + beat].position_W - flown.path[step].position_W).norm() * 34, 0.25);
+  });
 }
 
 TEST(FamilyC, SameBytesOnAnyNumberOfThreads) {
