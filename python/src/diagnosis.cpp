@@ -40,11 +40,12 @@ nb::object of_json(const nlohmann::ordered_json& json) {
 }
 
 nb::object diagnose(const std::filesystem::path& vehicle, const std::vector<std::string>& flights,
-                    const std::string& out, const std::vector<std::string>& withheld, const std::string& manoeuvre,
-                    int threads) {
+                    const std::string& out, const std::vector<std::string>& reference,
+                    const std::vector<std::string>& withheld, const std::string& manoeuvre, int threads) {
   gap::DiagnoseCommand command;
   command.settings.vehicle = found(vehicle);
   command.settings.flights = flights;
+  command.settings.reference = reference;
   command.out = out;
   command.settings.withheld = withheld;
   if (!manoeuvre.empty()) command.settings.manoeuvre = found(manoeuvre);
@@ -103,11 +104,12 @@ nb::dict identify(const std::filesystem::path& vehicle_file, const std::filesyst
 }  // namespace
 
 void bind_diagnosis(nb::module_& m) {
-  m.def("diagnose", &diagnose, "vehicle"_a, "flights"_a, "out"_a = "", "withheld"_a = std::vector<std::string>{},
-        "manoeuvre"_a = "", "threads"_a = 0,
+  m.def("diagnose", &diagnose, "vehicle"_a, "flights"_a, "out"_a = "", "reference"_a = std::vector<std::string>{},
+        "withheld"_a = std::vector<std::string>{}, "manoeuvre"_a = "", "threads"_a = 0,
         "What flappy-gap diagnose says of flight logs: the content of diagnosis.json. `vehicle`: the file as it was "
         "believed; `flights`: folders of "
-        "logs; `out`: folder for its files, the corrected vehicle among them. InputError for what cannot be read; "
+        "logs; `reference`: folders of logs of the same robot from before the change that is asked about; `out`: "
+        "folder for its files, the corrected vehicle among them. InputError for what cannot be read; "
         "KeyboardInterrupt.");
   m.def("identify", &identify, "vehicle"_a, "measured"_a, "config"_a = "identify/forces.toml",
         "parameters"_a = std::vector<std::string>{}, "starts"_a = 3, "seed"_a = 1, "threads"_a = 0,

@@ -173,6 +173,9 @@ int main(int argc, char** argv) {
   gap::DiagnoseCommand command;
   diagnose.option("--vehicle", command.settings.vehicle, "the vehicle's file, as it was believed").required();
   diagnose.option("--flights", command.settings.flights, "folders of flight logs").required();
+  diagnose.option("--reference", command.settings.reference,
+                  "flights of the same robot before what --flights are asked about");
+  diagnose.option("--sessions", command.settings.sessions, "what differs between sessions [session_variation.toml]");
   diagnose.option("--priors", command.settings.priors,
                   "what is uncertain of the vehicle [configs/gap/priors.toml, as the next]");
   diagnose.option("--discrepancy", command.settings.discrepancy,
@@ -188,9 +191,12 @@ int main(int argc, char** argv) {
       "learn-discrepancy", "what models get wrong, from robots of which all is known that the vehicle's file says");
   gap::LearnCommand lessons{.vehicle = {},
                             .priors = io::config_path("gap/priors.toml"),
-                            .discrepancy = io::config_path("gap/model_discrepancy.toml")};
+                            .discrepancy = io::config_path("gap/model_discrepancy.toml"),
+                            .sessions = io::config_path("gap/session_variation.toml")};
   learn.option("--vehicle", lessons.vehicle, "the vehicle's file").required();
-  learn.option("--robots", lessons.robots, "folders, each with the flights of one robot").required();
+  learn.option("--robots", lessons.robots, "folders, each with the flights of one robot");
+  learn.option("--pairs", lessons.pairs, "REFERENCE:TEST, two sessions of a robot without any change that matters");
+  learn.option("--sessions", lessons.sessions, "of --pairs: to begin with").shows_default();
   learn.option("--priors", lessons.priors, "what is uncertain of the vehicle").shows_default();
   learn.option("--discrepancy", lessons.discrepancy, "to begin with").shows_default();
   learn.option("--out", lessons.out, "file for what is learnt").required();

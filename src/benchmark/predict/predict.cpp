@@ -14,6 +14,7 @@ Prediction predict(const Question& q) {
   gap::DiagnosisSettings settings;
   settings.vehicle = q.vehicle;
   for (const std::filesystem::path& folder : q.flights) settings.flights.push_back(folder);
+  for (const std::filesystem::path& folder : q.reference) settings.reference.push_back(folder);
   settings.priors = q.priors;
   settings.discrepancy = q.discrepancy;
   settings.verdict = q.verdict;

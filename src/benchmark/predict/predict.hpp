@@ -40,6 +40,7 @@ struct Question {
   bool baselines = true;              ///< also compute Prediction::baselines and ::features
   /// Folder of manoeuvres (*.toml), one of which is proposed if the verdict abstains; empty: none.
   std::filesystem::path experiments;
+  std::vector<std::filesystem::path> reference;  ///< folders of reference logs; empty: no contrast
 };
 using Predictor = std::function<Prediction(const Question&)>;
 

@@ -3,6 +3,7 @@
 #include "flappy/vehicle_file.hpp"
 #include "flightlog/check/data_faults.hpp"
 #include "gap/diagnose/closed_loop_prediction.hpp"
+#include "gap/diagnose/contrast_warnings.hpp"
 #include "gap/diagnose/corrected_vehicle.hpp"
 #include "gap/diagnose/result.hpp"
 #include "gap/replay/beat_averaged_prediction.hpp"
@@ -71,7 +72,9 @@ DiagnosisRequest read_request(const DiagnosisSettings& s) {
   model::Vehicle vehicle = read_believed_vehicle(s.vehicle);
   const bool beat_averaged = vehicle.beat_averaged.has_value();
   check_withheld(s.withheld, vehicle);
-  flightlog::check_each_once(s.flights);
+  std::vector<std::string> all = s.reference;
+  all.insert(all.end(), s.flights.begin(), s.flights.end());
+  flightlog::check_each_once(all);
   rollout::FlyConfig pilot = read_pilot(s.manoeuvre);
   const auto file = [&](const std::string& given, const std::string& name) {
     return given.empty() ? fs::path(io::config_path((beat_averaged ? "gap/beat_averaged/" : "gap/") + name))
@@ -90,6 +93,10 @@ DiagnosisRequest read_request(const DiagnosisSettings& s) {
   options.withheld = s.withheld;
   options.discrepancy = read_model_discrepancy(file(s.discrepancy, "model_discrepancy.toml"));
   options.rule = read_verdict_rule(file(s.verdict, "verdict.toml"));
+  if (!s.reference.empty()) {
+    options.discrepancy.session = s.sessions.empty() ? read_session_variation() : read_session_variation(s.sessions);
+    options.rule.gain.by_chance_nats = options.rule.gain.outside_by_chance_nats;  // errors of models cancel
+  }
   return {s,
           std::move(vehicle),
           std::move(uncertain),
@@ -101,34 +108,42 @@ DiagnosisRequest read_request(const DiagnosisSettings& s) {
 
 Diagnosed diagnose(const DiagnosisRequest& request,
                    const std::function<bool(double share, const std::string& what)>& progress) {
-  const std::vector<std::string>& folders = request.settings.flights;
+  const std::size_t references = request.settings.reference.size();
+  std::vector<std::string> folders = request.settings.reference;
+  folders.insert(folders.end(), request.settings.flights.begin(), request.settings.flights.end());
   std::vector<flightlog::FlightLog> logs;
   for (const std::string& folder : folders) logs.push_back(flightlog::read_flight_log(folder));
+  std::vector<flightlog::FlightHeader> headers;
+  for (const flightlog::FlightLog& log : logs) headers.push_back(log.header);
+  if (references > 0) check_same_streams(headers, folders);
   Diagnosed d;
   if (std::vector<flightlog::DataFault> faults = data_faults(logs, folders); !faults.empty()) {
     d.result = result_of(folders, std::move(faults));
     return d;
   }
   for (std::size_t f = 0; f < logs.size(); ++f) {
+    std::shared_ptr<PredictedFlight> flight;
     if (request.vehicle.beat_averaged)
-      d.flights.push_back(
-          std::make_shared<BeatAveragedPrediction>(folders[f], std::move(logs[f]), request.vehicle, request.channels));
-    else
-      d.flights.push_back(
-          std::make_shared<ResetPrediction>(Recording(folders[f], std::move(logs[f]), request.vehicle)));
+      flight =
+          std::make_shared<BeatAveragedPrediction>(folders[f], std::move(logs[f]), request.vehicle, request.channels);
+    else flight = std::make_shared<ResetPrediction>(Recording(folders[f], std::move(logs[f]), request.vehicle));
+    if (f < references) flight->set_reference();
+    d.flights.push_back(std::move(flight));
   }
   InferenceOptions options = request.options;
   options.progress = progress;
   d.inference = infer(d.flights, request.uncertain, options);
   d.uncertain = request.uncertain;
   d.uncertain->set_minors(d.inference.minors);
-  d.result = result_of(folders, d.flights, *d.uncertain, d.inference);
+  d.result = result_of(request.settings.flights, d.flights, *d.uncertain, d.inference);
+  d.result.reference = request.settings.reference;
+  if (references > 0) d.result.warnings = contrast_warnings(headers, d.flights);
   if (d.inference.complete) d.corrected = corrected_vehicle(request.vehicle, d.inference, *d.uncertain);
   return d;
 }
 
 void fly_closed_loop(const DiagnosisRequest& request, Diagnosed& d) {
-  if (!d.corrected || request.vehicle.beat_averaged) return;
+  if (!d.corrected || request.vehicle.beat_averaged || !request.settings.reference.empty()) return;
   ClosedLoopOptions options;
   options.own_path = !request.settings.manoeuvre.empty();
   options.threads = request.settings.threads;
@@ -136,7 +151,7 @@ void fly_closed_loop(const DiagnosisRequest& request, Diagnosed& d) {
 }
 
 void propose_experiment(const DiagnosisRequest& request, Diagnosed& d) {
-  if (!d.corrected || request.vehicle.beat_averaged) return;
+  if (!d.corrected || request.vehicle.beat_averaged || !request.settings.reference.empty()) return;
   if (d.inference.hypotheses.size() < 2 || d.inference.hypotheses[1].probability < kMinRival) return;
   NextOptions options;
   options.threads = request.settings.threads;

@@ -16,8 +16,10 @@ namespace flappy::gap {
 struct DiagnosisSettings {
   std::string vehicle;               ///< the vehicle file
   std::vector<std::string> flights;  ///< folders of logs
+  /// Folders of logs of the same robot from before the change that the flights are asked about; empty: no contrast.
+  std::vector<std::string> reference;
   /// Empty: the files of configs/gap, or of configs/gap/beat_averaged for a beat-averaged vehicle.
-  std::string priors, discrepancy, verdict;
+  std::string priors, discrepancy, verdict, sessions;
   std::vector<std::string> withheld;  ///< effects to leave out of the catalogue
   /// For a beat-averaged vehicle, the only channels that count; empty: all that it compares.
   std::vector<std::string> channels;
@@ -44,7 +46,7 @@ struct Diagnosed {
   Diagnosis result;
   std::optional<model::Vehicle> corrected;  ///< none: the data are faulty, or the diagnosis was stopped
   // empty if the data are faulty:
-  Flights flights;
+  Flights flights;                              ///< references first
   std::optional<sim::Randomisation> uncertain;  ///< with the minor draws at their estimates
   Inference inference;
 };

@@ -31,7 +31,8 @@ ScoredHypothesis baseline(HypothesisKind kind, double log_evidence, double prior
 }
 
 /// The free blocks, each with the function of the regime that takes most of it; the largest gain first.
-std::vector<FreeBlock> free_blocks(const ScaledEvidence& w, const RegimeBasis& basis, double penalty_nats) {
+std::vector<FreeBlock> free_blocks(const ScaledEvidence& w, const Evidence& evidence, double penalty_nats) {
+  const RegimeBasis& basis = evidence.basis();
   std::vector<FreeBlock> blocks;
   for (std::size_t block = 0; block < w.scales.free.size(); ++block) {
     if (!w.scales.free[block]) continue;
@@ -40,12 +41,12 @@ std::vector<FreeBlock> free_blocks(const ScaledEvidence& w, const RegimeBasis& b
                 static_cast<int>(block) / kClasses % (kHarmonics + 1)};
     for (int g = 0; g < kGroups; ++g)
       for (int i = 0; i < basis.size(); ++i) {
-        if (Evidence::block_of(g, basis.kind(i)) != static_cast<int>(block)) continue;
+        if (evidence.block_of(g, i) != static_cast<int>(block)) continue;
         const double square = std::pow(w.delta(g, i), 2);
         sum += square;
         if (square > most) most = square, b.function = i;
       }
-    b.times = w.scales.blocks[block] / w.scales.robot;
+    b.times = w.scales.blocks[block] / w.scales.centre(block);
     b.gain_nats = 0.5 * sum * (b.times * b.times - 1) - penalty_nats;
     blocks.push_back(b);
   }
@@ -98,13 +99,15 @@ Baselines weigh_baselines(const RobotFit& robot, const VerdictRule& rule) {
   const Scales& scales = robot.fitter().scales();
   const double penalty = rule.unknown.penalty_nats;
   Baselines b;
-  b.none =
-      baseline(HypothesisKind::none, robot.weigh(h, robot.nominal(), scales).posterior.log_evidence, rule.prior.none);
+  b.none = baseline(HypothesisKind::none,
+                    robot.evidence().contrasts() ? robot.log_evidence_unchanged()
+                                                 : robot.weigh(h, robot.nominal(), scales).posterior.log_evidence,
+                    rule.prior.none);
   b.parameters = baseline(HypothesisKind::parameters, robot.weigh(h, robot.parameters(), scales).posterior.log_evidence,
                           rule.prior.parameters);
   const ScaledEvidence unknown = weigh_freely(robot, h, robot.parameters(), scales, nullptr, penalty);
   b.unknown = baseline(HypothesisKind::unknown, unknown.posterior.log_evidence, rule.prior.unknown);
-  b.unknown.unexplained = free_blocks(unknown, robot.evidence().basis(), penalty);
+  b.unknown.unexplained = free_blocks(unknown, robot.evidence(), penalty);
   // an unknown cause frees at least one block, so it pays the penalty at least once
   if (!b.unknown.has_remainder()) b.unknown.log_evidence -= penalty;
   b.unknown.fit.law_factor = unknown.law_factor;
@@ -176,7 +179,7 @@ ScoredHypothesis EffectFits::fitted(const std::vector<ScreenedEffect>& set, cons
 /// start.
 void EffectFits::move_parameters(const std::vector<ScreenedEffect>& set, const Fitter& fitter,
                                  ScoredHypothesis& a) const {
-  if (!robot_.evidence().policy().move_parameters) return;
+  if (!robot_.evidence().policy().move_parameters || robot_.evidence().contrasts()) return;
   const Hypothesis h(robot_.uncertain(), a.effects);
   take(h, fit_jointly(h, set, fitter), fitter.scales(), a);
 }
@@ -331,7 +334,7 @@ std::vector<ScoredHypothesis> EffectFits::with_remainders(const std::vector<Scor
     const ScoredHypothesis& a = hypotheses[i];
     const Hypothesis h(robot_.uncertain(), a.effects);
     const ScaledEvidence w = weigh_freely(robot_, h, a.fit, scales, &baselines_.unknown_scales, penalty);
-    std::vector<FreeBlock> blocks = free_blocks(w, robot_.evidence().basis(), penalty);
+    std::vector<FreeBlock> blocks = free_blocks(w, robot_.evidence(), penalty);
     if (blocks.empty()) return;
     found[i] = a;
     found[i].unexplained = std::move(blocks);

@@ -13,6 +13,8 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+/// Fold of a flight that is never held out.
+constexpr int kNever = -1;
 /// Length of a block of rows that is resampled; number of resamples; number of shifted copies.
 constexpr double kBlock_s = 2;
 constexpr int kDraws = 1000, kCopies = 20;
@@ -201,6 +203,7 @@ std::vector<Residuals> held_out(const Fitter& fitter, const Flights& flights, co
   std::vector<Residuals> left(fits.size(), Residuals(flights.size()));
   for (std::size_t i = 0; i < fits.size(); ++i)
     for (std::size_t f = 0; f < flights.size(); ++f) {
+      if (fold[f] == kNever) continue;
       const std::size_t k = i * folds + static_cast<std::size_t>(fold[f]);
       Residuals& s = rows[k];
       if (s.empty()) continue;
@@ -219,8 +222,9 @@ void hold_out(const Fitter& fitter, const sim::Randomisation& uncertain, const F
       fits.push_back({Hypothesis(uncertain, a.effects), &a.fit});
       of.push_back(&a.held_out);
     }
-  std::vector<int> each(flights.size());
-  std::iota(each.begin(), each.end(), 0);
+  std::vector<int> each;  // references are never held out
+  int next = 0;
+  for (const auto& f : flights) each.push_back(f->is_reference() ? kNever : next++);
   std::vector<Residuals> left = held_out(fitter, flights, fits, each, threads);
   for (std::size_t i = 0; i < of.size(); ++i) *of[i] = std::move(left[i]);
 }

@@ -11,7 +11,7 @@ struct FittedHypothesis {
 };
 
 /// Residuals, [fit][flight], of predictions by the fit to the other folds, or to all flights if there is one fold.
-/// `fold`: [flight].
+/// `fold`: [flight]; -1: never held out, and without a residual.
 std::vector<Residuals> held_out(const Fitter& fitter, const Flights& flights, const std::vector<FittedHypothesis>& fits,
                                 const std::vector<int>& fold, int threads);
 

@@ -29,7 +29,7 @@ class Progress {
 };
 
 VectorXd without_background(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit) {
-  if (!fitter.evidence().policy().background_in_corrected)
+  if (!fitter.evidence().policy().background_in_corrected || fitter.evidence().contrasts())
     return fitter.joint_fit(hypothesis, fit, fitter.all_flights(), false).at;
   VectorXd at = fitter.refit_without_background(hypothesis, fit).at;
   // parameters are fitted one by one, so together they may describe a body that cannot exist
@@ -59,13 +59,31 @@ const ScoredHypothesis& Inference::predicting() const {
   });
 }
 
+namespace {
+
+/// Drops the residuals of reference flights, which are no part of the answer.
+void keep_tests(std::size_t references, Inference& d) {
+  const auto keep = [&](Residuals& r) {
+    r.erase(r.begin(), r.begin() + static_cast<std::ptrdiff_t>(std::min(references, r.size())));
+  };
+  keep(d.nominal);
+  keep(d.refit);
+  for (ScoredHypothesis& a : d.hypotheses) keep(a.held_out);
+}
+
+}  // namespace
+
 Inference infer(const Flights& flights, const sim::Randomisation& uncertain, const InferenceOptions& options) {
   const int threads = io::thread_count(options.threads);
   const VerdictRule& rule = options.rule;
   Progress progress(options);
 
   progress(0, "fitting parameters");
-  const RobotFit robot(flights, uncertain, options.discrepancy, options.withheld, threads);
+  const Flights references = references_of(flights);
+  const auto fit = [&](const Flights& to) {
+    return RobotFit(to, uncertain, options.discrepancy, options.withheld, threads);
+  };
+  const RobotFit robot = references.empty() ? fit(flights) : RobotFit(fit(references), flights);
   const Baselines baselines = weigh_baselines(robot, rule);
 
   progress(0.3, "screening effects");
@@ -94,7 +112,9 @@ Inference infer(const Flights& flights, const sim::Randomisation& uncertain, con
   hold_out(fitter, robot.uncertain(), flights, threads, d);
   decide(robot, fitter, flights, rule, d);
   correct(robot, fitter, d);
-  if (robot.evidence().policy().validate) d.validation = validate(fitter, robot.uncertain(), flights, d, threads);
+  if (robot.evidence().policy().validate && references.empty())
+    d.validation = validate(fitter, robot.uncertain(), flights, d, threads);
+  keep_tests(references.size(), d);
   return d;
 }
 

@@ -28,28 +28,55 @@ std::vector<fs::path> flights_of(const fs::path& robot) {
   return flights;
 }
 
+/// Appends the flights in a folder.
+void read_flights(const std::string& from, const model::Vehicle& vehicle, bool reference, Flights& to) {
+  for (const fs::path& folder : flights_of(from)) {
+    flightlog::FlightLog log = flightlog::read_flight_log(folder);
+    if (const auto faults = data_faults(log, folder); !faults.empty())
+      throw io::InputError(faults.front().file + ":" + std::to_string(faults.front().line) + ": " +
+                           faults.front().what + "; accepted: flights that flappy-gap check finds no fault in");
+    const auto flight = std::make_shared<ResetPrediction>(Recording(folder, std::move(log), vehicle));
+    if (reference) flight->set_reference();
+    to.push_back(flight);
+  }
+}
+
+std::string learnt_from(std::size_t count, const char* of) {
+  return std::to_string(count) + " " + of + ", commit " + io::commit();
+}
+
 }  // namespace
 
 void run_learn_discrepancy(const LearnCommand& command) {
   io::check_output(command.out);
   const model::Vehicle vehicle = model::read_vehicle_for_steps(command.vehicle, kHoldStep_s);
   const sim::Randomisation uncertain = sim::read_randomisation(vehicle, io::Config::load(command.priors).root());
-  const ModelDiscrepancy start = read_model_discrepancy(command.discrepancy);
+  ModelDiscrepancy start = read_model_discrepancy(command.discrepancy);
+  if (command.robots.empty() == command.pairs.empty())
+    throw io::InputError("nothing to learn from; accepted: either --robots or --pairs");
   std::vector<Flights> robots;
   for (const std::string& robot : command.robots) {
     robots.emplace_back();
-    for (const fs::path& folder : flights_of(robot)) {
-      flightlog::FlightLog log = flightlog::read_flight_log(folder);
-      if (const auto faults = data_faults(log, folder); !faults.empty())
-        throw io::InputError(faults.front().file + ":" + std::to_string(faults.front().line) + ": " +
-                             faults.front().what + "; accepted: flights that flappy-gap check finds no fault in");
-      robots.back().push_back(std::make_shared<ResetPrediction>(Recording(folder, std::move(log), vehicle)));
-    }
+    read_flights(robot, vehicle, false, robots.back());
+  }
+  for (const std::string& pair : command.pairs) {
+    const std::size_t colon = pair.find(':');
+    if (colon == std::string::npos)
+      throw io::InputError("--pairs " + pair + ": no colon; accepted: REFERENCE:TEST, two folders of flights");
+    robots.emplace_back();
+    read_flights(pair.substr(0, colon), vehicle, true, robots.back());
+    read_flights(pair.substr(colon + 1), vehicle, false, robots.back());
   }
   io::stop_on_interrupt();
+  if (!command.pairs.empty()) {
+    start.session = read_session_variation(command.sessions);
+    const SessionVariation learnt = learn_sessions(robots, uncertain, start, command.threads);
+    io::write_atomically(command.out, session_text(learnt, learnt_from(robots.size(), "pairs of sessions")));
+    std::printf("%s: learnt from %zu pairs of sessions\n", command.out.c_str(), robots.size());
+    return;
+  }
   const ModelDiscrepancy learnt = learn_discrepancy(robots, uncertain, start, command.threads);
-  io::write_atomically(command.out,
-                       discrepancy_text(learnt, std::to_string(robots.size()) + " robots, commit " + io::commit()));
+  io::write_atomically(command.out, discrepancy_text(learnt, learnt_from(robots.size(), "robots")));
   std::printf("%s: learnt from %zu robots\n", command.out.c_str(), robots.size());
 }
 

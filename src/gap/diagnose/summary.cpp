@@ -29,22 +29,30 @@ std::string place_of(const UnexplainedTerm& u) {
   return u.channel + ", " + (u.harmonic == 0 ? "mean of the beat" : "harmonic " + std::to_string(u.harmonic));
 }
 
-std::string verdict_line(const Verdict& c) {
+std::string verdict_line(const Verdict& c, bool contrast) {
   const double p = c.probability;
+  const char* what = contrast ? "Changed since the reference" : "Missing in the model";
   switch (c.kind) {
     case VerdictKind::effect:
-      return io::format("Missing in the model: %s%s (probability %.2f%s)", listed(c.effects, "and").c_str(),
+      return io::format("%s: %s%s (probability %.2f%s)", what, listed(c.effects, "and").c_str(),
                         c.remainder ? ", and something more" : "", p, p < 0.5 ? ", no more than a guess" : "");
     case VerdictKind::group:
-      return io::format("Missing in the model: one of %s, which these flights cannot tell apart (together %.2f)",
+      return io::format("%s: one of %s, which these flights cannot tell apart (together %.2f)", what,
                         listed(c.effects, "or").c_str(), p);
     case VerdictKind::parameters:
-      return io::format("Nothing is missing in the model, its parameters are off (probability %.2f)", p);
-    case VerdictKind::none:
-      return io::format("No gap beyond noise: the vehicle's file explains the flights (probability %.2f)", p);
-    case VerdictKind::unknown:
-      return io::format("Something is missing in the model that no effect of the catalogue explains (probability %.2f)",
+      return io::format(contrast ? "Changed by no more than sessions differ by (probability %.2f)"
+                                 : "Nothing is missing in the model, its parameters are off (probability %.2f)",
                         p);
+    case VerdictKind::none:
+      return io::format(contrast ? "Unchanged since the reference (probability %.2f)"
+                                 : "No gap beyond noise: the vehicle's file explains the flights (probability %.2f)",
+                        p);
+    case VerdictKind::unknown:
+      return io::format(
+          contrast
+              ? "Changed since the reference by something that no effect of the catalogue explains (probability %.2f)"
+              : "Something is missing in the model that no effect of the catalogue explains (probability %.2f)",
+          p);
     case VerdictKind::data:
       return "The data are at fault; nothing was diagnosed";
   }
@@ -62,7 +70,8 @@ std::string next_line(const Diagnosis& r, const std::string& out) {
     case VerdictKind::group:
       return "next: fly so that these differ, and diagnose old and new flights together";
     case VerdictKind::none:
-      return "next: nothing to correct; fly harder manoeuvres to look further";
+      return r.reference.empty() ? "next: nothing to correct; fly harder manoeuvres to look further"
+                                 : "next: nothing to correct; fly both sessions harder to look further";
     case VerdictKind::unknown:
       return "next: see what the residuals depend on; where that is no help, fly harder manoeuvres there";
     case VerdictKind::data:
@@ -121,7 +130,7 @@ std::string words_of(const RankedHypothesis& c) {
 
 std::vector<std::string> summary_of(const Diagnosis& r, const std::string& out) {
   std::vector<std::string> lines = {
-      r.complete ? verdict_line(r.verdict)
+      r.complete ? verdict_line(r.verdict, !r.reference.empty())
                  : "Stopped before every effect was weighed: this is no verdict, only what was weighed until then"};
   if (r.verdict.kind == VerdictKind::data) {
     for (std::size_t i = 0; i < r.faults.size() && i + 3 < kSummaryLines; ++i)
@@ -129,6 +138,7 @@ std::vector<std::string> summary_of(const Diagnosis& r, const std::string& out) 
     lines.push_back(next_line(r, out));
     return lines;
   }
+  for (const std::string& warning : r.warnings) lines.push_back("warning: " + warning);
   std::vector<const RankedHypothesis*> ranked;
   for (const RankedHypothesis& c : r.hypotheses) ranked.push_back(&c);
   std::ranges::stable_sort(ranked, std::greater{}, &RankedHypothesis::probability);

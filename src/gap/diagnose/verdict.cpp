@@ -184,7 +184,8 @@ void decide(const RobotFit& robot, const Fitter& fitter, const Flights& flights,
             Inference& d) {
   const DiagnosisPolicy& policy = robot.evidence().policy();
   if (rule.refutation.min_share > 0) refute(robot.evidence(), flights, rule.refutation.min_share, d);
-  if (policy.discrepancy_scales) share_backgrounds(robot, fitter.scales(), rule.unknown.penalty_nats, d.hypotheses);
+  if (policy.discrepancy_scales && !robot.evidence().contrasts())
+    share_backgrounds(robot, fitter.scales(), rule.unknown.penalty_nats, d.hypotheses);
   set_probabilities(d.hypotheses, rule);
   conclude(rule, d);
   if (policy.discrepancy_scales) predict_with_the_likeliest(d);

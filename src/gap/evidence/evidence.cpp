@@ -283,8 +283,10 @@ double Evidence::noise_sd(int group) const {
 
 VectorXd Evidence::prior_sd(int group) const {
   VectorXd sd(basis().size());
-  for (int i = 0; i < basis().size(); ++i)
-    sd[i] = signal(group) * discrepancy_.share(group / kCoefficients, (group % kCoefficients + 1) / 2, basis().kind(i));
+  for (int i = 0; i < basis().size(); ++i) {
+    const auto& shares = basis().of_tests(i) ? discrepancy_.session.shares : discrepancy_.shares;
+    sd[i] = signal(group) * share_of(shares, group / kCoefficients, (group % kCoefficients + 1) / 2, basis().kind(i));
+  }
   return sd;
 }
 
@@ -292,8 +294,7 @@ BasisCoefficients Evidence::discrepancy_sd(const Scales& scales) const {
   BasisCoefficients sd(kGroups, basis().size());
   for (int g = 0; g < kGroups; ++g) {
     sd.row(g) = prior_sd(g).transpose();
-    for (int i = 0; i < basis().size(); ++i)
-      sd(g, i) *= scales.block(static_cast<std::size_t>(block_of(g, basis().kind(i))));
+    for (int i = 0; i < basis().size(); ++i) sd(g, i) *= scales.block(static_cast<std::size_t>(block_of(g, i)));
   }
   return sd;
 }

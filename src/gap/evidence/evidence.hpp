@@ -22,7 +22,8 @@ namespace flappy::gap {
 
 inline constexpr int kGroups = kChannels * kCoefficients;
 
-/// Smooth functions of the regime; over all flights each has mean 0 and rms 1, except the constant.
+/// Smooth functions of the regime; over all flights each has mean 0 and rms 1, except the constant. In a contrast, each
+/// function but the offsets of flights follows a second time, as what differs in the test flights: 0 in the references.
 class RegimeBasis {
  public:
   explicit RegimeBasis(const Flights& flights);
@@ -30,6 +31,11 @@ class RegimeBasis {
   const std::string& name(int i) const { return function(i).name; }
   const std::string& quantity(int i) const { return function(i).quantity; }
   BasisFunction kind(int i) const { return function(i).kind; }
+  /// Whether a function is 0 in the references. These functions come last; none without references.
+  bool of_tests(int i) const { return function(i).of_tests; }
+  bool contrasts() const { return functions_.back().of_tests; }
+  /// The same change in the test flights alone. `coefficients`: [group][size()].
+  Eigen::MatrixXd in_tests(const Eigen::MatrixXd& coefficients) const { return coefficients * in_tests_; }
   /// [beat][size()].
   const Eigen::MatrixXd& values(std::size_t flight) const { return values_[flight]; }
 
@@ -37,10 +43,14 @@ class RegimeBasis {
   struct Function {
     std::string name, quantity;
     BasisFunction kind;
+    bool of_tests = false;
   };
+  void append_functions(const Flights& flights);
+  void append_of_tests(const Flights& flights);
   const Function& function(int i) const { return functions_[static_cast<std::size_t>(i)]; }
   std::vector<Function> functions_;
   std::vector<Eigen::MatrixXd> values_;
+  Eigen::MatrixXd in_tests_;  ///< [function][function in the tests alone]
 };
 
 /// The part of rows that is a smooth function of the regime: [group][basis].
@@ -68,17 +78,26 @@ struct Reduced {
   double log_scale = 0;  ///< contribution of delta to the log evidence: minus half the log determinant of its precision
 };
 
+/// Classes of functions whose coefficients share a scale: Regimes, and again for those of the test flights.
+inline constexpr int kRegimes = static_cast<int>(Regimes::count), kClasses = 2 * kRegimes;
+/// Blocks: [channel][harmonic][class].
+inline constexpr int kBlocks = kChannels * (kHarmonics + 1) * kClasses;
+constexpr bool block_of_tests(std::size_t block) { return block % kClasses >= static_cast<std::size_t>(kRegimes); }
+constexpr Regimes regimes_of_block(std::size_t block) { return static_cast<Regimes>(block % kRegimes); }
+
 /// How far models of this robot are off, in units of the prior of the model discrepancy.
 struct Scales {
   double robot = 1;             ///< scale of the robot, common to all blocks
+  double session = 1;           ///< scale of what differs between sessions, common to all blocks of the test flights
   std::vector<double> effects;  ///< scale of the background magnitude of each effect; empty: 1
   std::vector<double> blocks;   ///< [kBlocks] scale of delta; empty: 1
   std::vector<char> free;       ///< [kBlocks] whether an unknown cause lets the block exceed its prior
   /// Prior scale of a background magnitude.
   double prior_scale(ScalePrior prior) const { return prior.follows_robot ? robot : 1; }
   double block(std::size_t b) const { return blocks.empty() ? 1 : blocks[b]; }
+  /// Centre of the prior of a block's scale.
+  double centre(std::size_t b) const { return block_of_tests(b) ? session : robot; }
 };
-inline constexpr int kClasses = static_cast<int>(Regimes::count), kBlocks = kChannels * (kHarmonics + 1) * kClasses;
 
 struct Posterior {
   double log_evidence = 0;
@@ -110,6 +129,8 @@ class Evidence {
   Evidence with_discrepancy(ModelDiscrepancy discrepancy) const;
 
   const RegimeBasis& basis() const { return *basis_; }
+  /// Whether test flights are compared with references.
+  bool contrasts() const { return basis_->contrasts(); }
   const ModelDiscrepancy& discrepancy() const { return discrepancy_; }
   const DiagnosisPolicy& policy() const { return flights_->front()->policy(); }
 
@@ -142,7 +163,8 @@ class Evidence {
   static constexpr int kMaxIterations = 40;
   /// Log-prior cost, in nats, of a background magnitude that is `times` its prior.
   static double scale_cost_nats(double times, ScalePrior prior, const Scales& scales);
-  static int block_of(int group, BasisFunction function);
+  /// Block of a function of the basis in a group.
+  int block_of(int group, int function) const;
 
   double noise_sd(int group) const;
   /// Rms of the signal of a group; its mean square is averaged with that of its channel.
@@ -156,6 +178,7 @@ class Evidence {
   enum class Learn { declared, weights, noise, remainder };
   const PredictedFlight& flight(std::size_t f) const { return *(*flights_)[f]; }
   bool has_rows(int group) const { return flight(0).has_rows(group / kCoefficients, group % kCoefficients); }
+  bool may_be_free(std::size_t block) const;
   void sum_basis();
   std::pair<Eigen::MatrixXd, Eigen::VectorXd> sums_of(const SufficientStatistics& residual,
                                                       const std::vector<char>& use, int group) const;

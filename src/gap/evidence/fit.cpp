@@ -250,6 +250,7 @@ BasisCoefficients Fitter::law_sd_of(const BasisCoefficients& change, double law_
   const RegimeBasis& basis = evidence_->basis();
   BasisCoefficients sd = BasisCoefficients::Zero(change.rows(), change.cols());
   if (!evidence_->policy().discrepancy_scales) return sd;
+  if (evidence_->contrasts()) return law_factor * evidence_->discrepancy().session.law_error * spread_of(change);
   const auto of_place = [&](int i) { return regimes_of(basis.kind(i)) == Regimes::place; };
   const auto load = [](int g) { return g / kCoefficients <= kForceZ; };
   VectorXd squares = VectorXd::Zero(change.cols());
@@ -271,6 +272,30 @@ BasisCoefficients Fitter::law_sd_of(const BasisCoefficients& change, double law_
         sd(g, i) =
             (squares[i] > kFollows * most ? law_factor : 1) * std::sqrt(squares[i] / groups) * evidence_->signal(g);
   return sd;
+}
+
+/// In a contrast, another law of the same cause changes a coefficient of the tests by a share of the effect's change:
+/// half of the square where the effect changes it, half in other harmonics and axes of channels of the same kind.
+BasisCoefficients Fitter::spread_of(const BasisCoefficients& change) const {
+  const RegimeBasis& basis = evidence_->basis();
+  const auto kind = [](int g) {
+    const int channel = g / kCoefficients;
+    return channel <= kTorqueZ ? 0 : channel <= kForceZ ? 1 : 2;
+  };
+  MatrixXd squares = MatrixXd::Zero(3, basis.size());
+  VectorXd groups = VectorXd::Zero(3);
+  for (int g = 0; g < kGroups; ++g) {
+    if (!(evidence_->signal(g) > 0)) continue;
+    squares.row(kind(g)) += (change.row(g) / evidence_->signal(g)).cwiseAbs2();
+    groups[kind(g)] += 1;
+  }
+  BasisCoefficients spread = BasisCoefficients::Zero(change.rows(), change.cols());
+  for (int g = 0; g < kGroups; ++g)
+    for (int i = 0; i < basis.size(); ++i)
+      if (basis.of_tests(i) && evidence_->signal(g) > 0)
+        spread(g, i) = std::sqrt(0.5 * std::pow(change(g, i), 2) +
+                                 0.5 * std::pow(evidence_->signal(g), 2) * squares(kind(g), i) / groups[kind(g)]);
+  return spread;
 }
 
 Posterior Fitter::posterior(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const {

@@ -116,6 +116,7 @@ class Fitter {
  private:
   std::map<std::string, BasisCoefficients> changes(const Hypothesis& hypothesis, const Fit& fit) const;
   BasisCoefficients law_sd_of(const BasisCoefficients& change, double law_factor) const;
+  BasisCoefficients spread_of(const BasisCoefficients& change) const;
   BasisCoefficients discrepancy_sd(const Hypothesis& hypothesis, const Fit& fit) const;
   /// Null: the direction is not a linear magnitude.
   const BasisCoefficients* linear_column(const Hypothesis& hypothesis, Eigen::Index direction) const;

@@ -78,6 +78,8 @@ VehicleHypothesis Hypothesis::vehicle(const Eigen::VectorXd& coordinates,
     variates[minor->first] += minor->second;
   }
   VehicleHypothesis h{uncertain_->at(variates), unknowns_[static_cast<std::size_t>(lag())].value(coordinates[lag()])};
+  h.variates = std::move(variates);
+  h.file_effects = h.vehicle.effects;
   for (Eigen::Index i = shared(); i < size(); ++i) {
     const Unknown& u = unknowns_[static_cast<std::size_t>(i)];
     h.vehicle.effects[u.effect][u.name] = u.value(coordinates[i]);

@@ -24,7 +24,7 @@ struct Moment {
   double sum = 0, count = 0;
   double root() const { return count > 0 ? std::sqrt(sum / count) : 0; }
 };
-using Shares = std::array<std::array<std::array<Moment, kKinds>, kHarmonics + 1>, kChannels>;
+using ShareMoments = std::array<std::array<std::array<Moment, kKinds>, kHarmonics + 1>, kChannels>;
 
 /// [effect] Scales of a robot's background magnitudes; they make their prior heavy-tailed.
 using Factors = std::map<std::string, double>;
@@ -32,7 +32,7 @@ using Factors = std::map<std::string, double>;
 using Robots = std::vector<std::unique_ptr<const RobotFit>>;
 
 /// Expected squares of the coefficients and background magnitudes over all robots, given `now`.
-void expect(const Robots& robots, const ModelDiscrepancy& now, Shares& shares,
+void expect(const Robots& robots, const ModelDiscrepancy& now, ShareMoments& shares,
             std::map<std::string, Moment>& backgrounds, std::vector<Factors>& factors) {
   factors.resize(robots.size());
   for (std::size_t k = 0; k < robots.size(); ++k) {
@@ -85,7 +85,7 @@ constexpr std::array<std::pair<int, int>, 7> kAlike = {{{kTorqueX, kTorqueZ},
                                                         {kPathX, kPathZ},
                                                         {kTurnX, kTurnZ}}};
 
-void shrink(Shares& shares) {
+void shrink(ShareMoments& shares) {
   for (const auto& [first, last] : kAlike)
     for (std::size_t h = 0; h <= kHarmonics; ++h)
       for (std::size_t k = 0; k < kKinds; ++k) {
@@ -105,7 +105,7 @@ void shrink(Shares& shares) {
 
 /// The class of regimes in which each effect's background is largest, in units of the model discrepancy.
 std::map<std::string, std::size_t> classes_of(const Robots& robots, const ModelDiscrepancy& now) {
-  std::map<std::string, std::array<double, kClasses>> sums;
+  std::map<std::string, std::array<double, kRegimes>> sums;
   for (const auto& robot : robots) {
     const Evidence evidence = robot->evidence().with_discrepancy(now);
     const BasisCoefficients sd = evidence.discrepancy_sd(robot->fitter().scales());
@@ -125,17 +125,61 @@ std::map<std::string, std::size_t> classes_of(const Robots& robots, const ModelD
 /// Averages each effect's variance with the median of its class. The median ignores the few effects that the errors of
 /// the few simulators behind the robots look like.
 void shrink(const std::map<std::string, std::size_t>& classes, std::map<std::string, Moment>& backgrounds) {
-  std::array<std::vector<double>, kClasses> of_class;
+  std::array<std::vector<double>, kRegimes> of_class;
   for (const auto& [effect, m] : backgrounds) of_class[classes.at(effect)].push_back(m.sum / m.count);
   for (auto& [effect, m] : backgrounds) m = {m.sum / m.count + io::upper_median(of_class[classes.at(effect)]), 2};
 }
 
-void take(const Shares& shares, const std::map<std::string, Moment>& backgrounds, ModelDiscrepancy& d) {
+void take(const ShareMoments& moments, const std::map<std::string, Moment>& backgrounds, Shares& shares,
+          std::map<std::string, double>& background) {
   for (std::size_t c = 0; c < kChannels; ++c)
     for (std::size_t h = 0; h <= kHarmonics; ++h)
       for (std::size_t k = 0; k < kKinds; ++k)
-        if (shares[c][h][k].count > 0) d.shares[c][h][k] = std::max(shares[c][h][k].root(), kMinShare);
-  for (const auto& [effect, m] : backgrounds) d.background[effect] = std::max(m.root(), kMinBackground);
+        if (moments[c][h][k].count > 0) shares[c][h][k] = std::max(moments[c][h][k].root(), kMinShare);
+  for (const auto& [effect, m] : backgrounds) background[effect] = std::max(m.root(), kMinBackground);
+}
+
+/// Expected squares over all pairs of what differs between their sessions, given `now`.
+void expect_sessions(const Robots& pairs, const ModelDiscrepancy& now, ShareMoments& shares,
+                     std::map<std::string, Moment>& backgrounds) {
+  for (const auto& pair : pairs) {
+    const auto evidence = std::make_shared<const Evidence>(pair->evidence().with_discrepancy(now));
+    std::vector<Background> all = pair->background(now, true);
+    std::ranges::move(pair->session_changes(now.session), std::back_inserter(all));
+    const Fitter fitter =
+        pair->fitter().with_evidence(evidence).with_nuisances(pair->nuisance_regressors(), all, pair->parameters());
+    const Regressors r = fitter.unscaled_regressors(pair->parameters());
+    const ScaledEvidence w =
+        evidence->weigh(pair->parameters().statistics, r, fitter.all_flights(), {}, pair->fitter().scales(), {}, 1);
+    for (std::size_t k = 0; k < r.effects.size(); ++k) {
+      if (r.effects[k] < 0) continue;
+      const std::string& name = fitter.effects()[static_cast<std::size_t>(r.effects[k])];
+      if (!name.starts_with(kSessionOf) || name == kSessionParameters) continue;
+      const std::string effect = name.substr(std::string(kSessionOf).size());
+      const auto i = static_cast<Index>(k);
+      backgrounds[effect].sum += std::pow(now.session.background_sd(effect), 2) *
+                                 (w.posterior.mean[i] * w.posterior.mean[i] + w.posterior.covariance(i, i));
+      backgrounds[effect].count += 1;
+    }
+    const RegimeBasis& basis = evidence->basis();
+    for (int g = 0; g < kGroups; ++g)
+      for (int i = 0; i < basis.size(); ++i) {
+        if (!basis.of_tests(i) || w.squares(g, i) == 0) continue;
+        const int channel = g / kCoefficients, harmonic = (g % kCoefficients + 1) / 2;
+        Moment& m = shares[static_cast<std::size_t>(channel)][static_cast<std::size_t>(harmonic)]
+                          [static_cast<std::size_t>(basis.kind(i))];
+        m.sum += w.squares(g, i) * std::pow(share_of(now.session.shares, channel, harmonic, basis.kind(i)), 2);
+        m.count += 1;
+      }
+  }
+}
+
+/// Averages each effect's variance with the median of all.
+void shrink(std::map<std::string, Moment>& backgrounds) {
+  std::vector<double> variances;
+  for (const auto& [effect, m] : backgrounds) variances.push_back(m.sum / m.count);
+  const double median = variances.empty() ? 0 : io::upper_median(variances);
+  for (auto& [effect, m] : backgrounds) m = {m.sum / m.count + median, 2};
 }
 
 }  // namespace
@@ -153,16 +197,40 @@ ModelDiscrepancy learn_discrepancy(const std::vector<Flights>& flights, const si
   ModelDiscrepancy now = start;
   std::vector<Factors> factors;
   for (int n = 1; n <= kIterations; ++n) {
-    Shares shares{};
+    ShareMoments shares{};
     std::map<std::string, Moment> backgrounds;
     expect(robots, now, shares, backgrounds, factors);
     if (n == kIterations) {
       shrink(shares);
       shrink(classes_of(robots, now), backgrounds);
     }
-    take(shares, backgrounds, now);
+    take(shares, backgrounds, now.shares, now.background);
   }
   return now;
+}
+
+SessionVariation learn_sessions(const std::vector<Flights>& flights, const sim::Randomisation& uncertain,
+                                const ModelDiscrepancy& start, int threads) {
+  io::ProgressLine line("learning");
+  Robots pairs;
+  for (std::size_t i = 0; i < flights.size() && !io::interrupted(); ++i) {
+    line.show(static_cast<double>(i) / static_cast<double>(flights.size()), "fitting pair " + std::to_string(i + 1));
+    pairs.push_back(std::make_unique<const RobotFit>(
+        RobotFit(references_of(flights[i]), uncertain, start, std::vector<std::string>(), threads), flights[i]));
+  }
+  if (io::interrupted()) throw io::InputError("stopped: nothing was learnt; accepted: all pairs");
+  ModelDiscrepancy now = start;
+  for (int n = 1; n <= kIterations; ++n) {
+    ShareMoments shares{};
+    std::map<std::string, Moment> backgrounds;
+    expect_sessions(pairs, now, shares, backgrounds);
+    if (n == kIterations) {
+      shrink(shares);
+      shrink(backgrounds);
+    }
+    take(shares, backgrounds, now.session.shares, now.session.background);
+  }
+  return now.session;
 }
 
 }  // namespace flappy::gap

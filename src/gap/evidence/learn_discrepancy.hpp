@@ -15,4 +15,9 @@ namespace flappy::gap {
 ModelDiscrepancy learn_discrepancy(const std::vector<Flights>& flights, const sim::Randomisation& uncertain,
                                    const ModelDiscrepancy& start, int threads);
 
+/// Learns what differs between sessions from pairs of sessions in which nothing that matters changed. `flights`: [pair]
+/// references and then test flights.
+SessionVariation learn_sessions(const std::vector<Flights>& flights, const sim::Randomisation& uncertain,
+                                const ModelDiscrepancy& start, int threads);
+
 }  // namespace flappy::gap

@@ -11,24 +11,12 @@
 namespace flappy::gap {
 namespace {
 
-using enum BasisFunction;
-constexpr std::pair<BasisFunction, const char*> kKeys[] = {
-    {constant, "constant"},     {input, "input"},           {rate, "rate"},
-    {product, "product"},       {place, "place"},           {flight, "flight"},
-    {velocity_x, "velocity_x"}, {velocity_y, "velocity_y"}, {velocity_z, "velocity_z"},
-    {drag_x, "drag_x"},         {drag_y, "drag_y"},         {drag_z, "drag_z"}};
-
 constexpr const char* kHead =
     R"(# The model discrepancy (Kennedy and O'Hagan 2001): what every model of a flapping wing gets wrong, before anything is known of a vehicle. An effect
 # has to explain more than this. Read by flappy-gap diagnose, written by flappy-gap learn-discrepancy: learn it again from robots of your own that
 # you trust, whose flights contain nothing that the vehicle file lacks.
 #
 # Learnt from )";
-constexpr const char* kShares =
-    R"(# Prior standard deviation of the coefficients of the regime basis, as a share of the channel's signal, for harmonics 0 (the mean) to 4 of the beat.
-# Rows are kinds of functions: constant; the inputs; the rates of the body; products with an input; the place (height, heading, time, nearness of
-# surfaces); an offset of each flight (a warm sensor, another day's battery); the velocity v in B; and |v| v.
-)";
 constexpr const char* kSpread =
     R"(# Priors of the scales by which models of one robot are off by more or less than those of others. robot_sd: standard deviation of the logarithm of the
 # robot's scale; wide, for a robot may be nearly the model. The other scales have inverse gamma priors of their squares; the more degrees of freedom,
@@ -76,6 +64,7 @@ double ModelDiscrepancy::background_sd(const std::string& effect) const {
 }
 
 ScalePrior ModelDiscrepancy::scale_prior(const std::string& effect) const {
+  if (effect.starts_with(kSessionOf)) return {session.effect_freedom, false};
   if (beat_averaged) return {spread.effect_freedom, true};
   const bool of_model = std::ranges::count(of_models, effect_of(effect)) > 0;
   return {of_model ? spread.model_freedom : spread.effect_freedom, of_model};
@@ -86,16 +75,7 @@ std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learn
   const auto sensor = [&](const char* id) {
     return number(std::ranges::find(d.nuisances, id, &ModelDiscrepancy::Nuisance::id)->sd);
   };
-  std::string text = kHead + learnt + ".\nschema = 1\n\n" + kShares;
-  for (int channel = 0; channel < kChannels; ++channel) {
-    text += std::string("[share.") + channel_name(channel) + "]\n";
-    for (const auto& [function, key] : kKeys) {
-      text += std::string(key) + " = [";
-      for (int h = 0; h <= kHarmonics; ++h) text += (h > 0 ? ", " : "") + number(d.share(channel, h, function));
-      text += "]\n";
-    }
-    text += "\n";
-  }
+  std::string text = kHead + learnt + ".\nschema = 1\n\n" + shares_text(d.shares);
   std::string of_models;
   if (!d.of_models.empty()) {
     for (const std::string& id : d.of_models) of_models += (of_models.empty() ? "\"" : ", \"") + id + "\"";
@@ -132,17 +112,7 @@ ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
     if (!model::is_effect(id))
       spread.fail("of_models", "no effect \"" + id + "\"", "those that flappy-gap effects lists");
 
-  for (int channel = 0; channel < kChannels; ++channel) {
-    const io::Table share = root.table("share");
-    const io::Table table =
-        share.table(share.has(channel_name(channel)) || !share.has("all") ? channel_name(channel) : "all");
-    auto& shares = d.shares[static_cast<std::size_t>(channel)];
-    for (const auto& [function, key] : kKeys) {
-      const std::vector<double> by_harmonic = table.numbers(key, kHarmonics + 1, io::positive());
-      for (std::size_t h = 0; h <= kHarmonics; ++h) shares[h][static_cast<std::size_t>(function)] = by_harmonic[h];
-    }
-  }
-
+  d.shares = read_shares(root);
   const auto sensors = root.optional_table("sensors");
   const auto axes = [&](const char* id, const char* unit, double sd) {
     for (const char* axis : {"x_", "y_", "z_"}) d.nuisances.push_back({id, std::string(axis) + unit, sd});

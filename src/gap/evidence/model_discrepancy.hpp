@@ -2,13 +2,12 @@
 // configs/gap/model_discrepancy.toml has its parameters and how they were learnt.
 #pragma once
 
-#include <array>
 #include <filesystem>
 #include <map>
 #include <string>
 #include <vector>
 
-#include "gap/replay/predicted_flight.hpp"
+#include "gap/evidence/session_variation.hpp"
 #include "io/installation.hpp"
 
 namespace flappy::gap {
@@ -41,8 +40,7 @@ struct ModelDiscrepancy {
   std::vector<Nuisance> nuisances;
   /// Prior sd of the coefficients of functions of this kind, as a share of the channel's signal.
   double share(int channel, int harmonic, BasisFunction function) const {
-    return shares[static_cast<std::size_t>(channel)][static_cast<std::size_t>(harmonic)]
-                 [static_cast<std::size_t>(function)];
+    return share_of(shares, channel, harmonic, function);
   }
   /// Prior sd of the background magnitude of an effect, in its coordinates (hypothesis.hpp): what a vehicle without the
   /// effect has of it, or of something that looks like it.
@@ -52,14 +50,18 @@ struct ModelDiscrepancy {
   }
   ScalePrior scale_prior(const std::string& effect) const;
 
-  std::array<std::array<std::array<double, static_cast<std::size_t>(BasisFunction::count)>, kHarmonics + 1>, kChannels>
-      shares{};
+  Shares shares{};
+  SessionVariation session;                  ///< only used in a contrast
   std::map<std::string, double> background;  ///< background_sd by effect; "other": effects that are not listed
   /// Effects of wings, hinges and drive, which models describe differently: their background follows the robot
   /// (model_freedom).
   std::vector<std::string> of_models;
   bool beat_averaged = false;  ///< every background magnitude follows the robot, with spread.effect_freedom
 };
+
+/// Names of what changes between sessions, as background magnitudes: the parameters together, and this prefix of an
+/// effect.
+inline constexpr const char *kSessionParameters = "session of parameters", *kSessionOf = "session of ";
 
 /// Suffix of the background magnitude that both wings share, for an effect with a magnitude for each wing.
 inline constexpr const char* kOfBoth = "_of_both";

@@ -6,6 +6,11 @@
 namespace flappy::gap {
 
 RegimeBasis::RegimeBasis(const Flights& flights) {
+  append_functions(flights);
+  append_of_tests(flights);
+}
+
+void RegimeBasis::append_functions(const Flights& flights) {
   values_.resize(flights.size());
   std::vector<std::vector<RegimeFunction>> functions;
   std::vector<Eigen::VectorXd> column;
@@ -36,6 +41,7 @@ RegimeBasis::RegimeBasis(const Flights& flights) {
   }
   // an offset for each flight would otherwise look like an influence of that flight's height
   for (std::size_t offset = 1; offset < flights.size() && flights.front()->policy().flight_offsets; ++offset) {
+    if (flights[offset]->is_reference() != flights[offset - 1]->is_reference()) continue;  // the first of the tests
     for (std::size_t f = 0; f < flights.size(); ++f) column[f].setConstant(f == offset ? 1 : 0);
     append("flight " + flights[offset]->name(), "flight", BasisFunction::flight);
   }
@@ -50,6 +56,37 @@ RegimeBasis::RegimeBasis(const Flights& flights) {
     const int i = index(a), j = index(b);
     for (std::size_t f = 0; f < flights.size(); ++f) column[f] = values_[f].col(i).cwiseProduct(values_[f].col(j));
     append(a + " " + b, quantity(j), BasisFunction::product);
+  }
+}
+
+void RegimeBasis::append_of_tests(const Flights& flights) {
+  if (references_of(flights).empty()) return;
+  const int once = size();
+  for (int i = 0; i < once; ++i) {
+    if (kind(i) == BasisFunction::flight) continue;
+    for (std::size_t f = 0; f < flights.size(); ++f) {
+      const Eigen::VectorXd column = (flights[f]->is_reference() ? 0.0 : 1.0) * values_[f].col(i);
+      values_[f].conservativeResize(column.size(), values_[f].cols() + 1);
+      values_[f].rightCols(1) = column;
+    }
+    functions_.push_back({name(i), quantity(i), kind(i), true});
+  }
+  in_tests_ = Eigen::MatrixXd::Zero(size(), size());
+  int again = once;
+  for (int i = 0; i < once; ++i) {
+    if (kind(i) != BasisFunction::flight) {
+      in_tests_(i, again) = in_tests_(again, again) = 1;
+      ++again;
+      continue;
+    }
+    // the offset of a flight: one value in it, another in all others
+    const auto largest = std::ranges::max_element(values_, {}, [&](const auto& v) { return v(0, i); });
+    const double elsewhere =
+        std::ranges::min_element(values_, {}, [&](const auto& v) { return v(0, i); })->operator()(0, i);
+    in_tests_(i, once) = elsewhere;
+    if (flights[static_cast<std::size_t>(largest - values_.begin())]->is_reference()) continue;
+    in_tests_(i, i) = 1;
+    in_tests_(i, 0) = -elsewhere;
   }
 }
 

@@ -47,6 +47,80 @@ RobotFit::RobotFit(const Flights& flights, const sim::Randomisation& uncertain, 
   refit_with_nuisances();
 }
 
+RobotFit::RobotFit(const RobotFit& reference, const Flights& flights)
+    : flights_(flights),
+      uncertain_(reference.uncertain_),
+      withheld_(reference.withheld_),
+      threads_(reference.threads_),
+      fitter_(flights, std::make_shared<const Evidence>(flights, reference.evidence().discrepancy(), threads_),
+              threads_),
+      no_effects_(uncertain_, {}) {
+  linearise_around(reference.parameters_);
+  find_magnitudes();
+  find_nuisances();
+  set_nuisances();
+  Scales scales = find_scales(no_effects_, parameters_, {});
+  // what an effect explains is no difference between sessions
+  scales.session = 1;
+  for (std::size_t b = 0; b < kBlocks; ++b)
+    if (block_of_tests(b)) scales.blocks[b] = 1;
+  for (std::size_t e = 0; e < scales.effects.size(); ++e)
+    if (fitter_.effects()[e].starts_with(kSessionOf)) scales.effects[e] = 1;
+  fitter_ = fitter_.with_scales(scales);
+}
+
+double RobotFit::log_evidence_unchanged() const {
+  constexpr double kNothing = 1e-3;  // changes so many times smaller than those between sessions have no effect
+  ModelDiscrepancy d = evidence().discrepancy();
+  for (auto& channel : d.session.shares)
+    for (auto& harmonic : channel)
+      for (double& share : harmonic) share *= kNothing;
+  for (auto& [effect, sd] : d.session.background) sd *= kNothing;
+  for (auto& [name, sd] : d.session.parameters) sd *= kNothing;
+  const auto unchanged = std::make_shared<const Evidence>(evidence().with_discrepancy(d));
+  std::vector<Background> all = background(d, true);
+  std::ranges::move(session_changes(d.session), std::back_inserter(all));
+  const Fitter fitter = fitter_.with_evidence(unchanged).with_nuisances(nuisance_regressors(), all, parameters_);
+  return unchanged
+      ->weigh(parameters_.statistics, fitter.unscaled_regressors(parameters_), fitter.all_flights(), {},
+              fitter_.scales())
+      .posterior.log_evidence;
+}
+
+/// Learns the noise; fits nothing.
+void RobotFit::linearise_around(const Fit& parameters) {
+  const Directions none{MatrixXd(no_effects_.size(), 0), VectorXd(0)};
+  nominal_ = fitter_.linearise(no_effects_, no_effects_.start(), none);
+  const Residuals residual = fitter_.linearise(no_effects_, parameters.at, none).residual;
+  take_evidence(evidence().with_weights(residual));
+  take_evidence(evidence().with_noise(residual));
+  nominal_.statistics = evidence().statistics(nominal_.residual);
+  parameters_ = fitter_.linearise(no_effects_, parameters.at, parameters.directions);
+  parameters_.posterior = parameters.posterior;
+}
+
+std::vector<Background> RobotFit::session_changes(const SessionVariation& session) const {
+  const RegimeBasis& basis = evidence().basis();
+  std::vector<Background> list;
+  for (Eigen::Index j = 0; j < no_effects_.shared(); ++j) {
+    const double sd = session.parameter_sd(no_effects_.unknowns()[static_cast<std::size_t>(j)].name);
+    if (sd == 0) continue;
+    BasisCoefficients change = BasisCoefficients::Zero(kGroups, basis.size());
+    for (std::size_t d = 0; d < parameters_.columns.size(); ++d)
+      if (parameters_.columns[d].size() > 0)
+        change += parameters_.directions.axes(j, static_cast<Eigen::Index>(d)) * parameters_.columns[d];
+    list.push_back({kSessionParameters, sd * basis.in_tests(change)});
+  }
+  for (std::size_t i = 0; i < sensor_errors_.size(); ++i) {
+    const ModelDiscrepancy::Nuisance& n = evidence().discrepancy().nuisances[i];
+    if (const double sd = session.parameter_sd(n.id + "." + n.value); sd > 0)
+      list.push_back({kSessionParameters, sd * basis.in_tests(sensor_errors_[i])});
+  }
+  for (const MagnitudeColumn& m : magnitudes_)
+    list.push_back({kSessionOf + m.effect, session.background_sd(m.effect) * m.change});
+  return list;
+}
+
 void RobotFit::fit_parameters() {
   const Directions none{MatrixXd(no_effects_.size(), 0), VectorXd(0)};
   nominal_ = fitter_.linearise(no_effects_, no_effects_.start(), none);
@@ -151,7 +225,10 @@ std::vector<Background> RobotFit::background(const ModelDiscrepancy& discrepancy
 }
 
 void RobotFit::set_nuisances() {
-  fitter_ = fitter_.with_nuisances(nuisance_regressors(), background(evidence().discrepancy(), true), parameters_);
+  std::vector<Background> all = background(evidence().discrepancy(), true);
+  if (evidence().contrasts())
+    std::ranges::move(session_changes(evidence().discrepancy().session), std::back_inserter(all));
+  fitter_ = fitter_.with_nuisances(nuisance_regressors(), all, parameters_);
 }
 
 /// Takes what all magnitudes of the catalogue together leave as noise, under every hypothesis.
@@ -271,10 +348,14 @@ std::vector<SensorFinding> RobotFit::sensors(const Fitter& fitter, const Hypothe
   return list;
 }
 
-/// For one step. `there`: residual of a vehicle `steps` steps from that of the parameters.
-BasisCoefficients RobotFit::change(Residuals there, double steps) const {
+/// For one step. `there`: residual of a vehicle `steps` steps from that of the parameters. `in_references`: whether it
+/// changes the reference flights, too.
+BasisCoefficients RobotFit::change(Residuals there, double steps, bool in_references) const {
   for (std::size_t f = 0; f < there.size(); ++f)
-    for (std::size_t k = 0; k < there[f].size(); ++k) there[f][k] = (parameters_.residual[f][k] - there[f][k]) / steps;
+    for (std::size_t k = 0; k < there[f].size(); ++k)
+      there[f][k] = !in_references && evidence().contrasts() && flights_[f]->is_reference()
+                        ? 0
+                        : (parameters_.residual[f][k] - there[f][k]) / steps;
   return evidence().basis_coefficients(there);
 }
 
@@ -287,13 +368,18 @@ void RobotFit::find_magnitudes() {
     for (VehicleHypothesis& v : s.further) vehicles.push_back(std::move(v));
     for (VehicleHypothesis& v : s.near) vehicles.push_back(std::move(v));
   }
-  std::vector<Residuals> rows = residuals(flights_, vehicles, threads_);
-  std::vector<BasisCoefficients> changes(rows.size());  // [vehicle] for the whole step
+  std::vector<Residuals> rows = residuals_with_effects(flights_, vehicles, threads_);
+  std::vector<BasisCoefficients> changes(rows.size());     // [vehicle] for the whole step
+  std::vector<BasisCoefficients> everywhere(rows.size());  // the same with the effect in reference flights, too
   io::parallel_for(rows.size(), threads_, [&](std::size_t i) {
-    if (!rows[i].empty()) changes[i] = change(std::move(rows[i]), 1);
+    if (rows[i].empty()) return;
+    if (evidence().contrasts()) everywhere[i] = change(rows[i], 1);
+    changes[i] = change(std::move(rows[i]), 1, false);
   });
+  if (!evidence().contrasts()) everywhere = changes;
   std::size_t i = 0;
   for (const MagnitudeStep& s : steps) {
+    const BasisCoefficients& whole_step = everywhere[i];
     std::vector<BasisCoefficients> along = {changes[i++]};
     const std::size_t shapes = i;
     i += s.shaped.size();
@@ -304,14 +390,14 @@ void RobotFit::find_magnitudes() {
     magnitudes_.push_back({static_cast<const Magnitude&>(s), along[0] / kMagnitudeReach, {}, {}});
     MagnitudeColumn& m = magnitudes_.back();
     for (std::size_t n = 0; n < s.near.size(); ++n) {
-      const BasisCoefficients& there = changes[near + n];
+      const BasisCoefficients& there = everywhere[near + n];
       m.near.push_back(there.size() > 0 ? BasisCoefficients(there / (n == 0 ? s.near_reach : -s.near_reach))
-                                        : m.change);
+                                        : whole_step / kMagnitudeReach);
     }
-    if (s.near.empty()) m.near.push_back(m.change);
+    if (s.near.empty()) m.near.push_back(whole_step / kMagnitudeReach);
     for (std::size_t k = shapes; k < shapes + s.shaped.size(); ++k)
       if (changes[k].size() > 0)
-        shapes_.push_back({static_cast<const Magnitude&>(s), (changes[k] - along[0]) / kMagnitudeReach, {}, {}});
+        shapes_.push_back({static_cast<const Magnitude&>(s), (everywhere[k] - whole_step) / kMagnitudeReach, {}, {}});
     for (std::size_t n = 1; n + 1 < along.size() && along[n].size() > 0 && along[n + 1].size() > 0; ++n) {
       const double at = kMagnitudeReach * static_cast<double>(n + 1);
       m.large.push_back({at, along[n] / at, (along[n + 1] - along[n - 1]) / (2 * kMagnitudeReach)});

@@ -17,6 +17,9 @@ class RobotFit {
   /// Fits; keeps a reference to `flights`. `withheld`: effects to leave out; `threads`: as for io::parallel_for.
   RobotFit(const Flights& flights, const sim::Randomisation& uncertain, const ModelDiscrepancy& discrepancy,
            std::vector<std::string> withheld, int threads);
+  /// A contrast: `flights` are those of `reference`, set_reference(), and test flights of the same robot. Linearises
+  /// around the parameters of `reference`; an effect's magnitude acts in the test flights alone.
+  RobotFit(const RobotFit& reference, const Flights& flights);
   RobotFit(const RobotFit&) = delete;
   RobotFit& operator=(const RobotFit&) = delete;
 
@@ -36,6 +39,9 @@ class RobotFit {
   /// a magnitude for each wing has two: the difference of the wings, and the part that both share, as an error of a wing
   /// model is the same in both. `shapes`: also with other shape parameters.
   std::vector<Background> background(const ModelDiscrepancy& discrepancy, bool shapes) const;
+  /// Changes between sessions in which nothing that matters changes, of parameters (all named kSessionParameters), of
+  /// sensors, and of each effect's magnitudes (kSessionOf and its name). Only in a contrast.
+  std::vector<Background> session_changes(const SessionVariation& session) const;
   /// Change of the prediction for one prior sd of each error of declared sensors, then of each minor draw of the
   /// vehicle.
   Regressors nuisance_regressors() const;
@@ -49,11 +55,14 @@ class RobotFit {
   /// backgrounds, and with its law factor. `unknown_penalty_nats`: as in Evidence::weigh.
   ScaledEvidence weigh(const Hypothesis& hypothesis, const Fit& fit, const Scales& start,
                        std::optional<double> unknown_penalty_nats = {}) const;
+  /// Evidence of the parameters if nothing at all changed since the reference. Only in a contrast.
+  double log_evidence_unchanged() const;
   /// Scales given a fit: searched from `start`, then from a larger background of one effect while the evidence grows.
   Scales find_scales(const Hypothesis& hypothesis, const Fit& fit, const Scales& start) const;
 
  private:
   void fit_parameters();
+  void linearise_around(const Fit& parameters);
   void refit_with_nuisances();
   void learn_remainder();
   void find_magnitudes();
@@ -67,7 +76,7 @@ class RobotFit {
     fitter_ = fitter_.with_evidence(std::make_shared<const Evidence>(std::move(evidence)));
   }
   std::optional<Scales> larger_effect(const Hypothesis& hypothesis, const Fit& fit, const Scales& now) const;
-  BasisCoefficients change(Residuals there, double steps) const;
+  BasisCoefficients change(Residuals there, double steps, bool in_references = true) const;
 
   const Flights& flights_;
   sim::Randomisation uncertain_;

@@ -62,6 +62,7 @@ Scales strided(const Scales& from, const Scales& to, double stride) {
   const auto go = [&](double a, double b) { return a * std::pow(b / a, stride); };
   Scales s = to;
   s.robot = go(from.robot, to.robot);
+  s.session = go(from.session, to.session);
   for (std::size_t e = 0; e < s.effects.size(); ++e) s.effects[e] = go(from.effects[e], to.effects[e]);
   for (std::size_t b = 0; b < s.blocks.size(); ++b)
     if (!from.free[b] && !to.free[b]) s.blocks[b] = go(from.blocks[b], to.blocks[b]);
@@ -70,9 +71,17 @@ Scales strided(const Scales& from, const Scales& to, double stride) {
 
 }  // namespace
 
-int Evidence::block_of(int group, BasisFunction function) {
+int Evidence::block_of(int group, int function) const {
   const int harmonic = (group % kCoefficients + 1) / 2;
-  return (group / kCoefficients * (kHarmonics + 1) + harmonic) * kClasses + static_cast<int>(regimes_of(function));
+  return (group / kCoefficients * (kHarmonics + 1) + harmonic) * kClasses +
+         (basis().of_tests(function) ? kRegimes : 0) + static_cast<int>(regimes_of(basis().kind(function)));
+}
+
+/// Whether an excess is a sign of an unknown cause. Blocks of few degrees of freedom have tails that hold any model
+/// error; in a contrast these errors cancel in the test flights.
+bool Evidence::may_be_free(std::size_t block) const {
+  if (contrasts()) return block_of_tests(block);
+  return discrepancy_.freedom_of(regimes_of_block(block)) >= discrepancy_.spread.place_freedom;
 }
 
 double Evidence::scale_cost_nats(double times, ScalePrior prior, const Scales& scales) {
@@ -84,7 +93,8 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
                                std::optional<double> unknown_penalty_nats, int max_iterations) const {
   const Index q = basis().size(), k = static_cast<Index>(regressors.columns.size());
   std::vector<double> nu;
-  for (std::size_t b = 0; b < kBlocks; ++b) nu.push_back(discrepancy_.freedom_of(static_cast<Regimes>(b % kClasses)));
+  for (std::size_t b = 0; b < kBlocks; ++b)
+    nu.push_back(block_of_tests(b) ? discrepancy_.session.block_freedom : discrepancy_.freedom_of(regimes_of_block(b)));
   const VectorXd prior_mean = regressors.prior_mean();
   std::vector<int> seen;
   for (int g = 0; g < kGroups; ++g)
@@ -96,7 +106,7 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
   std::vector<Sums> sums(seen.size());
   std::vector<int> counts(kBlocks, 0);
   for (const int g : seen)
-    for (int i = 0; i < basis().size(); ++i) ++counts[static_cast<std::size_t>(block_of(g, basis().kind(i)))];
+    for (int i = 0; i < basis().size(); ++i) ++counts[static_cast<std::size_t>(block_of(g, i))];
   io::parallel_for(seen.size(), threads_, [&](std::size_t n) {
     Sums& s = sums[n];
     auto [normal, right] = sums_of(residual, use, seen[n]);
@@ -147,7 +157,7 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
       h.law_sd = law_sd.size() > 0 ? VectorXd(law_sd.row(seen[n]).transpose()) : VectorXd::Zero(q);
       h.sd.resize(q);
       for (Index i = 0; i < q; ++i) {
-        const int block = block_of(seen[n], basis().kind(static_cast<int>(i)));
+        const int block = block_of(seen[n], static_cast<int>(i));
         h.sd[i] = std::hypot(now.blocks[static_cast<std::size_t>(block)] * s.prior_sd[i], h.law_sd[i]);
       }
       MatrixXd precision = h.sd.asDiagonal() * s.normal * h.sd.asDiagonal();
@@ -170,11 +180,12 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
     ScaledEvidence w{posterior(reduced, chosen, prior_mean), now, 1, BasisCoefficients::Zero(kGroups, q),
                      BasisCoefficients::Zero(kGroups, q)};
     double log_scales = -0.5 * std::pow(std::log(now.robot) / discrepancy_.spread.robot_sd, 2);
+    if (contrasts()) log_scales -= 0.5 * std::pow(std::log(now.session) / discrepancy_.session.scale_sd, 2);
     for (std::size_t b = 0; b < kBlocks; ++b)
       if (counts[b] > 0)
         log_scales += now.free[b]    ? -*unknown_penalty_nats
                       : scales_held_ ? 0
-                                     : log_prior(now.blocks[b], now.robot, nu[b]);
+                                     : log_prior(now.blocks[b], now.centre(b), nu[b]);
     for (std::size_t e = 0; e < of_effect.size(); ++e)
       if (of_effect[e] > 0 && !scales_held_)
         log_scales += log_prior(now.effects[e], now.prior_scale(priors[e]), priors[e].freedom);
@@ -213,8 +224,8 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
     std::vector<double> total(kBlocks, 0);
     for (const int g : seen)
       for (Index i = 0; i < q; ++i)
-        total[static_cast<std::size_t>(block_of(g, basis().kind(static_cast<int>(i))))] += best.squares(g, i);
-    double freedom = 0, inverses = 0;
+        total[static_cast<std::size_t>(block_of(g, static_cast<int>(i)))] += best.squares(g, i);
+    double freedom = 0, inverses = 0, session_freedom = 0, session_inverses = 0;
     if (!scales_held_) {
       std::vector<double> squares(of_effect.size(), 0);
       for (Index i = 0; i < k; ++i)
@@ -230,23 +241,26 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
     }
     for (std::size_t b = 0; b < kBlocks; ++b) {
       if (counts[b] == 0) continue;
-      const double n = counts[b], f2 = next.robot * next.robot;
+      const double n = counts[b], f2 = std::pow(next.centre(b), 2);
       const double bound2 = scales_held_ ? 1 : (total[b] + nu[b] * f2) / (n + nu[b]);
       next.blocks[b] = std::sqrt(bound2);
       next.free[b] = 0;
-      // blocks of few degrees of freedom have tails that hold any model error: an excess is no sign of an unknown cause
-      if (unknown_penalty_nats && nu[b] >= discrepancy_.spread.place_freedom) {
+      if (unknown_penalty_nats && may_be_free(b)) {
         const double free2 = std::max(total[b] / n, kMinFree * kMinFree * f2);
         const auto objective = [&](double s2) { return -0.5 * (n * std::log(s2) + total[b] / s2); };
-        const double bound = scales_held_ ? 0 : log_prior(std::sqrt(bound2), next.robot, nu[b]);
+        const double bound = scales_held_ ? 0 : log_prior(std::sqrt(bound2), next.centre(b), nu[b]);
         if (objective(free2) - *unknown_penalty_nats > objective(bound2) + bound) {
           next.blocks[b] = std::sqrt(free2);
           next.free[b] = 1;
         }
       }
-      if (!next.free[b]) freedom += nu[b], inverses += nu[b] / (next.blocks[b] * next.blocks[b]);
+      if (next.free[b]) continue;
+      const double inverse = nu[b] / (next.blocks[b] * next.blocks[b]);
+      if (block_of_tests(b)) session_freedom += nu[b], session_inverses += inverse;
+      else freedom += nu[b], inverses += inverse;
     }
     if (!scales_held_) next.robot = robot_scale(freedom, inverses, discrepancy_.spread.robot_sd);
+    if (contrasts()) next.session = robot_scale(session_freedom, session_inverses, discrepancy_.session.scale_sd);
     now = strided(best.scales, next, stride);
   }
   return best;

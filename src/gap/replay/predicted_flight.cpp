@@ -1,5 +1,7 @@
 #include "gap/replay/predicted_flight.hpp"
 
+#include <algorithm>
+
 namespace flappy::gap {
 
 const char* channel_name(int channel) {
@@ -16,6 +18,11 @@ const char* channel_unit(int channel) {
   if (channel < kBattery) return "rad";
   if (channel < kPathX) return channel == kBattery ? "V" : "A";
   return channel < kTurnX ? "m/s^2" : "rad/s";
+}
+
+Flights references_of(const Flights& flights) {
+  const auto tests = std::ranges::find_if(flights, [](const auto& f) { return !f->is_reference(); });
+  return tests == flights.end() ? Flights() : Flights(flights.begin(), tests);
 }
 
 }  // namespace flappy::gap

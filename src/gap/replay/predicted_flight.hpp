@@ -47,6 +47,8 @@ struct VehicleHypothesis {
   model::Vehicle vehicle;
   double lag_s = 0;      ///< delay of the sensors relative to the voltages, beyond the latency in the header
   EffectValues sensors;  ///< errors of sensors that the headers do not declare (gap/replay/sensor_correction.hpp)
+  std::vector<double> variates;  ///< draws of the vehicle's parameters: two that are equal differ only in effects
+  EffectValues file_effects;     ///< the effects of the vehicle file, which reference flights keep
 };
 
 /// Kinds of functions of the regime (gap/evidence/evidence.hpp).
@@ -82,6 +84,9 @@ struct RegimeQuantity {
 class PredictedFlight {
  public:
   virtual ~PredictedFlight() = default;
+  /// Whether the flight is a reference: the robot is believed to have been free of the effects asked about.
+  bool is_reference() const { return reference_; }
+  void set_reference() { reference_ = true; }
   virtual const std::string& name() const = 0;
   virtual std::size_t beats() const = 0;
   virtual double beats_Hz() const = 0;
@@ -111,9 +116,14 @@ class PredictedFlight {
   /// The same beats with the given errors of sensors undone in the log. Null for beat-averaged vehicles, whose
   /// prediction includes the effects of their sensors.
   virtual std::shared_ptr<const PredictedFlight> corrected(const EffectValues& /*sensors*/) const { return nullptr; }
+
+ private:
+  bool reference_ = false;
 };
 
-/// The flights of one robot.
+/// The flights of one robot; in a contrast, references and then test flights.
 using Flights = std::vector<std::shared_ptr<const PredictedFlight>>;
+/// The references; none if there are no test flights to compare with them.
+Flights references_of(const Flights& flights);
 
 }  // namespace flappy::gap

@@ -34,6 +34,33 @@ EffectValues sensors_of(const VehicleHypothesis& h) {
 }  // namespace
 
 std::vector<Residuals> residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads) {
+  const Flights references = references_of(flights);
+  const Flights tests(flights.begin() + static_cast<std::ptrdiff_t>(references.size()), flights.end());
+  if (references.empty()) return residuals_with_effects(flights, vehicles, threads);
+  // vehicles that differ only in effects share one prediction of the references
+  std::vector<VehicleHypothesis> without;
+  std::vector<std::size_t> shared;
+  for (const VehicleHypothesis& v : vehicles) {
+    const auto same = std::ranges::find_if(without, [&](const VehicleHypothesis& other) {
+      return other.variates == v.variates && other.lag_s == v.lag_s && other.sensors == v.sensors;
+    });
+    shared.push_back(static_cast<std::size_t>(same - without.begin()));
+    if (same != without.end()) continue;
+    without.push_back(v);
+    without.back().vehicle.effects = v.file_effects;
+  }
+  const std::vector<Residuals> of_references = residuals_with_effects(references, without, threads);
+  std::vector<Residuals> list = residuals_with_effects(tests, vehicles, threads);
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const Residuals& reference = of_references[shared[i]];
+    if (reference.empty()) list[i].clear();
+    if (!list[i].empty()) list[i].insert(list[i].begin(), reference.begin(), reference.end());
+  }
+  return list;
+}
+
+std::vector<Residuals> residuals_with_effects(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles,
+                                              int threads) {
   // vehicles with the same errors of sensors share a corrected log
   std::map<EffectValues, std::vector<std::size_t>> by_sensors;
   for (std::size_t i = 0; i < vehicles.size(); ++i) by_sensors[sensors_of(vehicles[i])].push_back(i);

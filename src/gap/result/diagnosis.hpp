@@ -22,7 +22,8 @@ struct Closure {
 };
 
 /// none: the file explains the flights; parameters: with other parameters; effect: effects of the catalogue are missing
-/// in it; unknown: something else is.
+/// in it; unknown: something else is. In a contrast: nothing changed since the reference; no more than sessions differ
+/// by; effects appeared; something else did.
 enum class HypothesisKind { none, parameters, effect, unknown };
 
 /// One of the hypotheses that exclude each other; their probabilities add up to 1.
@@ -136,6 +137,8 @@ struct Validation {
 
 struct Diagnosis {
   std::vector<std::string> flights;          ///< folders of the logs
+  std::vector<std::string> reference;        ///< folders of the reference's logs; empty: no contrast
+  std::vector<std::string> warnings;         ///< what makes the answer less sure, one line each
   std::vector<flightlog::DataFault> faults;  ///< if not empty, nothing was diagnosed
   bool complete = true;                      ///< false: stopped before every effect was weighed
   Verdict verdict;

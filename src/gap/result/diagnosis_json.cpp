@@ -189,6 +189,8 @@ NextExperiment next_of(const Json& json) {
 Diagnosis read(const Json& json) {
   Diagnosis d;
   d.flights = json.at("flights");
+  d.reference = json.value("reference", std::vector<std::string>());
+  d.warnings = json.value("warnings", std::vector<std::string>());
   for (const Json& f : json.at("data_faults")) d.faults.push_back({f.at("file"), f.at("line"), f.at("what")});
   d.complete = json.at("complete");
   const Json& verdict = json.at("verdict");
@@ -237,6 +239,8 @@ Json to_json(const Diagnosis& d) {
                            {"corrected", finite(c.corrected)}});
   return {{"schema", kDiagnosisSchema},
           {"flights", d.flights},
+          {"reference", d.reference},
+          {"warnings", d.warnings},
           {"data_faults", faults},
           {"complete", d.complete},
           {"verdict",

@@ -116,7 +116,7 @@ TEST(Evidence, ScalesTheDiscrepancyByBlocks) {
   EXPECT_DOUBLE_EQ(sd(group, 1), evidence.signal(group) * discrepancy.share(kForceZ, 0, BasisFunction::input));
   Scales scales;
   scales.blocks.assign(kBlocks, 1);
-  scales.blocks[static_cast<std::size_t>(Evidence::block_of(group, BasisFunction::input))] = 3;
+  scales.blocks[static_cast<std::size_t>(evidence.block_of(group, 1))] = 3;
   const BasisCoefficients scaled = evidence.discrepancy_sd(scales);
   EXPECT_DOUBLE_EQ(scaled(group, 1), 3 * sd(group, 1));
   EXPECT_EQ(scaled(group, 0), sd(group, 0));

@@ -34,5 +34,33 @@ TEST(LearnDiscrepancy, FindsHowFarModelsAreOff) {
   EXPECT_LE(learnt.background_sd("wind"), std::max(start.background_sd("wind"), 0.3));
 }
 
+// Models are off by 6 % of the signal, the same in both sessions of a robot; sessions differ by 1 %.
+TEST(LearnSessions, FindsHowMuchLessSessionsDiffer) {
+  const sim::Randomisation priors = synthetic_priors();
+  std::mt19937_64 random(12);
+  std::normal_distribution<double> normal(0, SyntheticFlight::kSignal);
+  std::vector<Flights> pairs;
+  for (int r = 0; r < 8; ++r) {
+    const double off = 0.06 * normal(random), changed = 0.01 * normal(random);
+    pairs.emplace_back();
+    for (int f = 0; f < 2; ++f) {
+      const auto flight =
+          std::make_shared<SyntheticFlight>("robot", static_cast<std::uint64_t>(2 * r + f + 1), synthetic_law);
+      flight->fly({synthetic_vehicle()});
+      flight->add_measured(kForceZ, 0, (off + f * changed) * flight->velocity);
+      if (f == 0) flight->set_reference();
+      pairs.back().push_back(flight);
+    }
+  }
+  ModelDiscrepancy start = read_model_discrepancy();
+  start.nuisances.clear();
+  start.session = read_session_variation();
+  const SessionVariation learnt = learn_sessions(pairs, priors, start, 2);
+  const double share = share_of(learnt.shares, kForceZ, 0, BasisFunction::velocity_x);
+  EXPECT_GT(share, 0.004);
+  EXPECT_LT(share, 0.02);
+  EXPECT_LT(share_of(learnt.shares, kTorqueY, 1, BasisFunction::velocity_x), 0.5 * share);
+}
+
 }  // namespace
 }  // namespace flappy::gap::learn_discrepancy_test

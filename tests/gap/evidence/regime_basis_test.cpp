@@ -54,5 +54,28 @@ TEST(RegimeBasis, LeavesOutWhatNeverChanges) {
   EXPECT_EQ(basis.size(), 4);
 }
 
+// A change of all flights, written with functions of the tests alone, is the same change there and none in the references.
+TEST(RegimeBasis, HasFunctionsOfTheTestsAgain) {
+  const auto made = synthetic_flights(4, synthetic_law);
+  made[0]->set_reference();
+  made[1]->set_reference();
+  const RegimeBasis basis(as_flights(made));
+  // constant, four functions, offsets of the second reference and the second test, two products; all but the offsets again
+  ASSERT_EQ(basis.size(), 9 + 7);
+  ASSERT_TRUE(basis.contrasts());
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  Eigen::MatrixXd change(1, basis.size());
+  for (int i = 0; i < basis.size(); ++i) change(0, i) = normal(random);
+  const Eigen::MatrixXd in_tests = basis.in_tests(change);
+  for (std::size_t f = 0; f < 4; ++f) {
+    const Eigen::VectorXd all = basis.values(f) * change.transpose(), part = basis.values(f) * in_tests.transpose();
+    EXPECT_LT((part - (f < 2 ? 0.0 : 1.0) * all).cwiseAbs().maxCoeff(), 1e-12) << f;
+  }
+  made[2]->set_reference();
+  made[3]->set_reference();
+  EXPECT_FALSE(RegimeBasis(as_flights(made)).contrasts()) << "nothing to compare with";
+}
+
 }  // namespace
 }  // namespace flappy::gap::regime_basis_test

@@ -114,5 +114,57 @@ TEST_F(RobotFits, ReportsTheLagAndErrorsOfSensors) {
   EXPECT_NEAR(found.front().sd, found.front().prior_sd, 1e-9) << "these flights say nothing of it";
 }
 
+TEST(Residuals, OfReferencesAreWithoutEffects) {
+  const sim::Randomisation priors = synthetic_priors();
+  const auto made = synthetic_flights(3, synthetic_law);
+  for (std::size_t f = 0; f < 2; ++f) made[f]->set_reference();
+  const Flights flights = as_flights(made);
+  const Hypothesis wind(priors, {"wind"});
+  Eigen::VectorXd at = wind.start(), windy = at;
+  windy[2] = 1;
+  const std::vector<Residuals> r = residuals(flights, {wind.vehicle(at), wind.vehicle(windy)}, 1);
+  EXPECT_EQ(r[0][0], r[1][0]);
+  EXPECT_EQ(r[0][1], r[1][1]);
+  EXPECT_NE(r[0][2], r[1][2]);
+  EXPECT_EQ(made[0]->predicted, 1u) << "both vehicles share one prediction";
+  const std::vector<Residuals> everywhere = residuals_with_effects(flights, {wind.vehicle(at), wind.vehicle(windy)}, 1);
+  EXPECT_NE(everywhere[0][0], everywhere[1][0]);
+  EXPECT_EQ(everywhere[1][2], r[1][2]);
+}
+
+// The model is off by something that follows the velocity as wind does, in all flights. Wind appears in the tests alone.
+TEST(Contrast, TellsWhatAppearedFromWhatWasAlwaysOff) {
+  const sim::Randomisation priors = synthetic_priors();
+  const Hypothesis none(priors, {}), wind(priors, {"wind"});
+  const auto flown = [&](double appears) {
+    auto made = synthetic_flights(4, synthetic_law);
+    for (std::size_t f = 0; f < 4; ++f) {
+      Eigen::VectorXd at = wind.start();
+      at[0] = 0.7;
+      at[2] = f < 2 ? 0 : appears;
+      made[f]->fly(wind.vehicle(at));
+      made[f]->add_measured(kForceX, 0, 0.3 * made[f]->velocity);
+      if (f < 2) made[f]->set_reference();
+    }
+    return made;
+  };
+  const auto gain = [&](double appears) {
+    const auto made = flown(appears);
+    const Flights flights = as_flights(made);
+    ModelDiscrepancy discrepancy = read_model_discrepancy();
+    discrepancy.session = read_session_variation();
+    const Flights references = references_of(flights);
+    const RobotFit robot(RobotFit(references, priors, discrepancy, {}, 2), flights);
+    const Hypothesis h(robot.uncertain(), {"wind"});
+    const Fit fit = robot.fitter().fit_effects(h, h.start(), robot.parameters());
+    if (appears != 0) EXPECT_NEAR(fit.mean()[2], appears, 4 * std::sqrt(fit.covariance()(2, 2)));
+    const Scales& scales = robot.fitter().scales();
+    return robot.weigh(h, fit, scales).posterior.log_evidence -
+           robot.weigh(robot.no_effects(), robot.parameters(), scales).posterior.log_evidence;
+  };
+  EXPECT_GT(gain(0.3), 10);
+  EXPECT_LT(gain(0), 1);
+}
+
 }  // namespace
 }  // namespace flappy::gap::robot_fit_test

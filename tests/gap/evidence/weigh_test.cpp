@@ -29,11 +29,11 @@ TEST_F(Weigh, FindsHowFarModelsOfARobotAreOff) {
   const Evidence evidence(flights_, discrepancy, 1);
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
-  const int freed = Evidence::block_of(group_index(kForceZ, 0), BasisFunction::input);
+  const int freed = evidence.block_of(group_index(kForceZ, 0), 1);
   BasisCoefficients delta = evidence.discrepancy_sd({});
   for (int g = 0; g < kGroups; ++g)
     for (int i = 0; i < evidence.basis().size(); ++i)
-      delta(g, i) *= (Evidence::block_of(g, evidence.basis().kind(i)) == freed ? 90 : 3) * normal(random);
+      delta(g, i) *= (evidence.block_of(g, i) == freed ? 90 : 3) * normal(random);
   const SufficientStatistics s = statistics_of(evidence, flights_, delta);
   const auto weigh = [&](std::optional<double> penalty, int iterations) {
     return evidence.weigh(s, {}, {1}, {}, Scales{}, penalty, iterations);
@@ -102,8 +102,8 @@ TEST_F(Weigh, TakesWhatLawsGetWrong) {
   const ScaledEvidence without = evidence.weigh(s, {}, {1}, {}, Scales{});
   const ScaledEvidence with = evidence.weigh(s, {}, {1}, delta.cwiseAbs(), Scales{});
   EXPECT_GT(with.posterior.log_evidence, without.posterior.log_evidence + 5);
-  EXPECT_LT(with.scales.blocks[static_cast<std::size_t>(Evidence::block_of(group, BasisFunction::place))],
-            without.scales.blocks[static_cast<std::size_t>(Evidence::block_of(group, BasisFunction::place))]);
+  EXPECT_LT(with.scales.blocks[static_cast<std::size_t>(evidence.block_of(group, 3))],
+            without.scales.blocks[static_cast<std::size_t>(evidence.block_of(group, 3))]);
 }
 
 // With all scales 1 the evidence is that of the closed form, and the prior of the scales costs nothing.

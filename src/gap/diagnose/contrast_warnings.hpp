@@ -1,0 +1,19 @@
+// What makes reference flights a poor measure for test flights.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "flightlog/flight_log.hpp"
+#include "gap/replay/predicted_flight.hpp"
+
+namespace flappy::gap {
+
+/// Throws io::InputError if the flights do not have the same streams. `headers`: of references, then of test flights;
+/// `folders`: for messages.
+void check_same_streams(const std::vector<flightlog::FlightHeader>& headers, const std::vector<std::string>& folders);
+
+/// One line each, with what it costs the answer: another vehicle file, other sensors, too short, other regimes.
+std::vector<std::string> contrast_warnings(const std::vector<flightlog::FlightHeader>& headers, const Flights& flights);
+
+}  // namespace flappy::gap

@@ -1,0 +1,53 @@
+#include "gap/evidence/discrepancy_shares.hpp"
+
+#include "io/text.hpp"
+
+namespace flappy::gap {
+namespace {
+
+using enum BasisFunction;
+constexpr std::pair<BasisFunction, const char*> kShareKeys[] = {
+    {constant, "constant"},     {input, "input"},           {rate, "rate"},
+    {product, "product"},       {place, "place"},           {flight, "flight"},
+    {velocity_x, "velocity_x"}, {velocity_y, "velocity_y"}, {velocity_z, "velocity_z"},
+    {drag_x, "drag_x"},         {drag_y, "drag_y"},         {drag_z, "drag_z"}};
+
+constexpr const char* kSharesHead =
+    R"(# Prior standard deviation of the coefficients of the regime basis, as a share of the channel's signal, for harmonics 0 (the mean) to 4 of the beat.
+# Rows are kinds of functions: constant; the inputs; the rates of the body; products with an input; the place (height, heading, time, nearness of
+# surfaces); an offset of each flight (a warm sensor, another day's battery); the velocity v in B; and |v| v.
+)";
+
+}  // namespace
+
+Shares read_shares(const io::Table& root) {
+  Shares shares{};
+  for (int channel = 0; channel < kChannels; ++channel) {
+    const io::Table share = root.table("share");
+    const io::Table table =
+        share.table(share.has(channel_name(channel)) || !share.has("all") ? channel_name(channel) : "all");
+    for (const auto& [function, key] : kShareKeys) {
+      const std::vector<double> by_harmonic = table.numbers(key, kHarmonics + 1, io::positive());
+      for (std::size_t h = 0; h <= kHarmonics; ++h)
+        shares[static_cast<std::size_t>(channel)][h][static_cast<std::size_t>(function)] = by_harmonic[h];
+    }
+  }
+  return shares;
+}
+
+std::string shares_text(const Shares& shares) {
+  std::string text = kSharesHead;
+  for (int channel = 0; channel < kChannels; ++channel) {
+    text += std::string("[share.") + channel_name(channel) + "]\n";
+    for (const auto& [function, key] : kShareKeys) {
+      text += std::string(key) + " = [";
+      for (int h = 0; h <= kHarmonics; ++h)
+        text += (h > 0 ? ", " : "") + io::format("%.4g", share_of(shares, channel, h, function));
+      text += "]\n";
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace flappy::gap

@@ -1,0 +1,27 @@
+// Prior standard deviations of the coefficients of a regime basis, as shares of the signal of their channel.
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "gap/replay/predicted_flight.hpp"
+#include "io/config.hpp"
+
+namespace flappy::gap {
+
+/// [channel][harmonic][kind of function].
+using Shares =
+    std::array<std::array<std::array<double, static_cast<std::size_t>(BasisFunction::count)>, kHarmonics + 1>,
+               kChannels>;
+
+inline double share_of(const Shares& shares, int channel, int harmonic, BasisFunction function) {
+  return shares[static_cast<std::size_t>(channel)][static_cast<std::size_t>(harmonic)]
+               [static_cast<std::size_t>(function)];
+}
+
+/// Reads the tables [share.CHANNEL], or [share.all] for channels without one. io::InputError with file and line.
+Shares read_shares(const io::Table& root);
+/// Text of these tables.
+std::string shares_text(const Shares& shares);
+
+}  // namespace flappy::gap

@@ -1,0 +1,79 @@
+#include "gap/evidence/session_variation.hpp"
+
+#include <algorithm>
+
+#include "io/text.hpp"
+#include "model/effects/registry.hpp"
+
+namespace flappy::gap {
+namespace {
+
+constexpr const char* kSessionHead =
+    R"(# What differs between two sessions of flights of one robot in which nothing that matters has changed. An effect that is named by contrast with
+# reference flights has to explain more than this. Read by flappy-gap diagnose --reference, written by flappy-gap learn-discrepancy --pairs.
+#
+# Learnt from )";
+constexpr const char* kSessionSpread =
+    R"(# scale_sd: standard deviation of the logarithm of the scale of a pair of sessions. block_freedom, effect_freedom: degrees of freedom of the scales of
+# single blocks and of single effects; high, for no session differs by a hundred times as much as others. Choices.
+# law_error: how far another law of the same cause deviates from that of the catalogue, as a share of the change by the effect.
+)";
+constexpr const char* kSessionParametersHead =
+    R"(# Prior standard deviation of the change of a parameter, in standard deviations of its prior (configs/gap/priors.toml), by a part of its name.
+# Weather: density by 1 %. A battery put back: mass by 0.5 %, centre of mass by 0.1 mm. Temperature of the motors: resistance by 2.5 %, torque constant
+# by 0.3 %. Wear and grease: friction and damping by 7 %. A hinge that was touched: rest angle by 0.3 degrees. The IMU and the markers are taken off and
+# put back: mounting by a tenth of its prior. Clocks drift with temperature. Choices, made before any session was seen.
+)";
+constexpr const char* kSessionBackground =
+    R"(# Prior standard deviation of the change of each effect's magnitude from session to session, in coordinates of the effect (1: the prior of the
+# catalogue). `other`: for effects that are not listed.
+)";
+
+}  // namespace
+
+double SessionVariation::parameter_sd(const std::string& name) const {
+  const auto at =
+      std::ranges::find_if(parameters, [&](const auto& p) { return name.find(p.first) != std::string::npos; });
+  return at == parameters.end() ? 0 : at->second;
+}
+
+double SessionVariation::background_sd(const std::string& effect) const {
+  const auto at = background.find(effect);
+  return at != background.end() ? at->second : background.at("other");
+}
+
+std::string session_text(const SessionVariation& s, const std::string& learnt) {
+  const auto number = [](double v) { return io::format("%.4g", v); };
+  std::string text = kSessionHead + learnt + ".\nschema = 1\n\n" + kSessionSpread +
+                     "[spread]\nscale_sd = " + number(s.scale_sd) + "\nblock_freedom = " + number(s.block_freedom) +
+                     "\neffect_freedom = " + number(s.effect_freedom) + "\nlaw_error = " + number(s.law_error) +
+                     "\n\n" + kSessionParametersHead + "[parameters]\n";
+  for (const auto& [name, sd] : s.parameters) text += "\"" + name + "\" = " + number(sd) + "\n";
+  text += "\n" + shares_text(s.shares) + kSessionBackground + "[background_sd]\n";
+  for (const auto& [effect, sd] : s.background) text += effect + " = " + number(sd) + "\n";
+  return text;
+}
+
+SessionVariation read_session_variation(const std::filesystem::path& path) {
+  const io::Config config = io::Config::load(path);
+  const io::Table root = config.root();
+  root.schema(1);
+  SessionVariation s;
+  const io::Table spread = root.table("spread");
+  s.scale_sd = spread.number("scale_sd", io::positive());
+  s.block_freedom = spread.number("block_freedom", io::positive());
+  s.effect_freedom = spread.number("effect_freedom", io::positive());
+  s.law_error = spread.number("law_error", io::positive());
+  const io::Table parameters = root.table("parameters");
+  for (const std::string& key : parameters.keys())
+    s.parameters.emplace_back(key, parameters.number(key, io::positive()));
+  s.shares = read_shares(root);
+  const io::Table background = root.table("background_sd");
+  s.background["other"] = background.number("other", io::positive());
+  for (const std::string& key : background.keys())
+    if (key == "other" || model::is_effect(key)) s.background[key] = background.number(key, io::positive());
+  root.finish();
+  return s;
+}
+
+}  // namespace flappy::gap
