@@ -41,8 +41,7 @@ void check_same_streams(const std::vector<flightlog::FlightHeader>& headers, con
 std::vector<std::string> contrast_warnings(const std::vector<flightlog::FlightHeader>& headers,
                                            const Flights& flights) {
   std::vector<std::string> lines;
-  const Flights references = references_of(flights);
-  const Flights tests(flights.begin() + static_cast<std::ptrdiff_t>(references.size()), flights.end());
+  const Flights references = references_of(flights), tests = tests_of(flights);
   const auto differs = [&](const auto& same) {
     return !std::ranges::all_of(headers, [&](const auto& h) { return same(h, headers.front()); });
   };

@@ -87,9 +87,7 @@ Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flig
   r.verdict = d.verdict;
   r.validation = d.validation;
   r.untestable = d.untestable;
-  Flights tests = flights;
-  std::erase_if(tests, [](const auto& f) { return f->is_reference(); });
-  const RowContext context = row_context_of(tests, d.noise_sd);
+  const RowContext context = row_context_of(tests_of(flights), d.noise_sd);
   add_hypotheses(context, uncertain, d, r);
 
   const ScoredHypothesis& concluded = d.conclusion();

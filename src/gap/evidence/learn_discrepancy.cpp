@@ -143,14 +143,10 @@ void take(const ShareMoments& moments, const std::map<std::string, Moment>& back
 void expect_sessions(const Robots& pairs, const ModelDiscrepancy& now, ShareMoments& shares,
                      std::map<std::string, Moment>& backgrounds) {
   for (const auto& pair : pairs) {
-    const auto evidence = std::make_shared<const Evidence>(pair->evidence().with_discrepancy(now));
-    std::vector<Background> all = pair->background(now, true);
-    std::ranges::move(pair->session_changes(now.session), std::back_inserter(all));
-    const Fitter fitter =
-        pair->fitter().with_evidence(evidence).with_nuisances(pair->nuisance_regressors(), all, pair->parameters());
+    const Fitter fitter = pair->fitter_given(now);
     const Regressors r = fitter.unscaled_regressors(pair->parameters());
     const ScaledEvidence w =
-        evidence->weigh(pair->parameters().statistics, r, fitter.all_flights(), {}, pair->fitter().scales(), {}, 1);
+        fitter.evidence().weigh(pair->parameters().statistics, r, fitter.all_flights(), {}, fitter.scales(), {}, 1);
     for (std::size_t k = 0; k < r.effects.size(); ++k) {
       if (r.effects[k] < 0) continue;
       const std::string& name = fitter.effects()[static_cast<std::size_t>(r.effects[k])];
@@ -161,7 +157,7 @@ void expect_sessions(const Robots& pairs, const ModelDiscrepancy& now, ShareMome
                                  (w.posterior.mean[i] * w.posterior.mean[i] + w.posterior.covariance(i, i));
       backgrounds[effect].count += 1;
     }
-    const RegimeBasis& basis = evidence->basis();
+    const RegimeBasis& basis = fitter.evidence().basis();
     for (int g = 0; g < kGroups; ++g)
       for (int i = 0; i < basis.size(); ++i) {
         if (!basis.of_tests(i) || w.squares(g, i) == 0) continue;

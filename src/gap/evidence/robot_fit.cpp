@@ -77,14 +77,23 @@ double RobotFit::log_evidence_unchanged() const {
       for (double& share : harmonic) share *= kNothing;
   for (auto& [effect, sd] : d.session.background) sd *= kNothing;
   for (auto& [name, sd] : d.session.parameters) sd *= kNothing;
-  const auto unchanged = std::make_shared<const Evidence>(evidence().with_discrepancy(d));
-  std::vector<Background> all = background(d, true);
-  std::ranges::move(session_changes(d.session), std::back_inserter(all));
-  const Fitter fitter = fitter_.with_evidence(unchanged).with_nuisances(nuisance_regressors(), all, parameters_);
-  return unchanged
-      ->weigh(parameters_.statistics, fitter.unscaled_regressors(parameters_), fitter.all_flights(), {},
-              fitter_.scales())
+  const Fitter unchanged = fitter_given(d);
+  return unchanged.evidence()
+      .weigh(parameters_.statistics, unchanged.unscaled_regressors(parameters_), unchanged.all_flights(), {},
+             unchanged.scales())
       .posterior.log_evidence;
+}
+
+Fitter RobotFit::fitter_given(const ModelDiscrepancy& discrepancy) const {
+  return fitter_.with_evidence(std::make_shared<const Evidence>(evidence().with_discrepancy(discrepancy)))
+      .with_nuisances(nuisance_regressors(), all_backgrounds(discrepancy), parameters_);
+}
+
+/// With shapes, and in a contrast with changes between sessions.
+std::vector<Background> RobotFit::all_backgrounds(const ModelDiscrepancy& discrepancy) const {
+  std::vector<Background> all = background(discrepancy, true);
+  if (evidence().contrasts()) std::ranges::move(session_changes(discrepancy.session), std::back_inserter(all));
+  return all;
 }
 
 /// Learns the noise; fits nothing.
@@ -225,10 +234,7 @@ std::vector<Background> RobotFit::background(const ModelDiscrepancy& discrepancy
 }
 
 void RobotFit::set_nuisances() {
-  std::vector<Background> all = background(evidence().discrepancy(), true);
-  if (evidence().contrasts())
-    std::ranges::move(session_changes(evidence().discrepancy().session), std::back_inserter(all));
-  fitter_ = fitter_.with_nuisances(nuisance_regressors(), all, parameters_);
+  fitter_ = fitter_.with_nuisances(nuisance_regressors(), all_backgrounds(evidence().discrepancy()), parameters_);
 }
 
 /// Takes what all magnitudes of the catalogue together leave as noise, under every hypothesis.

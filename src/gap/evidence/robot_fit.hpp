@@ -55,6 +55,8 @@ class RobotFit {
   /// backgrounds, and with its law factor. `unknown_penalty_nats`: as in Evidence::weigh.
   ScaledEvidence weigh(const Hypothesis& hypothesis, const Fit& fit, const Scales& start,
                        std::optional<double> unknown_penalty_nats = {}) const;
+  /// As fitter(), with the priors of another model discrepancy. Only in a contrast.
+  Fitter fitter_given(const ModelDiscrepancy& discrepancy) const;
   /// Evidence of the parameters if nothing at all changed since the reference. Only in a contrast.
   double log_evidence_unchanged() const;
   /// Scales given a fit: searched from `start`, then from a larger background of one effect while the evidence grows.
@@ -63,6 +65,7 @@ class RobotFit {
  private:
   void fit_parameters();
   void linearise_around(const Fit& parameters);
+  std::vector<Background> all_backgrounds(const ModelDiscrepancy& discrepancy) const;
   void refit_with_nuisances();
   void learn_remainder();
   void find_magnitudes();

@@ -125,5 +125,7 @@ class PredictedFlight {
 using Flights = std::vector<std::shared_ptr<const PredictedFlight>>;
 /// The references; none if there are no test flights to compare with them.
 Flights references_of(const Flights& flights);
+/// The flights that are no references_of().
+Flights tests_of(const Flights& flights);
 
 }  // namespace flappy::gap

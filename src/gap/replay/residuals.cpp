@@ -34,8 +34,7 @@ EffectValues sensors_of(const VehicleHypothesis& h) {
 }  // namespace
 
 std::vector<Residuals> residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads) {
-  const Flights references = references_of(flights);
-  const Flights tests(flights.begin() + static_cast<std::ptrdiff_t>(references.size()), flights.end());
+  const Flights references = references_of(flights), tests = tests_of(flights);
   if (references.empty()) return residuals_with_effects(flights, vehicles, threads);
   // vehicles that differ only in effects share one prediction of the references
   std::vector<VehicleHypothesis> without;
