@@ -92,11 +92,10 @@ DiagnosisRequest read_request(const DiagnosisSettings& s) {
   }
   options.withheld = s.withheld;
   options.discrepancy = read_model_discrepancy(file(s.discrepancy, "model_discrepancy.toml"));
-  options.rule = read_verdict_rule(file(s.verdict, "verdict.toml"));
-  if (!s.reference.empty()) {
+  const bool contrast = !s.reference.empty() && !beat_averaged;
+  options.rule = read_verdict_rule(file(s.verdict, contrast ? "contrast_verdict.toml" : "verdict.toml"));
+  if (!s.reference.empty())
     options.discrepancy.session = s.sessions.empty() ? read_session_variation() : read_session_variation(s.sessions);
-    options.rule.gain.by_chance_nats = options.rule.gain.outside_by_chance_nats;  // errors of models cancel
-  }
   return {s,
           std::move(vehicle),
           std::move(uncertain),

@@ -196,7 +196,7 @@ std::vector<Residuals> held_out(const Fitter& fitter, const Flights& flights, co
       for (std::size_t f = 0; folds > 1 && f < flights.size(); ++f) others[f] = fold[f] != static_cast<int>(k) ? 1 : 0;
       Fitter::JointFit joint = fitter.joint_fit(fit.hypothesis, *fit.fit, others);
       vehicles.push_back(fit.hypothesis.vehicle(joint.at));
-      nuisances.push_back(std::move(joint.nuisances));
+      nuisances.push_back(joint.nuisances + joint.shared);
     }
   const Evidence& evidence = fitter.evidence();
   std::vector<Residuals> rows = residuals(flights, vehicles, threads);

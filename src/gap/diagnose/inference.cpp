@@ -80,10 +80,11 @@ Inference infer(const Flights& flights, const sim::Randomisation& uncertain, con
 
   progress(0, "fitting parameters");
   const Flights references = references_of(flights);
-  const auto fit = [&](const Flights& to) {
-    return RobotFit(to, uncertain, options.discrepancy, options.withheld, threads);
-  };
-  const RobotFit robot = references.empty() ? fit(flights) : RobotFit(fit(references), flights);
+  const RobotFit robot =
+      references.empty()
+          ? RobotFit(flights, uncertain, options.discrepancy, options.withheld, threads)
+          : RobotFit(RobotFit::of_references(references, uncertain, options.discrepancy, options.withheld, threads),
+                     flights);
   const Baselines baselines = weigh_baselines(robot, rule);
 
   progress(0.3, "screening effects");

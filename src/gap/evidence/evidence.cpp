@@ -344,6 +344,20 @@ Reduced Evidence::reduce(const SufficientStatistics& residual, const std::vector
   return result;
 }
 
+BasisCoefficients Evidence::discrepancy_mean(const SufficientStatistics& residual, const BasisCoefficients& explained,
+                                             const std::vector<char>& use,
+                                             const BasisCoefficients& discrepancy_sd) const {
+  BasisCoefficients mean = BasisCoefficients::Zero(kGroups, basis().size());
+  for (int g = 0; g < kGroups; ++g) {
+    const auto [normal, right] = sums_of(residual, use, g);
+    if (normal(0, 0) == 0) continue;  // no rows
+    const WithoutDiscrepancy without(normal, discrepancy_sd.row(g).transpose());
+    const VectorXd half = without.of(right - normal * explained.row(g).transpose());
+    mean.row(g) = without.sd.cwiseProduct(without.llt.matrixU().solve(half)).transpose();
+  }
+  return mean;
+}
+
 Posterior Evidence::posterior(const Reduced& reduced, const std::vector<int>& chosen, const VectorXd& prior_mean,
                               bool covariance) {
   const Index k = static_cast<Index>(chosen.size()), last = reduced.sums.rows() - 1;

@@ -150,6 +150,9 @@ class Evidence {
   Reduced reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& regressors,
                  const std::vector<char>& use, const BasisCoefficients& discrepancy_sd,
                  const Eigen::MatrixXd* known = nullptr) const;
+  /// Posterior mean of the discrepancy coefficients, [group][basis], given what else explains the residual.
+  BasisCoefficients discrepancy_mean(const SufficientStatistics& residual, const BasisCoefficients& explained,
+                                     const std::vector<char>& use, const BasisCoefficients& discrepancy_sd) const;
   /// Posterior of the chosen regressors' coefficients, with prior standard deviation 1.
   static Posterior posterior(const Reduced& reduced, const std::vector<int>& chosen, const Eigen::VectorXd& prior_mean,
                              bool covariance = true);

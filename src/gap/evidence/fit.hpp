@@ -80,10 +80,11 @@ class Fitter {
 
   /// Posterior along all directions of a fit, from some flights alone. `use`: [flight] whether it counts.
   Posterior posterior(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
-  /// The most probable coordinates from some flights alone, and the part of the residual that nuisances then explain.
+  /// The most probable coordinates from some flights alone, and the parts of the residual that nuisances then explain
+  /// and, in a contrast, the discrepancy that references and test flights share.
   struct JointFit {
     Eigen::VectorXd at;
-    BasisCoefficients nuisances;
+    BasisCoefficients nuisances, shared;
   };
   JointFit joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use,
                      bool with_background = true) const;

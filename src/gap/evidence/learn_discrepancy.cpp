@@ -212,7 +212,7 @@ SessionVariation learn_sessions(const std::vector<Flights>& flights, const sim::
   for (std::size_t i = 0; i < flights.size() && !io::interrupted(); ++i) {
     line.show(static_cast<double>(i) / static_cast<double>(flights.size()), "fitting pair " + std::to_string(i + 1));
     pairs.push_back(std::make_unique<const RobotFit>(
-        RobotFit(references_of(flights[i]), uncertain, start, std::vector<std::string>(), threads), flights[i]));
+        RobotFit::of_references(references_of(flights[i]), uncertain, start, {}, threads), flights[i]));
   }
   if (io::interrupted()) throw io::InputError("stopped: nothing was learnt; accepted: all pairs");
   ModelDiscrepancy now = start;

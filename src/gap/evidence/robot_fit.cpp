@@ -35,8 +35,8 @@ bool of_sides(const model::CatalogueEffect& effect) {
 
 }  // namespace
 
-RobotFit::RobotFit(const Flights& flights, const sim::Randomisation& uncertain, const ModelDiscrepancy& discrepancy,
-                   std::vector<std::string> withheld, int threads)
+RobotFit::RobotFit(ParametersAlone, const Flights& flights, const sim::Randomisation& uncertain,
+                   const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads)
     : flights_(flights),
       uncertain_(uncertain),
       withheld_(std::move(withheld)),
@@ -44,7 +44,17 @@ RobotFit::RobotFit(const Flights& flights, const sim::Randomisation& uncertain, 
       fitter_(flights, std::make_shared<const Evidence>(flights, discrepancy, threads_), threads_),
       no_effects_(uncertain_, {}) {
   fit_parameters();
+}
+
+RobotFit::RobotFit(const Flights& flights, const sim::Randomisation& uncertain, const ModelDiscrepancy& discrepancy,
+                   std::vector<std::string> withheld, int threads)
+    : RobotFit(ParametersAlone(), flights, uncertain, discrepancy, std::move(withheld), threads) {
   refit_with_nuisances();
+}
+
+RobotFit RobotFit::of_references(const Flights& flights, const sim::Randomisation& uncertain,
+                                 const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads) {
+  return RobotFit(ParametersAlone(), flights, uncertain, discrepancy, std::move(withheld), threads);
 }
 
 RobotFit::RobotFit(const RobotFit& reference, const Flights& flights)
@@ -89,11 +99,9 @@ Fitter RobotFit::fitter_given(const ModelDiscrepancy& discrepancy) const {
       .with_nuisances(nuisance_regressors(), all_backgrounds(discrepancy), parameters_);
 }
 
-/// With shapes, and in a contrast with changes between sessions.
+/// With shapes; in a contrast, what changes between sessions.
 std::vector<Background> RobotFit::all_backgrounds(const ModelDiscrepancy& discrepancy) const {
-  std::vector<Background> all = background(discrepancy, true);
-  if (evidence().contrasts()) std::ranges::move(session_changes(discrepancy.session), std::back_inserter(all));
-  return all;
+  return evidence().contrasts() ? session_changes(discrepancy.session) : background(discrepancy, true);
 }
 
 /// Learns the noise; fits nothing.
@@ -126,7 +134,8 @@ std::vector<Background> RobotFit::session_changes(const SessionVariation& sessio
       list.push_back({kSessionParameters, sd * basis.in_tests(sensor_errors_[i])});
   }
   for (const MagnitudeColumn& m : magnitudes_)
-    list.push_back({kSessionOf + m.effect, session.background_sd(m.effect) * m.change});
+    if (const double sd = session.background_sd(m.effect); sd > 0)
+      list.push_back({kSessionOf + m.effect, sd * m.change});
   return list;
 }
 
@@ -354,19 +363,17 @@ std::vector<SensorFinding> RobotFit::sensors(const Fitter& fitter, const Hypothe
   return list;
 }
 
-/// For one step. `there`: residual of a vehicle `steps` steps from that of the parameters. `in_references`: whether it
-/// changes the reference flights, too.
-BasisCoefficients RobotFit::change(Residuals there, double steps, bool in_references) const {
+/// For one step. `there`: residual of a vehicle `steps` steps from that of the parameters.
+BasisCoefficients RobotFit::change(Residuals there, double steps) const {
   for (std::size_t f = 0; f < there.size(); ++f)
-    for (std::size_t k = 0; k < there[f].size(); ++k)
-      there[f][k] = !in_references && evidence().contrasts() && flights_[f]->is_reference()
-                        ? 0
-                        : (parameters_.residual[f][k] - there[f][k]) / steps;
+    for (std::size_t k = 0; k < there[f].size(); ++k) there[f][k] = (parameters_.residual[f][k] - there[f][k]) / steps;
   return evidence().basis_coefficients(there);
 }
 
 void RobotFit::find_magnitudes() {
-  std::vector<MagnitudeStep> steps = magnitude_steps(uncertain_, parameters_.at, withheld_, &evidence().discrepancy());
+  const bool contrasts = evidence().contrasts();
+  std::vector<MagnitudeStep> steps =
+      magnitude_steps(uncertain_, parameters_.at, withheld_, contrasts ? nullptr : &evidence().discrepancy());
   std::vector<VehicleHypothesis> vehicles;
   for (MagnitudeStep& s : steps) {
     vehicles.push_back(std::move(s.vehicle));
@@ -374,18 +381,14 @@ void RobotFit::find_magnitudes() {
     for (VehicleHypothesis& v : s.further) vehicles.push_back(std::move(v));
     for (VehicleHypothesis& v : s.near) vehicles.push_back(std::move(v));
   }
-  std::vector<Residuals> rows = residuals_with_effects(flights_, vehicles, threads_);
-  std::vector<BasisCoefficients> changes(rows.size());     // [vehicle] for the whole step
-  std::vector<BasisCoefficients> everywhere(rows.size());  // the same with the effect in reference flights, too
+  std::vector<Residuals> rows = residuals(flights_, vehicles, threads_);
+  std::vector<BasisCoefficients> changes(rows.size());  // [vehicle] for the whole step
   io::parallel_for(rows.size(), threads_, [&](std::size_t i) {
-    if (rows[i].empty()) return;
-    if (evidence().contrasts()) everywhere[i] = change(rows[i], 1);
-    changes[i] = change(std::move(rows[i]), 1, false);
+    if (!rows[i].empty()) changes[i] = change(std::move(rows[i]), 1);
   });
-  if (!evidence().contrasts()) everywhere = changes;
   std::size_t i = 0;
   for (const MagnitudeStep& s : steps) {
-    const BasisCoefficients& whole_step = everywhere[i];
+    const BasisCoefficients& whole_step = changes[i];
     std::vector<BasisCoefficients> along = {changes[i++]};
     const std::size_t shapes = i;
     i += s.shaped.size();
@@ -396,14 +399,14 @@ void RobotFit::find_magnitudes() {
     magnitudes_.push_back({static_cast<const Magnitude&>(s), along[0] / kMagnitudeReach, {}, {}});
     MagnitudeColumn& m = magnitudes_.back();
     for (std::size_t n = 0; n < s.near.size(); ++n) {
-      const BasisCoefficients& there = everywhere[near + n];
+      const BasisCoefficients& there = changes[near + n];
       m.near.push_back(there.size() > 0 ? BasisCoefficients(there / (n == 0 ? s.near_reach : -s.near_reach))
                                         : whole_step / kMagnitudeReach);
     }
     if (s.near.empty()) m.near.push_back(whole_step / kMagnitudeReach);
     for (std::size_t k = shapes; k < shapes + s.shaped.size(); ++k)
       if (changes[k].size() > 0)
-        shapes_.push_back({static_cast<const Magnitude&>(s), (everywhere[k] - whole_step) / kMagnitudeReach, {}, {}});
+        shapes_.push_back({static_cast<const Magnitude&>(s), (changes[k] - whole_step) / kMagnitudeReach, {}, {}});
     for (std::size_t n = 1; n + 1 < along.size() && along[n].size() > 0 && along[n + 1].size() > 0; ++n) {
       const double at = kMagnitudeReach * static_cast<double>(n + 1);
       m.large.push_back({at, along[n] / at, (along[n + 1] - along[n - 1]) / (2 * kMagnitudeReach)});
@@ -433,7 +436,8 @@ void RobotFit::find_nuisances() {
       if (other.id == n.id) v.sensors[n.id][other.value] = other.value == n.value ? n.sd : 0;
     vehicles.push_back(std::move(v));
   }
-  for (std::size_t d = uncertain_.majors(); d < uncertain_.draws(); ++d) {
+  const std::size_t minors = evidence().contrasts() ? 0 : uncertain_.draws() - uncertain_.majors();
+  for (std::size_t d = uncertain_.majors(); d < uncertain_.majors() + minors; ++d) {
     // a step in the direction in which the vehicle is physical
     VehicleHypothesis v = no_effects_.vehicle(parameters_.at, std::pair{d, 1.0});
     const bool other = model::physical_fault(v.vehicle).has_value();

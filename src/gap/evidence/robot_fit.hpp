@@ -17,6 +17,10 @@ class RobotFit {
   /// Fits; keeps a reference to `flights`. `withheld`: effects to leave out; `threads`: as for io::parallel_for.
   RobotFit(const Flights& flights, const sim::Randomisation& uncertain, const ModelDiscrepancy& discrepancy,
            std::vector<std::string> withheld, int threads);
+  /// Fits the parameters alone, to reference flights: what a model of this robot gets wrong cancels in a contrast, so it
+  /// needs no further description.
+  static RobotFit of_references(const Flights& flights, const sim::Randomisation& uncertain,
+                                const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads);
   /// A contrast: `flights` are those of `reference`, set_reference(), and test flights of the same robot. Linearises
   /// around the parameters of `reference`; an effect's magnitude acts in the test flights alone.
   RobotFit(const RobotFit& reference, const Flights& flights);
@@ -63,6 +67,9 @@ class RobotFit {
   Scales find_scales(const Hypothesis& hypothesis, const Fit& fit, const Scales& start) const;
 
  private:
+  struct ParametersAlone {};
+  RobotFit(ParametersAlone, const Flights& flights, const sim::Randomisation& uncertain,
+           const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads);
   void fit_parameters();
   void linearise_around(const Fit& parameters);
   std::vector<Background> all_backgrounds(const ModelDiscrepancy& discrepancy) const;
@@ -79,7 +86,7 @@ class RobotFit {
     fitter_ = fitter_.with_evidence(std::make_shared<const Evidence>(std::move(evidence)));
   }
   std::optional<Scales> larger_effect(const Hypothesis& hypothesis, const Fit& fit, const Scales& now) const;
-  BasisCoefficients change(Residuals there, double steps, bool in_references = true) const;
+  BasisCoefficients change(Residuals there, double steps) const;
 
   const Flights& flights_;
   sim::Randomisation uncertain_;

@@ -171,7 +171,7 @@ std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, 
         steps.back().further.push_back(h.vehicle(there));
       }
       there[i] = here[i] + kMagnitudeReach;
-      for (Index shape = first; shape < h.size(); ++shape) {
+      for (Index shape = first; background && shape < h.size(); ++shape) {
         if (h.unknowns()[static_cast<std::size_t>(shape)].magnitude) continue;
         VectorXd other = there;
         other[shape] = 1;

@@ -22,8 +22,8 @@ struct MagnitudeStep : Magnitude {
 inline constexpr std::size_t kMaxSteps = 5;
 inline constexpr double kMagnitudeReach = 0.4;
 
-/// Steps for each effect but `withheld`, with shape parameters in mid-prior. `background`: reach of near steps; null:
-/// none.
+/// Steps for each effect but `withheld`, with shape parameters in mid-prior. `background`: reach of near steps; null: no
+/// near and no shaped steps.
 std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, const Eigen::VectorXd& at,
                                            const std::vector<std::string>& withheld,
                                            const ModelDiscrepancy* background = nullptr);

@@ -69,9 +69,9 @@ SessionVariation read_session_variation(const std::filesystem::path& path) {
     s.parameters.emplace_back(key, parameters.number(key, io::positive()));
   s.shares = read_shares(root);
   const io::Table background = root.table("background_sd");
-  s.background["other"] = background.number("other", io::positive());
+  s.background["other"] = background.number("other", io::non_negative());
   for (const std::string& key : background.keys())
-    if (key == "other" || model::is_effect(key)) s.background[key] = background.number(key, io::positive());
+    if (key == "other" || model::is_effect(key)) s.background[key] = background.number(key, io::non_negative());
   root.finish();
   return s;
 }

@@ -24,6 +24,9 @@ using Eigen::VectorXd;
 /// Iterations end when they gain less evidence than this.
 constexpr double kSettled_nats = 0.1;
 constexpr double kStrideGrowth = 1.5, kMaxStride = 8;
+/// Blocks of many degrees of freedom hold each other back: in a contrast, blocks and their centres are maximised in
+/// turn, so many times an iteration.
+constexpr int kContrastPasses = 100;
 /// Smallest scale of a free block over the scale of the robot.
 constexpr double kMinFree = 2;
 
@@ -225,7 +228,7 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
     for (const int g : seen)
       for (Index i = 0; i < q; ++i)
         total[static_cast<std::size_t>(block_of(g, static_cast<int>(i)))] += best.squares(g, i);
-    double freedom = 0, inverses = 0, session_freedom = 0, session_inverses = 0;
+    double effects_freedom = 0, effects_inverses = 0;
     if (!scales_held_) {
       std::vector<double> squares(of_effect.size(), 0);
       for (Index i = 0; i < k; ++i)
@@ -236,31 +239,35 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
         const double nu_e = priors[e].freedom, prior = next.prior_scale(priors[e]);
         const double squares_e = squares[e] * next.effects[e] * next.effects[e];
         next.effects[e] = std::sqrt((squares_e + nu_e * prior * prior) / (of_effect[e] + nu_e));
-        if (priors[e].follows_robot) freedom += nu_e, inverses += nu_e / (next.effects[e] * next.effects[e]);
+        if (priors[e].follows_robot)
+          effects_freedom += nu_e, effects_inverses += nu_e / (next.effects[e] * next.effects[e]);
       }
     }
-    for (std::size_t b = 0; b < kBlocks; ++b) {
-      if (counts[b] == 0) continue;
-      const double n = counts[b], f2 = std::pow(next.centre(b), 2);
-      const double bound2 = scales_held_ ? 1 : (total[b] + nu[b] * f2) / (n + nu[b]);
-      next.blocks[b] = std::sqrt(bound2);
-      next.free[b] = 0;
-      if (unknown_penalty_nats && may_be_free(b)) {
-        const double free2 = std::max(total[b] / n, kMinFree * kMinFree * f2);
-        const auto objective = [&](double s2) { return -0.5 * (n * std::log(s2) + total[b] / s2); };
-        const double bound = scales_held_ ? 0 : log_prior(std::sqrt(bound2), next.centre(b), nu[b]);
-        if (objective(free2) - *unknown_penalty_nats > objective(bound2) + bound) {
-          next.blocks[b] = std::sqrt(free2);
-          next.free[b] = 1;
+    for (int pass = 0; pass < (contrasts() ? kContrastPasses : 1); ++pass) {
+      double freedom = effects_freedom, inverses = effects_inverses, session_freedom = 0, session_inverses = 0;
+      for (std::size_t b = 0; b < kBlocks; ++b) {
+        if (counts[b] == 0) continue;
+        const double n = counts[b], f2 = std::pow(next.centre(b), 2);
+        const double bound2 = scales_held_ ? 1 : (total[b] + nu[b] * f2) / (n + nu[b]);
+        next.blocks[b] = std::sqrt(bound2);
+        next.free[b] = 0;
+        if (unknown_penalty_nats && may_be_free(b)) {
+          const double free2 = std::max(total[b] / n, kMinFree * kMinFree * f2);
+          const auto objective = [&](double s2) { return -0.5 * (n * std::log(s2) + total[b] / s2); };
+          const double bound = scales_held_ ? 0 : log_prior(std::sqrt(bound2), next.centre(b), nu[b]);
+          if (objective(free2) - *unknown_penalty_nats > objective(bound2) + bound) {
+            next.blocks[b] = std::sqrt(free2);
+            next.free[b] = 1;
+          }
         }
+        if (next.free[b]) continue;
+        const double inverse = nu[b] / (next.blocks[b] * next.blocks[b]);
+        if (block_of_tests(b)) session_freedom += nu[b], session_inverses += inverse;
+        else freedom += nu[b], inverses += inverse;
       }
-      if (next.free[b]) continue;
-      const double inverse = nu[b] / (next.blocks[b] * next.blocks[b]);
-      if (block_of_tests(b)) session_freedom += nu[b], session_inverses += inverse;
-      else freedom += nu[b], inverses += inverse;
+      if (!scales_held_) next.robot = robot_scale(freedom, inverses, discrepancy_.spread.robot_sd);
+      if (contrasts()) next.session = robot_scale(session_freedom, session_inverses, discrepancy_.session.scale_sd);
     }
-    if (!scales_held_) next.robot = robot_scale(freedom, inverses, discrepancy_.spread.robot_sd);
-    if (contrasts()) next.session = robot_scale(session_freedom, session_inverses, discrepancy_.session.scale_sd);
     now = strided(best.scales, next, stride);
   }
   return best;

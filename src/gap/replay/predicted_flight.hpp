@@ -10,6 +10,7 @@
 #include "gap/replay/beat_rows.hpp"
 #include "gap/replay/policy.hpp"
 #include "gap/replay/recording.hpp"
+#include "gap/replay/residual_memo.hpp"
 #include "gap/replay/sensor_correction.hpp"
 
 namespace flappy::gap {
@@ -85,8 +86,10 @@ class PredictedFlight {
  public:
   virtual ~PredictedFlight() = default;
   /// Whether the flight is a reference: the robot is believed to have been free of the effects asked about.
-  bool is_reference() const { return reference_; }
-  void set_reference() { reference_ = true; }
+  bool is_reference() const { return memo_ != nullptr; }
+  void set_reference() { memo_ = std::make_shared<ResidualMemo>(); }
+  /// Only of a reference.
+  ResidualMemo& memo() const { return *memo_; }
   virtual const std::string& name() const = 0;
   virtual std::size_t beats() const = 0;
   virtual double beats_Hz() const = 0;
@@ -118,7 +121,7 @@ class PredictedFlight {
   virtual std::shared_ptr<const PredictedFlight> corrected(const EffectValues& /*sensors*/) const { return nullptr; }
 
  private:
-  bool reference_ = false;
+  std::shared_ptr<ResidualMemo> memo_;
 };
 
 /// The flights of one robot; in a contrast, references and then test flights.

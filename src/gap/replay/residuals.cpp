@@ -1,6 +1,7 @@
 #include "gap/replay/residuals.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 
 #include "gap/replay/reset_kernel.hpp"
@@ -31,33 +32,7 @@ EffectValues sensors_of(const VehicleHypothesis& h) {
   return sensors;
 }
 
-}  // namespace
-
-std::vector<Residuals> residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads) {
-  const Flights references = references_of(flights), tests = tests_of(flights);
-  if (references.empty()) return residuals_with_effects(flights, vehicles, threads);
-  // vehicles that differ only in effects share one prediction of the references
-  std::vector<VehicleHypothesis> without;
-  std::vector<std::size_t> shared;
-  for (const VehicleHypothesis& v : vehicles) {
-    const auto same = std::ranges::find_if(without, [&](const VehicleHypothesis& other) {
-      return other.variates == v.variates && other.lag_s == v.lag_s && other.sensors == v.sensors;
-    });
-    shared.push_back(static_cast<std::size_t>(same - without.begin()));
-    if (same != without.end()) continue;
-    without.push_back(v);
-    without.back().vehicle.effects = v.file_effects;
-  }
-  const std::vector<Residuals> of_references = residuals_with_effects(references, without, threads);
-  std::vector<Residuals> list = residuals_with_effects(tests, vehicles, threads);
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    const Residuals& reference = of_references[shared[i]];
-    if (reference.empty()) list[i].clear();
-    if (!list[i].empty()) list[i].insert(list[i].begin(), reference.begin(), reference.end());
-  }
-  return list;
-}
-
+/// With the effects of a vehicle in reference flights, too.
 std::vector<Residuals> residuals_with_effects(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles,
                                               int threads) {
   // vehicles with the same errors of sensors share a corrected log
@@ -90,6 +65,52 @@ std::vector<Residuals> residuals_with_effects(const Flights& flights, const std:
                      [&](std::size_t f) { seen[f] = flights[f]->corrected(corrected[k].first); });
     compare(seen, corrected[k].second, at_once);
   });
+  return list;
+}
+
+/// Residuals without the effects of the vehicles; those that are not known are computed and kept.
+std::vector<Residuals> residuals_of_references(const Flights& references,
+                                               const std::vector<VehicleHypothesis>& vehicles, int threads) {
+  std::map<ResidualMemo::Key, Residuals> by_key;  // empty rows: not known, or a simulation that diverges
+  std::vector<VehicleHypothesis> open;
+  std::vector<Residuals*> of_open;
+  for (const VehicleHypothesis& v : vehicles) {
+    const auto [at, fresh] = by_key.try_emplace({v.variates, v.lag_s, v.sensors});
+    if (!fresh) continue;
+    for (const auto& f : references)
+      if (std::optional<Rows> known = f->memo().find(at->first)) at->second.push_back(std::move(*known));
+    if (at->second.size() == references.size()) continue;
+    open.push_back(v);
+    open.back().vehicle.effects = v.file_effects;
+    of_open.push_back(&at->second);
+  }
+  std::vector<Residuals> computed = residuals_with_effects(references, open, threads);
+  for (std::size_t i = 0; i < open.size(); ++i) {
+    *of_open[i] = computed[i].empty() ? Residuals(references.size()) : std::move(computed[i]);
+    for (std::size_t f = 0; f < references.size(); ++f)
+      references[f]->memo().keep({open[i].variates, open[i].lag_s, open[i].sensors}, (*of_open[i])[f]);
+  }
+  std::vector<Residuals> list;
+  for (const VehicleHypothesis& v : vehicles) {
+    list.push_back(by_key.at({v.variates, v.lag_s, v.sensors}));
+    if (list.back().front().empty()) list.back().clear();
+  }
+  return list;
+}
+
+}  // namespace
+
+std::vector<Residuals> residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads) {
+  const auto first = std::ranges::find_if(flights, [](const auto& f) { return !f->is_reference(); });
+  const Flights references(flights.begin(), first), tests(first, flights.end());
+  if (references.empty()) return residuals_with_effects(tests, vehicles, threads);
+  std::vector<Residuals> list = residuals_of_references(references, vehicles, threads);
+  if (tests.empty()) return list;
+  std::vector<Residuals> of_tests = residuals_with_effects(tests, vehicles, threads);
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    if (of_tests[i].empty()) list[i].clear();
+    if (!list[i].empty()) std::ranges::move(of_tests[i], std::back_inserter(list[i]));
+  }
   return list;
 }
 

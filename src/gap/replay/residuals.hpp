@@ -11,8 +11,5 @@ using Residuals = std::vector<Rows>;
 /// are undone in the logs, except for beat-averaged vehicles, which predict them. `threads`: as for io::parallel_for.
 /// Reference flights are predicted without the effects of a vehicle.
 std::vector<Residuals> residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads);
-/// As residuals(), with the effects of a vehicle in reference flights, too.
-std::vector<Residuals> residuals_with_effects(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles,
-                                              int threads);
 
 }  // namespace flappy::gap

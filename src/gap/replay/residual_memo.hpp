@@ -1,0 +1,43 @@
+// Residuals of a reference flight that were computed before. Hypotheses that differ only in effects share them.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <tuple>
+#include <vector>
+
+#include "gap/replay/sensor_correction.hpp"
+
+namespace flappy::gap {
+
+class ResidualMemo {
+ public:
+  /// Draws of the vehicle's parameters, delay of the sensors, errors of the sensors.
+  using Key = std::tuple<std::vector<double>, double, EffectValues>;
+  /// None: not known. Thread-safe, as is keep().
+  std::optional<std::vector<double>> find(const Key& key) const {
+    const std::scoped_lock lock(mutex_);
+    const auto at = known_.find(key);
+    return at == known_.end() ? std::nullopt : std::optional(at->second);
+  }
+  /// Forgets the oldest of more than kMost.
+  void keep(const Key& key, std::vector<double> rows) {
+    const std::scoped_lock lock(mutex_);
+    if (!known_.insert_or_assign(key, std::move(rows)).second) return;
+    order_.push_back(key);
+    if (order_.size() <= kMost) return;
+    known_.erase(order_.front());
+    order_.pop_front();
+  }
+
+ private:
+  /// A quarter of a megabyte each for a flight of 10 s; a linearisation of all parameters takes some 120.
+  static constexpr std::size_t kMost = 256;
+  mutable std::mutex mutex_;
+  std::map<Key, std::vector<double>> known_;
+  std::deque<Key> order_;
+};
+
+}  // namespace flappy::gap
