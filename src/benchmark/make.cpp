@@ -92,14 +92,17 @@ class Maker {
     try {
       fs::remove_all(case_folder(p));  // an interrupted run may have left a part of it
       io::make_folder(case_folder(p));
-      FlownRobot flown = fly_drawn(family_, a, p.seed, prepare);
-      for (std::size_t k = 0; k < flown.flights.size(); ++k) {
+      FlownRobot flown = fly_drawn(family_, a, p.seed, prepare, reference_of(p, command_.vehicle));
+      for (std::size_t k = 0; k < p.references; ++k)
+        flightlog::write_flight_log(case_folder(p) / (kReferenceFolder + std::to_string(k + 1)),
+                                    flown.reference[k].log);
+      for (std::size_t k = 0; k < p.flights; ++k) {
         flightlog::FlightLog& log = flown.flights[k].log;
         if (p.published) {
           log.header.vehicle_sha256 = declared_.vehicle_sha256;
           log.header.ambient.air_density_kg_m3 = declared_.declared_density_kg_m3;
         }
-        flightlog::write_flight_log(case_folder(p) / ("flight_" + std::to_string(k + 1)), log);
+        flightlog::write_flight_log(case_folder(p) / (kFlightFolder + std::to_string(k + 1)), log);
       }
       label.draw = flown.draw;
       label.true_values = true_values(p, flown.assignment);
@@ -114,7 +117,7 @@ class Maker {
 
   std::map<std::string, double> true_values(const PlannedCase& p, const blind::Assignment& flown) const {
     std::map<std::string, double> known;
-    if (!command_.true_values || p.part != "singles") return known;
+    if (!command_.true_values || (p.part != "singles" && p.part != "changed")) return known;
     for (const auto& [name, value] : command_.true_values(flown, p.effects))
       if (value) known[name] = *value;
     return known;

@@ -22,7 +22,7 @@ struct MakeCommand {
   int threads = 0;  ///< 0: one for each processor
   io::Ranks* ranks = nullptr;
   /// Returns the catalogue parameters nearest to a case's effects, by "effect.parameter"; null: none comes near. Called
-  /// only for part "singles", whose intervals are scored; unset: no true values.
+  /// only for parts "singles" and "changed", whose intervals are scored; unset: no true values.
   std::function<std::map<std::string, std::optional<double>>(const blind::Assignment&,
                                                              const std::vector<blind::BlindEffect>&)>
       true_values;

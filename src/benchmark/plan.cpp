@@ -15,6 +15,8 @@ namespace {
 constexpr std::uint64_t kSeedsOfAFamily = 10'000'000, kReported = 8'500'000, kSeedsOfAPart = 10'000;
 /// Least number of cases of most parts; rounded up so that all effects of a part have as many.
 constexpr std::size_t kAtLeast = 100;
+/// The same of a contrast.
+constexpr std::size_t kSingles = 60, kHarmless = 30, kStrange = 15, kPairs = 20;
 constexpr double kOverDetectable = 2, kLargest = 4;
 /// For effects outside the catalogue that the table does not list.
 constexpr double kOutsideMagnitude = 2;
@@ -57,6 +59,13 @@ class Planner {
   }
 
   std::vector<PlannedCase> run() {
+    const Ids known = options_.contrast ? Ids(std::begin(kContrastParts), std::end(kContrastParts))
+                                        : Ids(std::begin(kParts), std::end(kParts));
+    for (const std::string& part : options_.parts)
+      if (!std::ranges::count(known, part))
+        throw io::InputError("--part " + part + ": not " + (options_.contrast ? "with" : "without") +
+                             " --contrast; accepted: " + io::joined(known));
+    if (options_.contrast) return contrasts();
     const std::size_t singles = rounds(detectable_, kAtLeast);
     part("singles", singles, [&](std::size_t k, PlannedCase& c) { single(k, c); });
     part("singles_current", singles, [&](std::size_t k, PlannedCase& c) {
@@ -88,7 +97,10 @@ class Planner {
     });
     part("outside", rounds(outside_, kAtLeast / 2),
          [&](std::size_t k, PlannedCase& c) { c.effects = {at_twice(outside_[k % outside_.size()])}; });
-    part("pairs", kAtLeast, [&](std::size_t, PlannedCase& c) { pair(c); });
+    part("pairs", kAtLeast, [&](std::size_t, PlannedCase& c) {
+      pair(
+          detectable_, [&](const std::string& id) { return at_twice(id).magnitude; }, c);
+    });
     part("hover", rounds(hidden_, kAtLeast), [&](std::size_t k, PlannedCase& c) {
       c.effects = {at_twice(hidden_[k % hidden_.size()])};
       c.hover = true;
@@ -103,7 +115,10 @@ class Planner {
     return ids.empty() ? 0 : (at_least + ids.size() - 1) / ids.size() * ids.size();
   }
   static std::uint64_t index_of(const std::string& part) {
-    return static_cast<std::uint64_t>(std::ranges::find(kParts, part) - std::begin(kParts));
+    const auto at = std::ranges::find(kParts, part);
+    if (at != std::end(kParts)) return static_cast<std::uint64_t>(at - std::begin(kParts));
+    return std::size(kParts) +
+           static_cast<std::uint64_t>(std::ranges::find(kContrastParts, part) - std::begin(kContrastParts));
   }
   std::uint64_t seed_of(const std::string& part, std::size_t k) const {
     return first_seed_ + kSeedsOfAPart * index_of(part) + k;
@@ -134,14 +149,16 @@ class Planner {
     c.effects = {at_twice(id)};
   }
 
-  void pair(PlannedCase& c) {
-    const std::string& first = detectable_[below(detectable_.size())];
+  template <class Magnitude>
+  void pair(const Ids& ids, const Magnitude& magnitude, PlannedCase& c) {
+    const std::string& first = ids[below(ids.size())];
     const Ids group = model::whole_group(model::effects(), first);
-    Ids others = detectable_;
+    Ids others = ids;
     std::erase_if(others, [&](const std::string& id) { return std::ranges::count(group, id) > 0; });
     if (others.empty())
       throw io::InputError("--detectable: all are of one group; accepted: a table of flappy-blind detectability");
-    c.effects = {at_twice(first), at_twice(others[below(others.size())])};
+    const std::string& second = others[below(others.size())];
+    c.effects = {{first, magnitude(first)}, {second, magnitude(second)}};
   }
 
   std::size_t below(std::size_t n) { return static_cast<std::size_t>(random_() % n); }
@@ -149,6 +166,57 @@ class Planner {
   template <class List>
   void shuffle(List& list) {
     for (std::size_t i = list.size(); i > 1; --i) std::swap(list[i - 1], list[below(i)]);
+  }
+
+  /// Every effect of the catalogue is asked for, whatever the table says; the score leaves out changes within noise.
+  std::vector<PlannedCase> contrasts() {
+    const Ids all = shuffled_catalogue();
+    const auto part = [&](const char* name, std::size_t count, const auto& fill) {
+      this->part(name, count, [&](std::size_t k, PlannedCase& c) {
+        c.references = blind::Family::kFlights;
+        fill(k, c);
+      });
+    };
+    const auto single = [&](std::size_t k, PlannedCase& c) { c.effects = {{all[k % all.size()], 1}}; };
+    part("changed", rounds(all, kSingles), single);
+    part("changed_short_reference", rounds(all, kSingles), [&](std::size_t k, PlannedCase& c) {
+      single(k, c);
+      c.seed = seed_of("changed", k);
+      c.references = 1;
+    });
+    part("changed_short_test", rounds(all, kSingles), [&](std::size_t k, PlannedCase& c) {
+      single(k, c);
+      c.seed = seed_of("changed", k);
+      c.flights = 1;
+    });
+    part("unchanged", kHarmless, [](std::size_t, PlannedCase&) {});
+    part("changed_calm", rounds(all, kHarmless), [&](std::size_t k, PlannedCase& c) {
+      single(k, c);
+      c.calm_reference = true;
+    });
+    part("unchanged_calm", kHarmless, [](std::size_t, PlannedCase& c) { c.calm_reference = true; });
+    part("changed_withheld", rounds(all, kStrange), [&](std::size_t k, PlannedCase& c) {
+      single(k, c);
+      c.withheld = model::whole_group(model::effects(), c.effects.front().id);
+    });
+    part("changed_outside", rounds(outside_, kStrange), [&](std::size_t k, PlannedCase& c) {
+      c.effects = {{outside_[k % outside_.size()], kOutsideMagnitude}};
+    });
+    part("changed_pairs", kPairs, [&](std::size_t, PlannedCase& c) {
+      pair(
+          all, [](const std::string&) { return 1.0; }, c);
+    });
+    number();
+    return std::move(cases_);
+  }
+
+  Ids shuffled_catalogue() {
+    Ids all;
+    for (const auto& [id, d] : of_)
+      if (!id.starts_with("outside_")) all.push_back(id);
+    shuffle(all);
+    random_.seed(first_seed_);
+    return all;
   }
 
   void number() {
@@ -194,6 +262,16 @@ blind::Assignment assignment_of(const PlannedCase& planned, const std::filesyste
   for (const blind::BlindEffect& e : planned.effects) a.effects.emplace_back(e.id, e.magnitude);
   a.hover = planned.hover, a.power = planned.power;
   a.own_parameters = planned.own_parameters, a.conventions = planned.conventions;
+  a.session = planned.references > 0 ? 1 : 0;
+  return a;
+}
+
+std::optional<blind::Assignment> reference_of(const PlannedCase& planned, const std::filesystem::path& vehicle) {
+  if (planned.references == 0) return std::nullopt;
+  blind::Assignment a = assignment_of(planned, vehicle);
+  a.effects.clear();
+  a.session = 0;
+  a.calm = planned.calm_reference;
   return a;
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,14 +32,20 @@ struct PlannedCase {
   bool hover = false, power = false;
   bool own_parameters = false, conventions = false;  ///< as in blind::Assignment
   bool published = false;                            ///< its vehicle is drawn from the published randomisation
-  std::vector<std::string> withheld;                 ///< effects withheld from the catalogue
+  /// Of a contrast: the robot flies `flights` of another session, and before them `references` without its effects.
+  std::size_t references = 0, flights = blind::Family::kFlights;
+  bool calm_reference = false;        ///< the references hover and follow slow paths
+  std::vector<std::string> withheld;  ///< effects withheld from the catalogue
 };
 
 /// The assignment of a case to its family, without the seed.
 blind::Assignment assignment_of(const PlannedCase& planned, const std::filesystem::path& vehicle);
+/// That of its reference flights; none without them.
+std::optional<blind::Assignment> reference_of(const PlannedCase& planned, const std::filesystem::path& vehicle);
 
 struct PlanOptions {
   bool reported = false;           ///< seeds of the reported scores; false: seeds for development
+  bool contrast = false;           ///< parts of the contrast; false: of the diagnosis without reference flights
   std::vector<std::string> parts;  ///< empty: all
   std::size_t at_most = 0;         ///< most cases of each part; 0: all
 };

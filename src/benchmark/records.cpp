@@ -34,10 +34,24 @@ Json read_json(const std::filesystem::path& file) {
   }
 }
 
-std::vector<std::filesystem::path> PublicCase::flights(const std::filesystem::path& folder) const {
+namespace {
+
+std::vector<std::filesystem::path> folders_in(const PublicCase& c, const std::filesystem::path& folder,
+                                              const std::string& begin) {
   std::set<std::filesystem::path> all;
-  for (const auto& [file, sha256] : files) all.insert((folder / file).parent_path());
+  for (const auto& [file, sha256] : c.files)
+    if (const auto of = (folder / file).parent_path(); of.filename().string().starts_with(begin)) all.insert(of);
   return {all.begin(), all.end()};
+}
+
+}  // namespace
+
+std::vector<std::filesystem::path> PublicCase::flights(const std::filesystem::path& folder) const {
+  return folders_in(*this, folder, kFlightFolder);
+}
+
+std::vector<std::filesystem::path> PublicCase::references(const std::filesystem::path& folder) const {
+  return folders_in(*this, folder, kReferenceFolder);
 }
 
 Json to_json(const Manifest& m) {
@@ -122,6 +136,9 @@ Json to_json(const PlannedCase& p) {
           {"own_parameters", p.own_parameters},
           {"conventions", p.conventions},
           {"published", p.published},
+          {"references", p.references},
+          {"flights", p.flights},
+          {"calm_reference", p.calm_reference},
           {"withheld", p.withheld}};
 }
 
@@ -146,6 +163,9 @@ Label label_from(const Json& json) {
   p.own_parameters = json.at("own_parameters");
   p.conventions = json.at("conventions");
   p.published = json.at("published");
+  p.references = json.value("references", std::size_t{0});
+  p.flights = json.value("flights", blind::Family::kFlights);
+  p.calm_reference = json.value("calm_reference", false);
   p.withheld = json.at("withheld").get<Names>();
   l.draw = json.at("draw");
   l.channels = json.at("channels").get<Names>();

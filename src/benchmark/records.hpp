@@ -16,6 +16,8 @@ using Json = nlohmann::ordered_json;
 
 /// "0007"
 std::string number_text(std::size_t number);
+/// Folders of flights in that of a case: flight_1, ..., and of its references: reference_1, ...
+inline constexpr const char *kFlightFolder = "flight_", *kReferenceFolder = "reference_";
 
 /// InputError if the file cannot be read or is not JSON.
 Json read_json(const std::filesystem::path& file);
@@ -25,8 +27,9 @@ struct PublicCase {
   std::size_t number = 0;
   std::vector<std::string> withheld;
   std::map<std::string, std::string> files;  ///< SHA-256 by path relative to the folder of the benchmark
-  /// Folders of its flights. `folder`: of the benchmark.
+  /// Folders of its flights, and of its reference flights. `folder`: of the benchmark.
   std::vector<std::filesystem::path> flights(const std::filesystem::path& folder) const;
+  std::vector<std::filesystem::path> references(const std::filesystem::path& folder) const;
 };
 
 struct Manifest {

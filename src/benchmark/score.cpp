@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <set>
+#include <tuple>
 
+#include "benchmark/change_over_noise.hpp"
 #include "io/statistics.hpp"
 #include "model/effects/registry.hpp"
 
@@ -259,6 +262,11 @@ std::map<std::string, std::vector<std::string>> unbeaten_lines(const std::vector
   return unbeaten;
 }
 
+bool within_noise(const ScoredCase& c) { return c.change_over_noise && *c.change_over_noise < kBeyondNoise; }
+
+std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases);
+std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases);
+
 }  // namespace
 
 Answer answer_of(const Prediction& p) {
@@ -293,6 +301,8 @@ Answer answer_of(const Prediction& p) {
 bool abstains(const Answer& a) { return a.kind == "group" || a.probability < 0.5; }
 
 bool right(const CaseTruth& t, const Answer& p) {
+  if (t.part.starts_with("unchanged")) return p.kind == "none" || p.kind == "parameters";
+  if (t.part == "changed_withheld" || t.part == "changed_outside") return p.kind == "unknown" || p.kind == "remainder";
   if (t.part == "none" || t.part == "conventions") return p.kind == "none" || p.kind == "parameters";
   if (t.part == "parameters" || t.part == "own_parameters") return p.kind == "parameters";
   if (t.part == "withheld" || t.part == "outside") return p.kind == "unknown";
@@ -316,14 +326,31 @@ std::optional<double> closure(const ScoredCase& c) {
 }
 
 bool needs_true_fit(const ScoredCase& c) {
-  if (c.truth.part != "singles") return false;
+  if ((c.truth.part != "singles" && c.truth.part != "changed") || within_noise(c)) return false;
   const FittedSet* truth = fitted(c.prediction, c.truth.effects);
   return c.prediction.kind != "data" && (truth == nullptr || !truth->left);
 }
 
-Scores score(const std::vector<ScoredCase>& cases) {
+bool needs_change_over_noise(const ScoredCase& c) {
+  return c.truth.part.starts_with("changed") && c.truth.effects.size() == 1 && c.truth.part != "changed_withheld" &&
+         c.truth.part != "changed_outside" && !right(c.truth, c.prediction);
+}
+
+Scores score(const std::vector<ScoredCase>& all) {
+  std::vector<ScoredCase> cases = all;
+  std::erase_if(cases, within_noise);
   Scores s;
-  std::vector<ScoreLine>& l = s.lines;
+  const auto of_contrast = [](const ScoredCase& c) { return std::ranges::count(kContrastParts, c.truth.part) > 0; };
+  if (!std::ranges::all_of(cases, of_contrast)) s.lines = absolute_lines(cases);
+  if (std::ranges::any_of(cases, of_contrast)) std::ranges::move(contrast_lines(cases), std::back_inserter(s.lines));
+  s.unbeaten = unbeaten_lines(s.lines);
+  return s;
+}
+
+namespace {
+
+std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases) {
+  std::vector<ScoreLine> l;
   const Cases singles = of_parts(cases, {"singles"}), strange = of_parts(cases, {"withheld", "outside"}),
               hover = of_parts(cases, {"hover"});
   l.push_back(first_line("top1_mocap_imu", "right effect first, mocap and IMU", 0.85, 0.95, singles));
@@ -363,8 +390,61 @@ Scores score(const std::vector<ScoredCase>& cases) {
                    share(hover, [](const ScoredCase& c) { return abstains(c.prediction); })));
   l.push_back(line("hover_next", "hover only: the proposed flight, flown, brings the truth to first place",
                    Bar::at_least, 0.60, 0.85, share(hover, next_brings_truth)));
-  s.unbeaten = unbeaten_lines(l);
-  return s;
+  return l;
 }
+
+std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases) {
+  std::vector<ScoreLine> l;
+  const auto of = [&](const char* part) { return of_parts(cases, {part}); };
+  const Cases changed = of("changed"), strange = of_parts(cases, {"changed_withheld", "changed_outside"});
+  l.push_back(first_line("contrast_top1", "contrast: right effect first", 0.85, 0.95, changed));
+  l.push_back(line("contrast_group_top1", "contrast: right group first", Bar::at_least, 0.92, 0.98,
+                   share(changed, right_group), of_baselines(changed, baseline_group)));
+  l.push_back(line("contrast_top3", "contrast: right effect among three", Bar::at_least, 0.97, 0.99,
+                   share(changed, among_three), of_baselines(changed, baseline_among_three)));
+  l.push_back(first_line("contrast_short_reference", "contrast: right first, reference of 10 s", 0.75, 0.90,
+                         of("changed_short_reference")));
+  l.push_back(
+      first_line("contrast_short_test", "contrast: right first, test of 10 s", 0.75, 0.90, of("changed_short_test")));
+  l.push_back(first_line("contrast_calm_top1", "contrast: right first, reference in hover and on slow paths", 0.70,
+                         0.85, of("changed_calm")));
+  for (const auto& [part, key, what] :
+       {std::tuple{"unchanged", "false_alarm_contrast", "contrast: harmless session, anything named"},
+        {"unchanged_calm", "false_alarm_contrast_calm", "contrast: harmless, reference in hover and on slow paths"}}) {
+    const Cases harmless = of(part);
+    l.push_back(line(key, what, Bar::at_most, kFalseAlarms, 0.02, share(harmless, false_alarm),
+                     of_baselines(harmless, [](const CaseTruth&, const Baseline& b) { return !b.named.empty(); })));
+  }
+  const auto left = [](const ScoredCase& c) {
+    return c.prediction.kind == "unknown" || c.prediction.kind == "remainder";
+  };
+  l.push_back(line("contrast_unknown", "contrast, withheld or outside: \"unknown\" or a remainder", Bar::at_least, 0.75,
+                   0.90, share(strange, left)));
+  l.push_back(line("contrast_unknown_wrong", "contrast, withheld or outside: a wrong name above 0.8", Bar::at_most,
+                   0.08, 0.02, share(strange, [&](const ScoredCase& c) {
+                     return names_effects(c.prediction) && !left(c) && c.prediction.probability > kConfident;
+                   })));
+  Cases unknown = strange;
+  std::erase_if(unknown, [&](const ScoredCase* c) { return !left(*c); });
+  l.push_back(line("contrast_where", "contrast, unknown or a remainder: where it acts is as sealed", Bar::at_least,
+                   0.80, 0.95, share(unknown, described)));
+  std::vector<ScoredCase> own = cases;
+  std::erase_if(own, [](const ScoredCase& c) { return std::ranges::count(kContrastParts, c.truth.part) == 0; });
+  ScoreLine ece = calibration_line(own);
+  ece.key = "contrast_ece", ece.what = "contrast: calibration error (ECE) over all parts";
+  l.push_back(std::move(ece));
+  ScoreLine coverage = coverage_line(changed);
+  coverage.key = "contrast_coverage", coverage.what = "contrast: 90 % intervals that hold the true magnitude";
+  l.push_back(std::move(coverage));
+  ScoreLine closed = closure_line(changed);
+  closed.key = "contrast_closure", closed.what = "contrast: closure as a share of the truth's, median";
+  l.push_back(std::move(closed));
+  ScoreLine pairs = pairs_line(of("changed_pairs"));
+  pairs.key = "contrast_pairs_f1", pairs.what = "contrast: pairs, F1 of names";
+  l.push_back(std::move(pairs));
+  return l;
+}
+
+}  // namespace
 
 }  // namespace flappy::benchmark

@@ -31,6 +31,19 @@ struct CaseTruth {
 inline constexpr const char* kParts[] = {"singles",  "singles_current", "redeclared",     "typical",
                                          "none",     "parameters",      "own_parameters", "conventions",
                                          "withheld", "outside",         "pairs",          "hover"};
+/// Parts of a contrast. All robots have independent parameters and inexact declarations; their tests are of another
+/// session than their references.
+///   changed, changed_pairs    one effect, and two of different groups, at magnitude 1
+///   changed_short_reference, changed_short_test
+///                             the robots of changed with one reference or one test flight of 10 s
+///   unchanged                 no effect
+///   changed_calm, unchanged_calm
+///                             references that hover and follow slow paths; one effect at magnitude 1, and none
+///   changed_withheld, changed_outside
+///                             an effect whose group is withheld, at magnitude 1; one never in the catalogue, at 2
+inline constexpr const char* kContrastParts[] = {
+    "changed",        "changed_short_reference", "changed_short_test", "unchanged",    "changed_calm",
+    "unchanged_calm", "changed_withheld",        "changed_outside",    "changed_pairs"};
 
 struct ScoredParameter {
   double value = 0, low = 0, high = 0;
@@ -73,6 +86,9 @@ struct ScoredCase {
   std::optional<Answer> true_fit;
   /// Answer for the flights and the flight that `prediction` proposed.
   std::optional<Answer> after_next;
+  /// Change of the test flights by the effect, over what noise alone would give a matched filter
+  /// (change_over_noise.hpp). None: not asked for.
+  std::optional<double> change_over_noise;
 };
 
 struct ScoreLine {
@@ -100,5 +116,7 @@ std::optional<double> closure(const ScoredCase& c);
 
 /// Whether the closure of a case is scored but its true effect was not fitted, so that true_fit is needed.
 bool needs_true_fit(const ScoredCase& c);
+/// Whether change_over_noise is needed: one effect of the catalogue changed between the sessions, and was not named.
+bool needs_change_over_noise(const ScoredCase& c);
 
 }  // namespace flappy::benchmark

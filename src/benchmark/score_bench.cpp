@@ -6,6 +6,7 @@
 #include <set>
 
 #include "benchmark/black_box.hpp"
+#include "benchmark/change_over_noise.hpp"
 #include "benchmark/families.hpp"
 #include "benchmark/proposal.hpp"
 #include "benchmark/records.hpp"
@@ -45,7 +46,9 @@ class Predictions {
     for (const PublicCase& c : manifest_.cases) {
       for (const auto& [file, sha256] : c.files)
         if (io::sha256(io::read_text(folder_ / file)) != sha256) refuse(folder_ / file, "has changed");
-      for (const fs::path& flight : c.flights(folder_))
+      std::vector<fs::path> flights = c.flights(folder_);
+      std::ranges::move(c.references(folder_), std::back_inserter(flights));
+      for (const fs::path& flight : flights)
         for (const fs::directory_entry& e : fs::directory_iterator(flight))
           if (!c.files.contains(e.path().lexically_relative(folder_).string())) refuse(e.path(), "is new");
     }
@@ -76,11 +79,19 @@ class Predictions {
     return true;
   }
 
+  const fs::path& vehicle() const { return vehicle_; }
   Json read(std::size_t number) const { return read_json(prediction_file(folder_, number)); }
 
   Question question(const PublicCase& c, const std::vector<std::string>& withheld) const {
-    return {c.flights(folder_), vehicle_, command_.priors,     command_.discrepancy, command_.verdict,
-            withheld,           true,     command_.experiments};
+    return {.flights = c.flights(folder_),
+            .reference = c.references(folder_),
+            .vehicle = vehicle_,
+            .priors = command_.priors,
+            .discrepancy = command_.discrepancy,
+            .verdict = command_.verdict,
+            .sessions = command_.sessions,
+            .withheld = withheld,
+            .experiments = command_.experiments};
   }
 
  private:
@@ -150,6 +161,35 @@ bool fit_truths(const ScoreCommand& command, Bench& bench) {
   return true;
 }
 
+/// How far effects that were not named change the flights beyond noise. False if interrupted.
+bool find_changes_over_noise(const ScoreCommand& command, Bench& bench) {
+  std::vector<std::size_t> asked, open;
+  const auto file_of = [&](std::size_t i) {
+    return true_fits(bench.folder) / (number_text(bench.manifest.cases[i].number) + "_over_noise.json");
+  };
+  for (std::size_t i = 0; i < bench.cases.size(); ++i) {
+    if (!needs_change_over_noise(bench.cases[i])) continue;
+    asked.push_back(i);
+    if (!fs::exists(file_of(i))) open.push_back(i);
+  }
+  const bool all =
+      work_through("comparing with noise", open.size(), command.threads, command.ranks, [&](std::size_t k) {
+        const Label& label = bench.labels.at(bench.manifest.cases[open[k]].number);
+        blind::Assignment robot = label.robot(bench.predictions.vehicle());
+        robot.effects.clear();
+        const blind::BlindEffect& e = label.planned.effects.front();
+        const std::optional<double> change =
+            change_over_noise(family_named(bench.manifest.family), robot, label.planned.flights, e.id, e.magnitude);
+        io::write_atomically(file_of(open[k]),
+                             Json{{"change_over_noise", change ? Json(*change) : Json()}}.dump() + "\n");
+      });
+  if (!all) return false;
+  for (const std::size_t i : asked)
+    if (const Json& change = read_json(file_of(i)).at("change_over_noise"); !change.is_null())
+      bench.cases[i].change_over_noise = change.get<double>();
+  return true;
+}
+
 /// Of part "hover", and diagnoses them with the earlier flights. False if interrupted.
 bool fly_proposals(const ScoreCommand& command, Bench& bench) {
   const auto file_of = [&](std::size_t i) {
@@ -197,8 +237,8 @@ bool fly_proposals(const ScoreCommand& command, Bench& bench) {
 /// Learnt on the robots of the other families; none if there are too few.
 void ask_black_box(const std::vector<std::unique_ptr<Bench>>& benches, const std::string& family) {
   constexpr std::size_t kFewest = 20;
-  const std::set<std::string> kTeaching = {"singles",    "singles_current", "typical",    "none",
-                                           "parameters", "own_parameters",  "conventions"};
+  const std::set<std::string> kTeaching = {"singles",        "singles_current", "typical", "none",     "parameters",
+                                           "own_parameters", "conventions",     "changed", "unchanged"};
   std::vector<Example> examples;
   for (const auto& b : benches)
     for (const ScoredCase& c : b->cases)
@@ -278,7 +318,8 @@ std::string case_lines(const Bench& bench) {
     std::string magnitudes;
     for (const blind::BlindEffect& e : label.planned.effects)
       magnitudes += (magnitudes.empty() ? "" : "+") + io::shortest_digits(e.magnitude);
-    const std::optional<double> closed = c.truth.part == "singles" ? closure(c) : std::nullopt;
+    const bool alone = c.truth.part == "singles" || c.truth.part == "changed";
+    const std::optional<double> closed = alone ? closure(c) : std::nullopt;
     text += std::to_string(number) + "," + c.truth.part + "," + io::joined(c.truth.effects, "+") + "," + magnitudes +
             "," + p.kind + "," + io::joined(p.effects, "+") + "," + figure(p.probability) + "," +
             (right(c.truth, p) ? "1" : "0") + "," + (closed ? figure(closed) : "") + "," +
@@ -305,7 +346,7 @@ Json score_bench(const ScoreCommand& command) {
     }
   for (const auto& b : benches) {
     b->open();
-    if (!fit_truths(command, *b) || !fly_proposals(command, *b)) {
+    if (!fit_truths(command, *b) || !find_changes_over_noise(command, *b) || !fly_proposals(command, *b)) {
       std::printf("stopped; predictions are sealed: the same command goes on\n");
       return nullptr;
     }
@@ -339,7 +380,7 @@ Json score_bench(const ScoreCommand& command) {
   json["families"] = Json::object();
   for (const auto& [family, cases] : by_family) {
     const Scores own = score(cases);
-    text += table("family " + family + ", 30 s of rich flight, twice the detectable magnitude", own) + "\n";
+    text += table("family " + family, own) + "\n";
     json["families"][family] = scores_json(own, cases.size());
   }
   if (by_family.size() > 1) text += table("all families", scores) + "\n";

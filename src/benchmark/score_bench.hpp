@@ -16,8 +16,9 @@ struct ScoreCommand {
   std::filesystem::path out;      ///< folder for score.md and score.csv; empty: the first of `folders`
   std::filesystem::path priors = io::config_path("gap/priors.toml"),
                         discrepancy = io::config_path("gap/model_discrepancy.toml"),
-                        verdict = io::config_path("gap/verdict.toml");
-  std::filesystem::path experiments = io::config_path("gap/experiments");  ///< manoeuvres that may be proposed
+                        verdict;  ///< empty: configs/gap/verdict.toml, contrast_verdict.toml of a contrast
+  std::filesystem::path sessions = io::config_path("gap/session_variation.toml");  ///< only for a contrast
+  std::filesystem::path experiments = io::config_path("gap/experiments");          ///< manoeuvres that may be proposed
   int threads = 0;  ///< number of cases at a time; 0: one for each processor
   io::Ranks* ranks = nullptr;
   Predictor predictor = predict;

@@ -140,8 +140,10 @@ int main(int argc, char** argv) {
   make.option("--family", made.family, "of whose robots: a, b or c").shows_default();
   make.option("--out", made.out, "folder for the cases").required();
   make.option("--set", set, "development or reported: which seeds").one_of({"development", "reported"}).required();
-  make.option("--part", made.plan.parts, "these parts alone")
-      .one_of(std::vector<std::string>(std::begin(benchmark::kParts), std::end(benchmark::kParts)));
+  make.flag("--contrast", made.plan.contrast, "robots with reference flights of another session");
+  std::vector<std::string> parts(std::begin(benchmark::kParts), std::end(benchmark::kParts));
+  parts.insert(parts.end(), std::begin(benchmark::kContrastParts), std::end(benchmark::kContrastParts));
+  make.option("--part", made.plan.parts, "these parts alone").one_of(parts);
   make.option("--cases", made.plan.at_most, "of each part at most").range(1, 1000);
   make.option("--vehicle", made.vehicle, "the robot as declared").shows_default();
   make.option("--randomise", made.randomise, "what robots of the part parameters are drawn from").shows_default();
@@ -157,7 +159,9 @@ int main(int argc, char** argv) {
       .option("--discrepancy", scored.discrepancy,
               "what models get wrong; of a family: configs/gap/discrepancy/without_FAMILY.toml")
       .shows_default();
-  score.option("--verdict", scored.verdict, "constants of the verdict; of flappy-blind calibrate").shows_default();
+  score.option("--sessions", scored.sessions, "what differs between sessions, for a contrast").shows_default();
+  score.option("--verdict", scored.verdict,
+               "constants of the verdict; none: configs/gap/verdict.toml, for a contrast contrast_verdict.toml");
   score.option("--threads", scored.threads, "cases at a time; 0: one for each processor").range(0, 1024);
   io::Command calibrate = program.app().command("calibrate", "learns from scored cases how much evidence counts");
   benchmark::CalibrateCommand calibrated;
@@ -193,8 +197,8 @@ int main(int argc, char** argv) {
       if (!benchmark::make_bench(made)) std::printf("stopped; what has flown stays: the same command goes on\n");
     } else if (score.given()) {
       scored.ranks = program.ranks("priors: " + io::sha256(io::read_text(scored.priors)) +
-                                   ", discrepancy: " + io::sha256(io::read_text(scored.discrepancy)) +
-                                   ", verdict: " + io::sha256(io::read_text(scored.verdict)) + "\n");
+                                   ", discrepancy: " + io::sha256(io::read_text(scored.discrepancy)) + ", verdict: " +
+                                   (scored.verdict.empty() ? "" : io::sha256(io::read_text(scored.verdict))) + "\n");
       const nlohmann::ordered_json scores = benchmark::score_bench(scored);
       if (!scores.is_null()) program.write_json(scores);
     } else if (loop.given()) {

@@ -48,6 +48,10 @@ Energy energy(const gap::Flights& flights, const std::vector<double>& noise_sd, 
   return e;
 }
 
+bool in_contrast(const gap::Flights& flights, const gap::Inference& d) {
+  return d.parameters.residual.size() > flights.size();
+}
+
 /// Names by their number, the largest first; each name once, without "".
 std::vector<std::string> ranked(std::vector<std::pair<double, std::string>> list) {
   std::ranges::stable_sort(list, std::greater{}, &std::pair<double, std::string>::first);
@@ -70,13 +74,18 @@ Baseline largest_residual(const std::vector<Energy>& columns, const std::vector<
   return b;
 }
 
+/// Residual of the parameters alone.
+const gap::Residuals& residual_of(const gap::Flights& flights, const gap::Inference& d) {
+  return in_contrast(flights, d) ? d.refit : d.parameters.residual;
+}
+
 Baseline best_rmse(const gap::Flights& flights, const gap::Inference& d) {
   Baseline b;
   double least = 1e300;
   std::vector<std::pair<double, std::string>> left;
   for (const gap::ScoredHypothesis& a : d.hypotheses) {
     if (!a.fitted()) continue;
-    const Energy e = energy(flights, d.noise_sd, a.fit.residual);
+    const Energy e = energy(flights, d.noise_sd, in_contrast(flights, d) ? a.held_out : a.fit.residual);
     double sum = 0;
     for (const double s : e.sum) sum += s;
     for (const std::string& name : a.effects) left.emplace_back(-sum, name);
@@ -148,7 +157,7 @@ Baseline stlsq(const Regression& r) {
 }
 
 std::vector<double> features(const gap::Flights& flights, const gap::Inference& d) {
-  const gap::Residuals& residual = d.parameters.residual;
+  const gap::Residuals& residual = residual_of(flights, d);
   const Energy whole = energy(flights, d.noise_sd, residual);
   std::vector<double> list;
   for (std::size_t g = 0; g < gap::kGroups; ++g) list.push_back(std::log1p(whole.rms(g)));
@@ -202,13 +211,16 @@ std::map<std::string, Baseline> baselines(const gap::Flights& flights, const sim
     effects.push_back(std::move(s.effect));
   }
   std::vector<gap::Residuals> rows = residuals(flights, vehicles, threads);
-  const gap::Residuals& residual = d.parameters.residual;
+  const gap::Residuals& residual = residual_of(flights, d);
+  // of the same flights as `flights`, which come last
+  const gap::Residuals here(d.parameters.residual.end() - static_cast<std::ptrdiff_t>(flights.size()),
+                            d.parameters.residual.end());
   std::vector<gap::Residuals> columns;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     if (rows[k].empty()) continue;
     for (std::size_t f = 0; f < flights.size(); ++f)
       for (std::size_t i = 0; i < rows[k][f].size(); ++i)
-        rows[k][f][i] = (residual[f][i] - rows[k][f][i]) / gap::kMagnitudeReach;
+        rows[k][f][i] = (here[f][i] - rows[k][f][i]) / gap::kMagnitudeReach;
     columns.push_back(std::move(rows[k]));
     r.effects.push_back(effects[k]);
   }

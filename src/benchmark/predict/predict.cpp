@@ -18,6 +18,7 @@ Prediction predict(const Question& q) {
   settings.priors = q.priors;
   settings.discrepancy = q.discrepancy;
   settings.verdict = q.verdict;
+  settings.sessions = q.sessions;
   settings.withheld = q.withheld;
   settings.experiments = q.experiments;
   settings.threads = 1;
@@ -29,8 +30,9 @@ Prediction predict(const Question& q) {
     d.corrected->posterior.reset();  // long, and not scored
     p.corrected = model::vehicle_text(*d.corrected);
     if (q.baselines) {
-      p.baselines = baselines(d.flights, *d.uncertain, d.inference, q.withheld, settings.threads);
-      p.features = features(d.flights, d.inference);
+      const gap::Flights flights = tests_of(d.flights);
+      p.baselines = baselines(flights, *d.uncertain, d.inference, q.withheld, settings.threads);
+      p.features = features(flights, d.inference);
     }
   }
   p.diagnosis = std::move(d.result);

@@ -33,14 +33,14 @@ struct Prediction {
 bool abstains(const gap::Verdict& verdict);
 
 struct Question {
-  std::vector<std::filesystem::path> flights;  ///< folders of logs
-  /// TOML files. Empty priors, discrepancy or verdict: those of configs/gap or configs/gap/beat_averaged.
-  std::filesystem::path vehicle, priors, discrepancy, verdict;
+  std::vector<std::filesystem::path> flights;    ///< folders of logs
+  std::vector<std::filesystem::path> reference;  ///< folders of reference logs; empty: no contrast
+  /// TOML files. All but the vehicle may be empty: gap::DiagnosisSettings.
+  std::filesystem::path vehicle, priors, discrepancy, verdict, sessions;
   std::vector<std::string> withheld;  ///< effects to leave out of the catalogue
   bool baselines = true;              ///< also compute Prediction::baselines and ::features
   /// Folder of manoeuvres (*.toml), one of which is proposed if the verdict abstains; empty: none.
   std::filesystem::path experiments;
-  std::vector<std::filesystem::path> reference;  ///< folders of reference logs; empty: no contrast
 };
 using Predictor = std::function<Prediction(const Question&)>;
 
