@@ -26,16 +26,18 @@ struct Constant {
   const char *table, *key;
   std::function<double&(VerdictRule&)> of;
   double low, high;
-  bool by_factors;
+  bool by_factors;  ///< else by steps of 40 nats or, of a share, half of its range
 };
 
-const std::array<Constant, 7>& constants() {
-  static const std::array<Constant, 7> kAll = {{
+const std::array<Constant, 9>& constants() {
+  static const std::array<Constant, 9> kAll = {{
       {"tempering", "nats", [](VerdictRule& r) -> double& { return r.tempering.nats; }, 0.1, 100, true},
       {"tempering", "freedom", [](VerdictRule& r) -> double& { return r.tempering.freedom; }, 0.3, 30, true},
       {"gain", "by_chance_nats", [](VerdictRule& r) -> double& { return r.gain.by_chance_nats; }, 0, 300, false},
       {"gain.outside", "by_chance_nats", [](VerdictRule& r) -> double& { return r.gain.outside_by_chance_nats; }, 0,
        300, false},
+      {"another_law", "further_share", [](VerdictRule& r) -> double& { return r.gain.further_share; }, 0, 1, false},
+      {"another_law", "remainder_share", [](VerdictRule& r) -> double& { return r.gain.remainder_share; }, 0, 1, false},
       {"prior", "parameters", [](VerdictRule& r) -> double& { return r.prior.parameters; }, 0.01, 0.9, true},
       {"prior", "unknown", [](VerdictRule& r) -> double& { return r.prior.unknown; }, 0.01, 0.8, true},
       {"prior", "remainder", [](VerdictRule& r) -> double& { return r.prior.remainder; }, 0.001, 1, true},
@@ -137,7 +139,7 @@ class Calibration {
           for (const double way : {step, -step}) {
             VerdictRule there = rule;
             double& x = c.of(there);
-            x = std::clamp(c.by_factors ? x * std::exp(way) : x + 40 * way, c.low, c.high);
+            x = std::clamp(c.by_factors ? x * std::exp(way) : x + (c.high > 1 ? 40 : 0.5) * way, c.low, c.high);
             if (std::ranges::count(shared(there), &x)) share(there, x);
             const double now = score(there);
             if (now > value + 1e-6) rule = there, value = now, better = true;

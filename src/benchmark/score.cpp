@@ -282,6 +282,7 @@ Answer answer_of(const Prediction& p) {
   if (d.next) a.manoeuvre = d.next->manoeuvre;
   a.baselines = p.baselines;
   a.features = p.features;
+  for (const gap::Suspect& s : d.suspects) a.suspects.push_back(s.effect);
   for (const gap::RankedHypothesis& h : d.hypotheses) {
     if (h.kind == gap::HypothesisKind::none) a.none = h.probability;
     if (h.kind == gap::HypothesisKind::parameters) a.parameters = h.probability;
@@ -362,6 +363,10 @@ std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases) {
                    of_baselines(singles, baseline_among_three)));
   l.push_back(
       first_line("top1_typical", "right effect first at typical magnitude", 0.80, 0.93, of_parts(cases, {"typical"})));
+  l.push_back(line("suspects", "given that an effect is missing: it is among the three named", Bar::at_least, 0.60,
+                   0.80, share(singles, [](const ScoredCase& c) {
+                     return std::ranges::count(c.prediction.suspects, c.truth.effects.front()) > 0;
+                   })));
   for (const auto& [part, what] : {std::pair{"none", "false alarm: none"},
                                    {"parameters", "false alarm: parameters"},
                                    {"own_parameters", "false alarm: own parameters"},

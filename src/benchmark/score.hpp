@@ -66,9 +66,10 @@ struct Answer {
   /// Kind of the verdict; "remainder": effects and a remainder; "crashed": the robot crashed in the flight to be
   /// diagnosed.
   std::string kind = "data";
-  std::vector<std::string> effects;  ///< effects that the verdict names; for a group, its possible effects
-  double probability = 0;            ///< probability of the verdict
-  std::vector<FittedSet> sets;       ///< the most probable first
+  std::vector<std::string> effects;   ///< effects that the verdict names; for a group, its possible effects
+  double probability = 0;             ///< probability of the verdict
+  std::vector<FittedSet> sets;        ///< the most probable first
+  std::vector<std::string> suspects;  ///< most probable effects given that one is missing
   double none = 0, parameters = 0, unknown = 0;
   std::optional<double> nominal, refit, floor;  ///< mean losses: vehicle file, parameters fitted, noise alone
   std::map<std::string, Baseline> baselines;    ///< by name (kBaselines)

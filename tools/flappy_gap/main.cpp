@@ -195,7 +195,9 @@ int main(int argc, char** argv) {
                             .sessions = io::config_path("gap/session_variation.toml")};
   learn.option("--vehicle", lessons.vehicle, "the vehicle's file").required();
   learn.option("--robots", lessons.robots, "folders, each with the flights of one robot");
-  learn.option("--pairs", lessons.pairs, "REFERENCE:TEST, two sessions of a robot without any change that matters");
+  learn.option("--pairs", lessons.pairs,
+               "REFERENCE:TEST, two sessions of a robot without any change that matters, or REFERENCE:TEST:EFFECT, "
+               "with this one");
   learn.option("--sessions", lessons.sessions, "of --pairs: to begin with").shows_default();
   learn.option("--priors", lessons.priors, "what is uncertain of the vehicle").shows_default();
   learn.option("--discrepancy", lessons.discrepancy, "to begin with").shows_default();

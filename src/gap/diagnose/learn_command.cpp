@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <ranges>
 
 #include "flappy/vehicle_file.hpp"
 #include "flightlog/check/data_faults.hpp"
@@ -10,6 +11,7 @@
 #include "io/config.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
+#include "model/effects/registry.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -59,20 +61,28 @@ void run_learn_discrepancy(const LearnCommand& command) {
     robots.emplace_back();
     read_flights(robot, vehicle, false, robots.back());
   }
+  std::vector<SessionPair> pairs;
   for (const std::string& pair : command.pairs) {
-    const std::size_t colon = pair.find(':');
-    if (colon == std::string::npos)
-      throw io::InputError("--pairs " + pair + ": no colon; accepted: REFERENCE:TEST, two folders of flights");
-    robots.emplace_back();
-    read_flights(pair.substr(0, colon), vehicle, true, robots.back());
-    read_flights(pair.substr(colon + 1), vehicle, false, robots.back());
+    std::vector<std::string> parts;
+    for (const auto part : std::views::split(pair, ':')) parts.emplace_back(part.begin(), part.end());
+    if (parts.size() < 2 || parts.size() > 3)
+      throw io::InputError("--pairs " + pair +
+                           ": accepted: REFERENCE:TEST, two folders of flights, or REFERENCE:TEST:EFFECT");
+    pairs.emplace_back();
+    read_flights(parts[0], vehicle, true, pairs.back().flights);
+    read_flights(parts[1], vehicle, false, pairs.back().flights);
+    if (parts.size() < 3) continue;
+    if (model::find_effect(vehicle, parts[2]) == nullptr)
+      throw io::InputError("--pairs " + pair + ": no effect " + parts[2] +
+                           "; accepted: those that flappy-gap effects lists");
+    pairs.back().effect = parts[2];
   }
   io::stop_on_interrupt();
   if (!command.pairs.empty()) {
     start.session = read_session_variation(command.sessions);
-    const SessionVariation learnt = learn_sessions(robots, uncertain, start, command.threads);
-    io::write_atomically(command.out, session_text(learnt, learnt_from(robots.size(), "pairs of sessions")));
-    std::printf("%s: learnt from %zu pairs of sessions\n", command.out.c_str(), robots.size());
+    const SessionVariation learnt = learn_sessions(pairs, uncertain, start, command.threads);
+    io::write_atomically(command.out, session_text(learnt, learnt_from(pairs.size(), "pairs of sessions")));
+    std::printf("%s: learnt from %zu pairs of sessions\n", command.out.c_str(), pairs.size());
     return;
   }
   const ModelDiscrepancy learnt = learn_discrepancy(robots, uncertain, start, command.threads);

@@ -62,6 +62,28 @@ void add_hypotheses(const RowContext& context, const sim::Randomisation& uncerta
   r.hypotheses.insert(r.hypotheses.end(), without_effects.begin(), without_effects.end());
 }
 
+constexpr std::size_t kSuspects = 3;
+
+/// Of hypotheses with an effect, those with it count.
+std::vector<Suspect> suspects_of(const std::vector<RankedHypothesis>& hypotheses) {
+  std::vector<Suspect> all;
+  double any = 0;
+  for (const RankedHypothesis& h : hypotheses) {
+    if (h.kind != HypothesisKind::effect) continue;
+    any += h.probability;
+    for (const std::string& e : h.effects) {
+      auto at = std::ranges::find(all, e, &Suspect::effect);
+      if (at == all.end()) at = all.insert(all.end(), {e, 0, {}});
+      at->probability += h.probability;
+      if (h.effects.size() == 1 && !h.remainder) at->closure = h.closure;
+    }
+  }
+  std::ranges::stable_sort(all, std::greater{}, &Suspect::probability);
+  all.resize(std::min(all.size(), kSuspects));
+  for (Suspect& s : all) s.probability /= any;
+  return all;
+}
+
 }  // namespace
 
 std::vector<Estimate> estimates_of(const ScoredHypothesis& hypothesis, const sim::Randomisation& uncertain) {
@@ -89,6 +111,7 @@ Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flig
   r.untestable = d.untestable;
   const RowContext context = row_context_of(tests_of(flights), d.noise_sd);
   add_hypotheses(context, uncertain, d, r);
+  r.suspects = suspects_of(r.hypotheses);
 
   const ScoredHypothesis& concluded = d.conclusion();
   const ScoredHypothesis& unknown =

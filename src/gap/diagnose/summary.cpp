@@ -181,6 +181,15 @@ std::vector<std::string> summary_of(const Diagnosis& r, const std::string& out) 
     ++shown;
   }
   lines.push_back("runners-up: " + others);
+  if (r.reference.empty() && r.verdict.kind != VerdictKind::effect && !r.suspects.empty()) {
+    std::string suspects;
+    for (const Suspect& s : r.suspects)
+      suspects += (suspects.empty() ? "" : ", ") + s.effect +
+                  (s.closure ? io::format(" %.2f (closes %.0f %%)", s.probability, 100 * s.closure->value)
+                             : io::format(" %.2f", s.probability));
+    lines.push_back("if an effect is missing, then most probably " + suspects);
+    lines.push_back("that would be decided by flights of the same robot without it, given as --reference");
+  }
   const std::vector<ResidualLocation> locations = one_of_each_test(r);
   lines.push_back(locations.empty() ? "with parameters refitted nothing stands out of the noise"
                                     : "where the gap lies, with parameters refitted (rms, that of noise):");

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <set>
 
@@ -94,11 +93,24 @@ void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule) {
   }
 }
 
-double beyond_chance(const ScoredHypothesis& a, double baseline, const VerdictRule& rule) {
-  const double gain = a.log_evidence - a.log_prior - baseline;
+double beyond_chance(const ScoredHypothesis& a, const std::vector<ScoredHypothesis>& all, const VerdictRule& rule) {
+  const auto parameters = std::ranges::find(all, HypothesisKind::parameters, &ScoredHypothesis::kind);
+  const double baseline = parameters == all.end() ? 0 : parameters->explained();
+  /// Largest gain of fewer effects, or of the same without a remainder.
+  const auto gain_of_part = [&](std::size_t effects) {
+    double most = 0;
+    for (const ScoredHypothesis& b : all)
+      if (b.kind == HypothesisKind::effect && !b.has_remainder() && b.effects.size() == effects &&
+          std::ranges::all_of(b.effects, [&](const std::string& e) { return std::ranges::count(a.effects, e) > 0; }))
+        most = std::max(most, b.explained() - baseline);
+    return most;
+  };
+  const double gain = a.explained() - baseline;
   const bool unknown = a.kind == HypothesisKind::unknown || a.has_remainder();
   double chance = unknown ? rule.gain.by_chance_nats : 0;
   for (const std::string& e : a.effects) chance += rule.gain.chance_of(e);
+  for (std::size_t n = 1; n < a.effects.size(); ++n) chance += rule.gain.further_share * gain_of_part(n);
+  if (!a.effects.empty() && a.has_remainder()) chance += rule.gain.remainder_share * gain_of_part(a.effects.size());
   return a.log_prior + baseline + std::max(gain - chance, std::min(gain, 0.0));
 }
 
@@ -107,13 +119,13 @@ double tempered(double nats, const VerdictRule& rule) {
 }
 
 void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictRule& rule) {
-  const auto parameters = std::ranges::find(hypotheses, HypothesisKind::parameters, &ScoredHypothesis::kind);
-  const double baseline = parameters == hypotheses.end() ? 0 : parameters->explained();
-  double most = -std::numeric_limits<double>::infinity(), sum = 0;
-  for (const ScoredHypothesis& a : hypotheses) most = std::max(most, beyond_chance(a, baseline, rule) - a.log_prior);
-  for (ScoredHypothesis& a : hypotheses) {
-    const double behind = most + a.log_prior - beyond_chance(a, baseline, rule);
-    a.probability = std::exp(a.log_prior) * tempered(behind, rule);
+  std::vector<double> explained;
+  for (const ScoredHypothesis& a : hypotheses) explained.push_back(beyond_chance(a, hypotheses, rule) - a.log_prior);
+  const double most = explained.empty() ? 0 : *std::ranges::max_element(explained);
+  double sum = 0;
+  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+    ScoredHypothesis& a = hypotheses[i];
+    a.probability = std::exp(a.log_prior) * tempered(most - explained[i], rule);
     sum += a.probability;
   }
   for (ScoredHypothesis& a : hypotheses) a.probability /= sum;

@@ -11,9 +11,10 @@ namespace flappy::gap {
 /// Widens the effects' posterior to the errors found on robots with known effects (`interval` of the verdict rule).
 void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule);
 
-/// Log evidence of a hypothesis, less what its effects and unknown cause gain by chance; a positive gain stays at least
-/// 0. `baseline`: log evidence of the parameters alone, without its prior.
-double beyond_chance(const ScoredHypothesis& a, double baseline, const VerdictRule& rule);
+/// Log evidence of one of all hypotheses, less what its effects and unknown cause gain by chance, and less what further
+/// effects and a remainder gain because the effects before them follow another law; a positive gain over the parameters
+/// alone stays at least 0.
+double beyond_chance(const ScoredHypothesis& a, const std::vector<ScoredHypothesis>& all, const VerdictRule& rule);
 
 /// Factor on the prior probability of a hypothesis whose evidence is d = `nats` behind the best one's:
 ///   (1 + 2 d / (n f))^(-f / 2)       n, f: tempering.nats, tempering.freedom

@@ -24,7 +24,13 @@ VerdictRule read_verdict_rule(const std::filesystem::path& path) {
             gain.number("further_screened_nats", kNats),
             gain.number("vanished_magnitude", kPositive),
             {},
+            {},
+            {},
             {}};
+  if (const auto law = root.optional_table("another_law")) {
+    r.gain.further_share = law->number("further_share", kShare);
+    r.gain.remainder_share = law->number("remainder_share", kShare);
+  }
   if (const auto outside = gain.optional_table("outside")) {
     r.gain.outside = outside->strings("effects");
     r.gain.outside_by_chance_nats = outside->number("by_chance_nats", kNats);

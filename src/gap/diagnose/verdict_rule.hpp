@@ -17,6 +17,8 @@ struct VerdictRule {
   struct Gain {
     double by_chance_nats, further_screened_nats, vanished_magnitude;
     double outside_by_chance_nats;  ///< replaces by_chance_nats for effects in `outside`
+    /// In addition, of a further effect and of a remainder: a share of what the effects before it gain.
+    double further_share, remainder_share;
     /// Effects of surroundings and sensors: errors of a robot's model do not look like these.
     std::vector<std::string> outside;
     double chance_of(const std::string& effect) const {

@@ -217,13 +217,14 @@ Regressors Fitter::unscaled_regressors(const Fit& fit) const {
   return r;
 }
 
-/// Linear change by each effect's magnitudes. Effects of sensors are left out, for their laws are known.
+/// Linear change by each effect's magnitudes. Without references, effects of sensors are left out: their errors hide
+/// behind those of the model.
 std::map<std::string, BasisCoefficients> Fitter::changes(const Hypothesis& hypothesis, const Fit& fit) const {
   std::map<std::string, BasisCoefficients> whole;
   for (Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
     const Unknown& u = hypothesis.unknowns()[static_cast<std::size_t>(i)];
     const BasisCoefficients& column = fit.columns[static_cast<std::size_t>(i)];
-    if (!u.magnitude || u.in_log || column.size() == 0) continue;
+    if (!u.magnitude || (u.in_log && !evidence_->contrasts()) || column.size() == 0) continue;
     BasisCoefficients& change = whole[u.effect];
     if (change.size() == 0) change = BasisCoefficients::Zero(column.rows(), column.cols());
     change += fit.at[i] * column;

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
+#include <optional>
 
 #include "io/files.hpp"
 #include "io/progress.hpp"
 #include "io/statistics.hpp"
+#include "io/text.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -18,6 +21,9 @@ constexpr int kIterations = 16;
 constexpr double kShrink = 6;
 /// Least estimates: smaller ones are due to the small number of robots.
 constexpr double kMinShare = 2e-4, kMinBackground = 0.01;
+/// Errors of laws are learnt from no fewer pairs; least standard deviation of their logarithm.
+constexpr std::size_t kFewestLaws = 5;
+constexpr double kLeastSpread = 0.25;
 constexpr std::size_t kKinds = static_cast<std::size_t>(BasisFunction::count);
 
 struct Moment {
@@ -178,6 +184,32 @@ void shrink(std::map<std::string, Moment>& backgrounds) {
   for (auto& [effect, m] : backgrounds) m = {m.sum / m.count + median, 2};
 }
 
+/// Deviation of the law of an effect from the catalogue's, as a share of its change: the most probable one of a grid.
+/// None: the effect cannot be simulated.
+std::optional<double> law_error(const RobotFit& robot, const std::string& effect, const ModelDiscrepancy& now) {
+  constexpr double kStep = 1.1892;  // four steps to a factor of two
+  constexpr double kSmallest = 0.01, kLargest = 4;
+  const Fitter fitter = robot.fitter_given(now);
+  std::vector<MagnitudeColumn> columns = robot.magnitudes();
+  std::erase_if(columns, [&](const MagnitudeColumn& m) { return m.effect != effect; });
+  if (columns.empty()) return std::nullopt;
+  const Hypothesis h(robot.uncertain(), {effect});
+  Eigen::VectorXd start = h.start();
+  start.tail(h.size() - h.shared()) = screen(fitter, robot.parameters(), columns).front().coordinates;
+  const Fit fit = fitter.fit_effects(h, start, robot.parameters());
+  if (!fit.flown()) return std::nullopt;
+  const Regressors regressors = fitter.unscaled_regressors(fit);
+  double best = kSmallest, most = -std::numeric_limits<double>::infinity();
+  for (double error = kSmallest; error < kLargest; error *= kStep) {
+    const double log_evidence = fitter.evidence()
+                                    .weigh(fit.statistics, regressors, fitter.all_flights(),
+                                           fitter.law_sd(h, fit, error / now.session.law_error), fitter.scales())
+                                    .posterior.log_evidence;
+    if (log_evidence > most) most = log_evidence, best = error;
+  }
+  return best;
+}
+
 }  // namespace
 
 ModelDiscrepancy learn_discrepancy(const std::vector<Flights>& flights, const sim::Randomisation& uncertain,
@@ -205,28 +237,52 @@ ModelDiscrepancy learn_discrepancy(const std::vector<Flights>& flights, const si
   return now;
 }
 
-SessionVariation learn_sessions(const std::vector<Flights>& flights, const sim::Randomisation& uncertain,
+SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim::Randomisation& uncertain,
                                 const ModelDiscrepancy& start, int threads) {
   io::ProgressLine line("learning");
-  Robots pairs;
-  for (std::size_t i = 0; i < flights.size() && !io::interrupted(); ++i) {
-    line.show(static_cast<double>(i) / static_cast<double>(flights.size()), "fitting pair " + std::to_string(i + 1));
-    pairs.push_back(std::make_unique<const RobotFit>(
-        RobotFit::of_references(references_of(flights[i]), uncertain, start, {}, threads), flights[i]));
+  const auto count = static_cast<double>(pairs.size());
+  double done = 0;
+  const auto go_on = [&] {
+    if (io::interrupted()) throw io::InputError("stopped: nothing was learnt; accepted: all pairs");
+    line.show(done / count, io::format("fitting pair %.0f", done + 1));
+    done += 1;
+  };
+  const auto of_references = [&](const SessionPair& p) {
+    return RobotFit::of_references(references_of(p.flights), uncertain, start, {}, threads);
+  };
+  Robots harmless;
+  for (const SessionPair& p : pairs) {
+    if (!p.effect.empty()) continue;
+    go_on();
+    harmless.push_back(std::make_unique<const RobotFit>(of_references(p), p.flights));
+    for (const auto& f : references_of(p.flights)) f->memo().clear();
   }
-  if (io::interrupted()) throw io::InputError("stopped: nothing was learnt; accepted: all pairs");
   ModelDiscrepancy now = start;
-  for (int n = 1; n <= kIterations; ++n) {
+  for (int n = 1; n <= kIterations && !harmless.empty(); ++n) {
     ShareMoments shares{};
     std::map<std::string, Moment> backgrounds;
-    expect_sessions(pairs, now, shares, backgrounds);
+    expect_sessions(harmless, now, shares, backgrounds);
     if (n == kIterations) {
       shrink(shares);
       shrink(backgrounds);
     }
     take(shares, backgrounds, now.session.shares, now.session.background);
   }
-  return now.session;
+  harmless.clear();
+  std::vector<double> errors;
+  for (const SessionPair& p : pairs) {
+    if (p.effect.empty()) continue;
+    go_on();
+    const RobotFit robot(of_references(p), p.flights);
+    if (const auto error = law_error(robot, p.effect, now)) errors.push_back(*error);
+    for (const auto& f : references_of(p.flights)) f->memo().clear();
+  }
+  if (errors.size() < kFewestLaws) return now.session;
+  SessionVariation& s = now.session;
+  s.law_error = io::median(errors);
+  s.law_spread = std::max(std::log(io::quantile(errors, 0.84) / io::quantile(errors, 0.16)) / 2, kLeastSpread);
+  s.law_most = std::max(io::quantile(errors, 0.95) / s.law_error, 1.0);
+  return s;
 }
 
 }  // namespace flappy::gap

@@ -15,9 +15,16 @@ namespace flappy::gap {
 ModelDiscrepancy learn_discrepancy(const std::vector<Flights>& flights, const sim::Randomisation& uncertain,
                                    const ModelDiscrepancy& start, int threads);
 
-/// Learns what differs between sessions from pairs of sessions in which nothing that matters changed. `flights`: [pair]
-/// references and then test flights.
-SessionVariation learn_sessions(const std::vector<Flights>& flights, const sim::Randomisation& uncertain,
+/// Two sessions of a robot.
+struct SessionPair {
+  Flights flights;     ///< references and then test flights
+  std::string effect;  ///< what changed between them, of the catalogue; empty: nothing that matters
+};
+
+/// Learns what differs between sessions from pairs in which nothing that matters changed, and how far laws of one cause
+/// differ from pairs with an effect, if there are enough. What cannot be learnt stays as in `start`.
+/// io::InputError after Ctrl-C.
+SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim::Randomisation& uncertain,
                                 const ModelDiscrepancy& start, int threads);
 
 }  // namespace flappy::gap

@@ -320,11 +320,14 @@ std::optional<Scales> RobotFit::larger_effect(const Hypothesis& hypothesis, cons
 ScaledEvidence RobotFit::weigh(const Hypothesis& hypothesis, const Fit& fit, const Scales& start,
                                std::optional<double> unknown_penalty_nats) const {
   const Regressors regressors = fitter_.unscaled_regressors(fit);
+  const SessionVariation& session = evidence().discrepancy().session;
+  const double spread = evidence().contrasts() ? session.law_spread : kLawFactorSd,
+               most = evidence().contrasts() ? session.law_most : kMaxLawFactor;
   const auto with = [&](double law_factor, const Scales& from) {
     ScaledEvidence w = evidence().weigh(fit.statistics, regressors, fitter_.all_flights(),
                                         fitter_.law_sd(hypothesis, fit, law_factor), from, unknown_penalty_nats);
     w.law_factor = law_factor;
-    w.posterior.log_evidence -= 0.5 * std::pow(std::log(law_factor) / kLawFactorSd, 2);
+    w.posterior.log_evidence -= 0.5 * std::pow(std::log(law_factor) / spread, 2);
     return w;
   };
   ScaledEvidence best = with(1, start);
@@ -341,8 +344,8 @@ ScaledEvidence RobotFit::weigh(const Hypothesis& hypothesis, const Fit& fit, con
     if (ScaledEvidence w = with(1, without_background); w.posterior.log_evidence > best.posterior.log_evidence)
       best = std::move(w);
   if (!fitter_.acts_by_place(hypothesis, fit)) return best;
-  for (const double step : {2.0, 0.5})
-    for (double law_factor = step; law_factor <= kMaxLawFactor && law_factor >= 1 / kMaxLawFactor; law_factor *= step) {
+  for (const double step : {std::min(2.0, most), 1 / std::min(2.0, most)})
+    for (double law_factor = step; law_factor <= most && law_factor >= 1 / most; law_factor *= step) {
       ScaledEvidence other = with(law_factor, best.scales);
       if (other.posterior.log_evidence < best.posterior.log_evidence) break;
       best = std::move(other);

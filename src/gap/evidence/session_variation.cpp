@@ -16,7 +16,8 @@ constexpr const char* kSessionHead =
 constexpr const char* kSessionSpread =
     R"(# scale_sd: standard deviation of the logarithm of the scale of a pair of sessions. block_freedom, effect_freedom: degrees of freedom of the scales of
 # single blocks and of single effects; high, for no session differs by a hundred times as much as others. Choices.
-# law_error: how far another law of the same cause deviates from that of the catalogue, as a share of the change by the effect.
+# law_error: how far another law of the same cause deviates from that of the catalogue, as a share of the change by the effect: median over effects and
+# robots. law_spread: standard deviation of its logarithm. law_most: the largest over the median; what deviates more is another cause.
 )";
 constexpr const char* kSessionParametersHead =
     R"(# Prior standard deviation of the change of a parameter, in standard deviations of its prior (configs/gap/priors.toml), by a part of its name.
@@ -47,7 +48,8 @@ std::string session_text(const SessionVariation& s, const std::string& learnt) {
   std::string text = kSessionHead + learnt + ".\nschema = 1\n\n" + kSessionSpread +
                      "[spread]\nscale_sd = " + number(s.scale_sd) + "\nblock_freedom = " + number(s.block_freedom) +
                      "\neffect_freedom = " + number(s.effect_freedom) + "\nlaw_error = " + number(s.law_error) +
-                     "\n\n" + kSessionParametersHead + "[parameters]\n";
+                     "\nlaw_spread = " + number(s.law_spread) + "\nlaw_most = " + number(s.law_most) + "\n\n" +
+                     kSessionParametersHead + "[parameters]\n";
   for (const auto& [name, sd] : s.parameters) text += "\"" + name + "\" = " + number(sd) + "\n";
   text += "\n" + shares_text(s.shares) + kSessionBackground + "[background_sd]\n";
   for (const auto& [effect, sd] : s.background) text += effect + " = " + number(sd) + "\n";
@@ -64,6 +66,8 @@ SessionVariation read_session_variation(const std::filesystem::path& path) {
   s.block_freedom = spread.number("block_freedom", io::positive());
   s.effect_freedom = spread.number("effect_freedom", io::positive());
   s.law_error = spread.number("law_error", io::positive());
+  s.law_spread = spread.number("law_spread", io::positive());
+  s.law_most = spread.number("law_most", io::Range{1, 1e3});
   const io::Table parameters = root.table("parameters");
   for (const std::string& key : parameters.keys())
     s.parameters.emplace_back(key, parameters.number(key, io::positive()));

@@ -18,8 +18,9 @@ struct SessionVariation {
   double scale_sd = 0.5;
   /// Degrees of freedom of the scales of blocks, and of those of background magnitudes (ScalePrior).
   double block_freedom = 30, effect_freedom = 30;
-  /// Deviation of another law of the same cause from the catalogue's, as a share of the change by the effect.
-  double law_error = 0.3;
+  /// Deviation of another law of the same cause from the catalogue's, as a share of the change by the effect: the median
+  /// over effects and robots, the standard deviation of its logarithm, and the largest over the median.
+  double law_error = 0.3, law_spread = 1, law_most = 8;
   /// Prior sd of the change of a parameter, in its prior standard deviations, by a part of its name.
   std::vector<std::pair<std::string, double>> parameters;
   Shares shares{};                           ///< prior of the smooth differences between sessions

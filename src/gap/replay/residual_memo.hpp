@@ -31,6 +31,11 @@ class ResidualMemo {
     known_.erase(order_.front());
     order_.pop_front();
   }
+  void clear() {
+    const std::scoped_lock lock(mutex_);
+    known_.clear();
+    order_.clear();
+  }
 
  private:
   /// A quarter of a megabyte each for a flight of 10 s; a linearisation of all parameters takes some 120.

@@ -40,6 +40,13 @@ struct RankedHypothesis {
   std::optional<Closure> closure;
 };
 
+/// One of the effects that are most probable if an effect is missing, whatever the verdict.
+struct Suspect {
+  std::string effect;
+  double probability = 0;          ///< that it is among the missing effects, given that one is missing
+  std::optional<Closure> closure;  ///< of the effect alone; none: it was not fitted by simulation
+};
+
 /// group: one of several effects that the flights cannot tell apart. data: the data forbid a diagnosis.
 enum class VerdictKind { effect, group, parameters, none, unknown, data };
 
@@ -143,6 +150,7 @@ struct Diagnosis {
   bool complete = true;                      ///< false: stopped before every effect was weighed
   Verdict verdict;
   std::vector<RankedHypothesis> hypotheses;  ///< those with effects, then the others; each by falling probability
+  std::vector<Suspect> suspects;             ///< at most three, the most probable first
   /// Terms of the conclusion's remainder; without one, those of the hypothesis unknown, even an improbable one.
   std::vector<UnexplainedTerm> unexplained;  ///< the largest gain first
   std::vector<std::string> jointly_with;     ///< effects that are fitted jointly with the unexplained terms

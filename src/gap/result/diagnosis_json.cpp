@@ -211,6 +211,8 @@ Diagnosis read(const Json& json) {
   d.noise_floor = gap.at("noise_floor");
   d.closure = closure_of(gap.at("closure"));
   d.untestable = json.at("untestable");
+  for (const Json& s : json.at("suspects"))
+    d.suspects.push_back({s.at("effect"), s.at("probability"), closure_of(s.at("closure"))});
   if (const Json& v = json.at("validation"); !v.is_null()) d.validation = validation_of(v);
   for (const Json& c : json.at("closed_loop"))
     d.closed_loop.push_back({c.at("flight"), c.at("quantity"), number_of(c.at("recorded")), number_of(c.at("nominal")),
@@ -223,10 +225,12 @@ Diagnosis read(const Json& json) {
 
 Json to_json(const Diagnosis& d) {
   Json faults = Json::array(), hypotheses = Json::array(), terms = Json::array(), where = Json::array(),
-       locations = Json::array(), closed_loop = Json::array(), moved = Json::object();
+       locations = Json::array(), closed_loop = Json::array(), moved = Json::object(), suspects = Json::array();
   for (const flightlog::DataFault& f : d.faults)
     faults.push_back({{"file", f.file}, {"line", f.line}, {"what", f.what}});
   for (const RankedHypothesis& h : d.hypotheses) hypotheses.push_back(to_json(h));
+  for (const Suspect& s : d.suspects)
+    suspects.push_back({{"effect", s.effect}, {"probability", s.probability}, {"closure", to_json(s.closure)}});
   for (const UnexplainedTerm& t : d.unexplained) terms.push_back(to_json(t));
   for (const ResidualLocation& l : largest_discoveries(d, Stage::refit, kMaxWhere)) where.push_back(to_json(l));
   for (const ResidualLocation& l : d.locations) locations.push_back(to_json(l));
@@ -249,6 +253,7 @@ Json to_json(const Diagnosis& d) {
             {"remainder", d.verdict.remainder},
             {"probability", d.verdict.probability}}},
           {"hypotheses", hypotheses},
+          {"suspects", suspects},
           {"unexplained", {{"jointly_with", d.jointly_with}, {"terms", terms}}},
           {"other_law", d.other_law ? to_json(*d.other_law) : Json(nullptr)},
           {"background", to_json(d.background)},

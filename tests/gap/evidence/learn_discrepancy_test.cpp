@@ -39,7 +39,7 @@ TEST(LearnSessions, FindsHowMuchLessSessionsDiffer) {
   const sim::Randomisation priors = synthetic_priors();
   std::mt19937_64 random(12);
   std::normal_distribution<double> normal(0, SyntheticFlight::kSignal);
-  std::vector<Flights> pairs;
+  std::vector<SessionPair> pairs;
   for (int r = 0; r < 8; ++r) {
     const double off = 0.06 * normal(random), changed = 0.01 * normal(random);
     pairs.emplace_back();
@@ -49,7 +49,7 @@ TEST(LearnSessions, FindsHowMuchLessSessionsDiffer) {
       flight->fly({synthetic_vehicle()});
       flight->add_measured(kForceZ, 0, (off + f * changed) * flight->velocity);
       if (f == 0) flight->set_reference();
-      pairs.back().push_back(flight);
+      pairs.back().flights.push_back(flight);
     }
   }
   ModelDiscrepancy start = read_model_discrepancy();
