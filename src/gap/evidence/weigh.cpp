@@ -60,6 +60,23 @@ double robot_scale(double freedom, double inverses, double sd) {
   return best;
 }
 
+/// All scales of the test flights times the power of two with the largest evidence: single steps are short.
+template <class Value>
+Scales with_best_session(const Scales& from, const Value& log_evidence) {
+  Scales best = from;
+  double most = log_evidence(from);
+  for (const double factor : {2.0, 0.5})
+    for (Scales next = best;;) {
+      next.session *= factor;
+      for (std::size_t b = 0; b < kBlocks; ++b)
+        if (block_of_tests(b) && !next.free[b]) next.blocks[b] *= factor;
+      const double value = log_evidence(next);
+      if (!(value > most)) break;
+      most = value, best = next;
+    }
+  return best;
+}
+
 /// Over-relaxed: `stride` times the step between the logarithms of two sets of scales (Salakhutdinov, Roweis 2003).
 Scales strided(const Scales& from, const Scales& to, double stride) {
   const auto go = [&](double a, double b) { return a * std::pow(b / a, stride); };
@@ -153,7 +170,8 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
   std::vector<Half> halves(seen.size());
   std::vector<int> chosen(static_cast<std::size_t>(k));
   for (Index i = 0; i < k; ++i) chosen[static_cast<std::size_t>(i)] = static_cast<int>(i);
-  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+  /// Leaves the groups under these scales in `halves`.
+  const auto evidence_with = [&](const Scales& scales, bool covariance) {
     io::parallel_for(seen.size(), threads_, [&](std::size_t n) {
       const Sums& s = sums[n];
       Half& h = halves[n];
@@ -161,7 +179,7 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
       h.sd.resize(q);
       for (Index i = 0; i < q; ++i) {
         const int block = block_of(seen[n], static_cast<int>(i));
-        h.sd[i] = std::hypot(now.blocks[static_cast<std::size_t>(block)] * s.prior_sd[i], h.law_sd[i]);
+        h.sd[i] = std::hypot(scales.blocks[static_cast<std::size_t>(block)] * s.prior_sd[i], h.law_sd[i]);
       }
       MatrixXd precision = h.sd.asDiagonal() * s.normal * h.sd.asDiagonal();
       precision.diagonal().array() += 1;
@@ -172,7 +190,7 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
     VectorXd unit = VectorXd::Ones(k + 1);
     for (Index i = 0; i < k; ++i)
       if (const int e = regressors.effects[static_cast<std::size_t>(i)]; e >= 0)
-        unit[i] = now.effects[static_cast<std::size_t>(e)];
+        unit[i] = scales.effects[static_cast<std::size_t>(e)];
     io::parallel_for(seen.size(), threads_, [&](std::size_t n) { halves[n].half *= unit.asDiagonal(); });
     Reduced reduced{unit.asDiagonal() * whole * unit.asDiagonal(), 0};
     for (const Half& h : halves) {
@@ -180,19 +198,25 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
       reduced.log_scale -= h.llt.matrixLLT().diagonal().array().log().sum();
     }
     reduced.sums = MatrixXd(reduced.sums.selfadjointView<Eigen::Lower>());
-    ScaledEvidence w{posterior(reduced, chosen, prior_mean), now, 1, BasisCoefficients::Zero(kGroups, q),
+    ScaledEvidence w{posterior(reduced, chosen, prior_mean, covariance), scales, 1, BasisCoefficients::Zero(kGroups, q),
                      BasisCoefficients::Zero(kGroups, q)};
-    double log_scales = -0.5 * std::pow(std::log(now.robot) / discrepancy_.spread.robot_sd, 2);
-    if (contrasts()) log_scales -= 0.5 * std::pow(std::log(now.session) / discrepancy_.session.scale_sd, 2);
+    double log_scales = -0.5 * std::pow(std::log(scales.robot) / discrepancy_.spread.robot_sd, 2);
+    if (contrasts()) log_scales -= 0.5 * std::pow(std::log(scales.session) / discrepancy_.session.scale_sd, 2);
     for (std::size_t b = 0; b < kBlocks; ++b)
       if (counts[b] > 0)
-        log_scales += now.free[b]    ? -*unknown_penalty_nats
+        log_scales += scales.free[b] ? -*unknown_penalty_nats
                       : scales_held_ ? 0
-                                     : log_prior(now.blocks[b], now.centre(b), nu[b]);
+                                     : log_prior(scales.blocks[b], scales.centre(b), nu[b]);
     for (std::size_t e = 0; e < of_effect.size(); ++e)
       if (of_effect[e] > 0 && !scales_held_)
-        log_scales += log_prior(now.effects[e], now.prior_scale(priors[e]), priors[e].freedom);
+        log_scales += log_prior(scales.effects[e], scales.prior_scale(priors[e]), priors[e].freedom);
     w.posterior.log_evidence += log_scales;
+    return w;
+  };
+  if (contrasts() && now.session == 1 && max_iterations > 1)  // not searched before
+    now = with_best_session(now, [&](const Scales& s) { return evidence_with(s, false).posterior.log_evidence; });
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    ScaledEvidence w = evidence_with(now, true);
     const double gain = w.posterior.log_evidence - best.posterior.log_evidence;
     if (!(gain > 0)) {  // the stride was too long: back to the best scales, and on with stride 1, which cannot lose
       if (stride == 1) break;
