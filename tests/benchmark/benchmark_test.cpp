@@ -256,6 +256,48 @@ TEST_F(Benchmark, TakesNoPredictionOnceLabelsAreOpen) {
       (root_ / "bench").string() + ": begun with another plan; accepted: the same options, or a name for a new folder");
 }
 
+TEST_F(Benchmark, PlansContrasts) {
+  const blind::Family& family = family_named("a");
+  io::write_atomically(root_ / "detectable.toml", detectability());
+  const auto of = read_detectability(root_ / "detectable.toml", family);
+  PlanOptions options;
+  options.contrast = true;
+  std::map<std::string, std::size_t> count;
+  std::map<std::string, std::set<std::string>> effects;
+  std::map<std::uint64_t, std::set<std::string>> by_seed;
+  for (const PlannedCase& c : plan_cases(family, of, options)) {
+    ++count[c.part];
+    EXPECT_TRUE(c.own_parameters && c.conventions);
+    EXPECT_EQ(c.references, c.part == "changed_short_reference" ? 1U : 3U) << c.part;
+    EXPECT_EQ(c.flights, c.part == "changed_short_test" ? 1U : 3U) << c.part;
+    EXPECT_EQ(c.calm_reference, c.part.ends_with("_calm")) << c.part;
+    EXPECT_EQ(c.withheld.empty(), c.part != "changed_withheld");
+    EXPECT_EQ(c.effects.empty(), c.part.starts_with("unchanged"));
+    for (const blind::BlindEffect& e : c.effects) {
+      EXPECT_EQ(e.magnitude, c.part == "changed_outside" ? 2 : 1);
+      effects[c.part].insert(e.id);
+      by_seed[c.seed].insert(e.id);
+    }
+    const std::optional<blind::Assignment> reference = reference_of(c, "vehicle.toml");
+    ASSERT_TRUE(reference);
+    EXPECT_TRUE(reference->effects.empty());
+    EXPECT_EQ(reference->session, 0U);
+    EXPECT_EQ(assignment_of(c, "vehicle.toml").session, 1U);
+  }
+  const std::map<std::string, std::size_t> expected = {
+      {"changed", 60},      {"changed_short_reference", 60}, {"changed_short_test", 60}, {"unchanged", 30},
+      {"changed_calm", 30}, {"unchanged_calm", 30},          {"changed_withheld", 30},   {"changed_outside", 18},
+      {"changed_pairs", 20}};
+  EXPECT_EQ(count, expected);
+  EXPECT_EQ(effects["changed"].size(), 30U) << "every effect, even an undetectable one";
+  for (const auto& [seed, ids] : by_seed)
+    if (ids.size() > 1) EXPECT_EQ(ids.size(), 2U) << "of a pair, not of another robot: " << seed;
+  options.parts = {"singles"};
+  EXPECT_TRUE(test::refusal([&] {
+                plan_cases(family, of, options);
+              }).starts_with("--part singles: not with --contrast; accepted: changed, "));
+}
+
 TEST_F(Benchmark, PlansEveryPart) {
   const blind::Family& family = family_named("a");
   io::write_atomically(root_ / "detectable.toml", detectability());

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "benchmark/black_box.hpp"
+#include "benchmark/change_over_noise.hpp"
 #include "benchmark/predict/baselines.hpp"
 
 namespace flappy::benchmark {
@@ -181,6 +182,31 @@ TEST(Score, FalseAlarmsAndUnknownTruths) {
   cases[5].prediction.where = {"torque_y", "heading"};
   cases[8].prediction.where = {"torque_y", "height"};
   EXPECT_DOUBLE_EQ(*main_score(cases, "unknown_where").value, 0.5);
+}
+
+TEST(Score, OfAContrast) {
+  std::vector<ScoredCase> cases = {judged("changed", {"wind"}, "effect", {"wind"}, 0.9),
+                                   judged("changed", {"tether"}, "effect", {"wind"}, 0.9),
+                                   judged("changed", {"com_offset"}, "parameters", {}, 0.9),
+                                   judged("unchanged", {}, "none", {}, 0.9),
+                                   judged("unchanged", {}, "unknown", {}, 0.5),
+                                   judged("changed_withheld", {"wind"}, "remainder", {"tether"}, 0.9),
+                                   judged("changed_withheld", {"wind"}, "effect", {"tether"}, 0.9),
+                                   judged("changed_outside", {"outside_slosh"}, "unknown", {}, 0.9),
+                                   judged("changed_pairs", {"wind", "com_offset"}, "effect", {"wind"}, 0.9)};
+  cases[2].change_over_noise = kBeyondNoise - 1;  // left out
+  const std::vector<ScoreLine> lines = score(cases).lines;
+  const auto of = [&](const char* key) { return *line_of(lines, key).score.value; };
+  EXPECT_DOUBLE_EQ(of("contrast_top1"), 1.0 / 2);
+  EXPECT_DOUBLE_EQ(of("false_alarm_contrast"), 1.0 / 2);
+  EXPECT_DOUBLE_EQ(of("contrast_unknown"), 2.0 / 3);
+  EXPECT_DOUBLE_EQ(of("contrast_unknown_wrong"), 1.0 / 3);
+  EXPECT_DOUBLE_EQ(of("contrast_pairs_f1"), 2.0 / 3);
+  EXPECT_FALSE(line_of(lines, "contrast_calm_top1").score.value);
+  EXPECT_THROW(line_of(lines, "top1_mocap_imu"), std::out_of_range) << "no case is of that benchmark";
+  EXPECT_FALSE(needs_change_over_noise(cases[0])) << "it was named";
+  EXPECT_TRUE(needs_change_over_noise(cases[1]));
+  EXPECT_FALSE(needs_change_over_noise(cases[6])) << "another name is expected";
 }
 
 TEST(Score, ARemainderBesideTheTruthIsRight) {
