@@ -175,6 +175,8 @@ class Planner {
       this->part(name, count, [&](std::size_t k, PlannedCase& c) {
         c.references = blind::Family::kFlights;
         fill(k, c);
+        c.references = std::min(c.references, options_.flights);
+        c.flights = std::min(c.flights, options_.flights);
       });
     };
     const auto single = [&](std::size_t k, PlannedCase& c) { c.effects = {{all[k % all.size()], 1}}; };

@@ -48,6 +48,7 @@ struct PlanOptions {
   bool contrast = false;           ///< parts of the contrast; false: of the diagnosis without reference flights
   std::vector<std::string> parts;  ///< empty: all
   std::size_t at_most = 0;         ///< most cases of each part; 0: all
+  std::size_t flights = blind::Family::kFlights;  ///< of a contrast: most flights of a session
 };
 
 /// Seeds of family b begin at 20,000,000 (development) and 28,500,000 (reported); a and c: 10,000,000 and 30,000,000

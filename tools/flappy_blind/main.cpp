@@ -145,6 +145,9 @@ int main(int argc, char** argv) {
   parts.insert(parts.end(), std::begin(benchmark::kContrastParts), std::end(benchmark::kContrastParts));
   make.option("--part", made.plan.parts, "these parts alone").one_of(parts);
   make.option("--cases", made.plan.at_most, "of each part at most").range(1, 1000);
+  make.option("--flights", made.plan.flights, "of each session at most, with --contrast")
+      .range(std::size_t{1}, blind::Family::kFlights)
+      .shows_default();
   make.option("--vehicle", made.vehicle, "the robot as declared").shows_default();
   make.option("--randomise", made.randomise, "what robots of the part parameters are drawn from").shows_default();
   make.option("--detectable", made.detectable, "what is detectable of every effect; none: the family's own table");

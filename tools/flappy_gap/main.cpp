@@ -174,7 +174,8 @@ int main(int argc, char** argv) {
   diagnose.option("--vehicle", command.settings.vehicle, "the vehicle's file, as it was believed").required();
   diagnose.option("--flights", command.settings.flights, "folders of flight logs").required();
   diagnose.option("--reference", command.settings.reference,
-                  "flights of the same robot before what --flights are asked about");
+                  "flights of the same robot before what --flights are asked about; NAME=LOG begins another set, "
+                  "which is asked about, too");
   diagnose.option("--sessions", command.settings.sessions, "what differs between sessions [session_variation.toml]");
   diagnose.option("--priors", command.settings.priors,
                   "what is uncertain of the vehicle [configs/gap/priors.toml, as the next]");

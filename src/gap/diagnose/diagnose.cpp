@@ -66,15 +66,42 @@ void check_withheld(const std::vector<std::string>& withheld, const model::Vehic
                            io::did_you_mean(id, known));
 }
 
+/// Sets of reference flights, the first of which is the reference. NAME=LOG begins a set, or goes on with it.
+std::vector<NamedFlights> sets_of(const std::vector<std::string>& reference) {
+  std::vector<NamedFlights> sets;
+  std::size_t now = 0;
+  for (const std::string& given : reference) {
+    const std::size_t equals = given.find('=');
+    const bool named = equals != std::string::npos && !fs::exists(given);
+    const std::string name = named ? given.substr(0, equals) : "";
+    if (named && (name.empty() || name.find_first_of("/.\\ ") != std::string::npos))
+      throw io::InputError("--reference " + given + ": no name before \"=\"; accepted: LOG, or NAME=LOG as far=LOG");
+    if (named || sets.empty()) {
+      const auto same = std::ranges::find(sets, name, &NamedFlights::name);
+      now = static_cast<std::size_t>(same - sets.begin());
+      if (same == sets.end()) sets.push_back({name, {}});
+    }
+    sets[now].flights.push_back(named ? given.substr(equals + 1) : given);
+  }
+  return sets;
+}
+
 }  // namespace
 
-DiagnosisRequest read_request(const DiagnosisSettings& s) {
+DiagnosisRequest read_request(const DiagnosisSettings& settings) {
+  DiagnosisSettings s = settings;
+  std::vector<NamedFlights> sets = sets_of(settings.reference);
+  std::vector<std::string> all;
+  for (const NamedFlights& set : sets) all.insert(all.end(), set.flights.begin(), set.flights.end());
+  all.insert(all.end(), s.flights.begin(), s.flights.end());
+  flightlog::check_each_once(all);
+  if (!sets.empty()) {
+    s.reference = sets.front().flights;
+    sets.erase(sets.begin());
+  }
   model::Vehicle vehicle = read_believed_vehicle(s.vehicle);
   const bool beat_averaged = vehicle.beat_averaged.has_value();
   check_withheld(s.withheld, vehicle);
-  std::vector<std::string> all = s.reference;
-  all.insert(all.end(), s.flights.begin(), s.flights.end());
-  flightlog::check_each_once(all);
   rollout::FlyConfig pilot = read_pilot(s.manoeuvre);
   const auto file = [&](const std::string& given, const std::string& name) {
     return given.empty() ? fs::path(io::config_path((beat_averaged ? "gap/beat_averaged/" : "gap/") + name))
@@ -97,6 +124,7 @@ DiagnosisRequest read_request(const DiagnosisSettings& s) {
   if (!s.reference.empty())
     options.discrepancy.session = s.sessions.empty() ? read_session_variation() : read_session_variation(s.sessions);
   return {s,
+          std::move(sets),
           std::move(vehicle),
           std::move(uncertain),
           std::move(options),
@@ -138,6 +166,13 @@ Diagnosed diagnose(const DiagnosisRequest& request,
   d.result.reference = request.settings.reference;
   if (references > 0) d.result.warnings = contrast_warnings(headers, d.flights);
   if (d.inference.complete) d.corrected = corrected_vehicle(request.vehicle, d.inference, *d.uncertain);
+  for (const NamedFlights& other : request.others) {
+    DiagnosisRequest alone = request;
+    alone.settings.flights = other.flights;
+    alone.others.clear();
+    d.result.sets.push_back({other.name, diagnose(alone, progress).result});
+    d.result.complete = d.result.complete && d.result.sets.back().diagnosis.complete;
+  }
   return d;
 }
 

@@ -17,6 +17,8 @@ struct DiagnosisSettings {
   std::string vehicle;               ///< the vehicle file
   std::vector<std::string> flights;  ///< folders of logs
   /// Folders of logs of the same robot from before the change that the flights are asked about; empty: no contrast.
+  /// NAME=LOG begins a named set, to which the logs after it belong. The unnamed or first set is the reference; every
+  /// other set is asked about as the flights are.
   std::vector<std::string> reference;
   /// Empty: the files of configs/gap, or of configs/gap/beat_averaged for a beat-averaged vehicle.
   std::string priors, discrepancy, verdict, sessions;
@@ -30,8 +32,15 @@ struct DiagnosisSettings {
   int threads = 0;          ///< 0: one for each processor
 };
 
+/// A set of flights that differ from the reference in one thing.
+struct NamedFlights {
+  std::string name;
+  std::vector<std::string> flights;
+};
+
 struct DiagnosisRequest {
-  DiagnosisSettings settings;
+  DiagnosisSettings settings;        ///< `reference` without other sets and names
+  std::vector<NamedFlights> others;  ///< the other sets of `reference`
   model::Vehicle vehicle;
   sim::Randomisation uncertain;
   InferenceOptions options;

@@ -138,6 +138,7 @@ std::vector<std::string> summary_of(const Diagnosis& r, const std::string& out) 
     lines.push_back(next_line(r, out));
     return lines;
   }
+  for (const NamedDiagnosis& s : r.sets) lines.push_back(s.name + ": " + verdict_line(s.diagnosis.verdict, true));
   for (const std::string& warning : r.warnings) lines.push_back("warning: " + warning);
   std::vector<const RankedHypothesis*> ranked;
   for (const RankedHypothesis& c : r.hypotheses) ranked.push_back(&c);

@@ -142,6 +142,8 @@ struct Validation {
   std::vector<Agreement> agreements;
 };
 
+struct NamedDiagnosis;
+
 struct Diagnosis {
   std::vector<std::string> flights;          ///< folders of the logs
   std::vector<std::string> reference;        ///< folders of the reference's logs; empty: no contrast
@@ -168,6 +170,13 @@ struct Diagnosis {
   std::vector<ClosedLoop> closed_loop;
   /// None for a beat-averaged vehicle, a stopped diagnosis, no safe manoeuvre, or fewer than two probable hypotheses.
   std::optional<NextExperiment> next;
+  /// In a contrast: other sets of reference flights, each against the same reference as `flights`.
+  std::vector<NamedDiagnosis> sets;
+};
+
+struct NamedDiagnosis {
+  std::string name;
+  Diagnosis diagnosis;
 };
 
 const char* name_of(HypothesisKind kind);

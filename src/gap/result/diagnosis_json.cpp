@@ -218,6 +218,8 @@ Diagnosis read(const Json& json) {
     d.closed_loop.push_back({c.at("flight"), c.at("quantity"), number_of(c.at("recorded")), number_of(c.at("nominal")),
                              number_of(c.at("corrected"))});
   if (const Json& n = json.at("next_experiment"); !n.is_null()) d.next = next_of(n);
+  if (json.contains("sets"))
+    for (const auto& [name, set] : json.at("sets").items()) d.sets.push_back({name, read(set)});
   return d;
 }
 
@@ -241,6 +243,8 @@ Json to_json(const Diagnosis& d) {
                            {"recorded", finite(c.recorded)},
                            {"nominal", finite(c.nominal)},
                            {"corrected", finite(c.corrected)}});
+  Json sets = Json::object();
+  for (const NamedDiagnosis& s : d.sets) sets[s.name] = to_json(s.diagnosis);
   return {{"schema", kDiagnosisSchema},
           {"flights", d.flights},
           {"reference", d.reference},
@@ -270,7 +274,8 @@ Json to_json(const Diagnosis& d) {
           {"next_experiment", d.next ? to_json(*d.next) : Json(nullptr)},
           {"untestable", d.untestable},
           {"validation", d.validation ? to_json(*d.validation) : Json(nullptr)},
-          {"locations", locations}};
+          {"locations", locations},
+          {"sets", sets}};
 }
 
 Diagnosis diagnosis_from(const Json& json, const std::filesystem::path& file) {
