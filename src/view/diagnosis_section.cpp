@@ -116,43 +116,57 @@ class DiagnosisSection {
 
   void ask(const std::string& question) { section_.add(Json{{"kind", "heading"}, {"text", question}}); }
 
-  std::string concluded() const {
+  static std::string verdict_words(const gap::Diagnosis& d) {
+    const gap::Verdict& v = d.verdict;
+    const bool contrast = !d.reference.empty();
+    const std::string lacks = contrast ? "Since the reference, what appeared is " : "The model lacks ";
     std::vector<std::string> names;
-    for (const std::string& e : diagnosis_.verdict.effects) names.push_back(spoken(e));
-    return spoken_list(names, diagnosis_.verdict.kind == gap::VerdictKind::group ? "or" : "and");
+    for (const std::string& e : v.effects) names.push_back(spoken(e));
+    switch (v.kind) {
+      case gap::VerdictKind::effect:
+        return lacks + spoken_list(names, "and") + (v.remainder ? ", and something more" : "") + ".";
+      case gap::VerdictKind::group:
+        return lacks + "one of " + spoken_list(names, "or") + ": these flights cannot tell them apart.";
+      case gap::VerdictKind::parameters:
+        return contrast ? "The robot changed by no more than sessions differ by."
+                        : "The model lacks nothing, but its parameters are off.";
+      case gap::VerdictKind::none:
+        return contrast ? "The robot is unchanged since the reference."
+                        : "There is no gap beyond noise: the vehicle's file explains the flights.";
+      case gap::VerdictKind::unknown:
+        return lacks + "something that the catalogue of effects does not have.";
+      case gap::VerdictKind::data:
+        return "The recordings are at fault, so nothing was diagnosed.";
+    }
+    return "";
   }
 
   void add_verdict() {
     const gap::Verdict& v = diagnosis_.verdict;
-    using Kind = gap::VerdictKind;
-    std::string text;
-    switch (v.kind) {
-      case Kind::effect:
-        text = "The model lacks " + concluded() + (v.remainder ? ", and something more" : "") + ".";
-        break;
-      case Kind::group:
-        text = "The model lacks one of " + concluded() + ": these flights cannot tell them apart.";
-        break;
-      case Kind::parameters:
-        text = "The model lacks nothing, but its parameters are off.";
-        break;
-      case Kind::none:
-        text = "There is no gap beyond noise: the vehicle's file explains the flights.";
-        break;
-      case Kind::unknown:
-        text = "The model lacks something that the catalogue of effects does not have.";
-        break;
-      case Kind::data:
-        text = "The recordings are at fault, so nothing was diagnosed.";
-        break;
-    }
-    section_.say(text, "lead");
-    if (v.kind != Kind::data)
-      section_.say(format("Probability %.2f%s, from %zu flights.", v.probability,
-                          v.probability < 0.5 ? ", no more than a guess" : "", diagnosis_.flights.size()));
+    section_.say(verdict_words(diagnosis_), "lead");
+    const std::size_t references = diagnosis_.reference.size();
+    if (v.kind != gap::VerdictKind::data)
+      section_.say(format("Probability %.2f%s, from %zu flights%s.", v.probability,
+                          v.probability < 0.5 ? ", no more than a guess" : "", diagnosis_.flights.size(),
+                          references > 0 ? format(" and %zu of the reference", references).c_str() : ""));
+    for (const gap::NamedDiagnosis& s : diagnosis_.sets)
+      section_.say(s.name + ": " + verdict_words(s.diagnosis) +
+                   format(" Probability %.2f.", s.diagnosis.verdict.probability));
+    for (const std::string& w : diagnosis_.warnings) section_.say("Warning: " + w + ".");
+    if (references == 0 && v.kind != gap::VerdictKind::effect && !diagnosis_.suspects.empty()) add_suspects();
     if (!diagnosis_.complete)
       section_.say(
           "It was stopped before every effect was weighed: this is no verdict, only what was weighed until then.");
+  }
+
+  void add_suspects() {
+    std::vector<std::string> words;
+    for (const gap::Suspect& s : diagnosis_.suspects)
+      words.push_back(spoken(s.effect) + (s.closure
+                                              ? format(" (%.2f, closes %.0f %%)", s.probability, 100 * s.closure->value)
+                                              : format(" (%.2f)", s.probability)));
+    section_.say("If an effect is missing, then most probably " + spoken_list(words, "or") +
+                 ". Flights of the same robot without it, given as --reference, would decide.");
   }
 
   void add_faults() {

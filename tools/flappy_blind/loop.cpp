@@ -26,7 +26,8 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kPolicies[] = {"as_shipped", "file", "corrected"};
 
 /// Parts of a benchmark whose robots have an effect and are diagnosed from rich flights. Each robot occurs once in them.
-constexpr std::string_view kParts[] = {"singles", "typical", "withheld", "outside", "pairs"};
+constexpr std::string_view kParts[] = {"singles", "typical",         "withheld",      "outside",
+                                       "pairs",   "changed_outside", "changed_pairs", "changed"};
 
 /// A scored benchmark. The constructor checks the hashes of its predictions and opens the labels.
 struct Scored {
@@ -57,7 +58,8 @@ class Loop {
  public:
   explicit Loop(const LoopCommand& command) : command_(command) {
     start_ = learn::read_train_init(command.run);
-    const EscapeRules hover = hover_rules(read_escape_rules(fs::path(command.run) / "best.json", command.config));
+    const EscapeRules shipped = read_escape_rules(fs::path(command.run) / "best.json", command.config),
+                      hover = hover_rules(shipped);
     for (const std::string& folder : command.folders) {
       const Scored& s = *scored_.emplace_back(std::make_unique<Scored>(folder));
       std::size_t robots = 0;
@@ -65,6 +67,10 @@ class Loop {
         if (command.robots > 0 && robots == command.robots) break;
         if (!escapes_of(s.manifest.family, label.robot(s.manifest.vehicle), hover)(0)) {
           ++unsteady_[s.manifest.family];
+          continue;
+        }
+        if (command.costly && !costs_escapes(s.manifest.family, label.robot(s.manifest.vehicle), shipped)) {
+          ++as_good_[s.manifest.family];
           continue;
         }
         ++robots;
@@ -88,6 +94,18 @@ class Loop {
   }
 
  private:
+  bool costs_escapes(const std::string& family, Assignment a, const EscapeRules& rules) const {
+    const auto succeeded = [&] {
+      const auto succeeds = escapes_of(family, a, rules);
+      std::size_t count = 0;
+      for (std::size_t n = 0; n < command_.escapes; ++n) count += succeeds(n);
+      return count;
+    };
+    const std::size_t with_effect = succeeded();
+    a.effects.clear();
+    return with_effect < succeeded();
+  }
+
   static fs::path result_of(const Robot& r) { return r.own / "result.json"; }
   fs::path without() const { return fs::path(command_.out) / "file"; }
 
@@ -192,8 +210,9 @@ class Loop {
       lines += "," + std::to_string(label.planned.seed) + "," + std::to_string(label.draw) + "\n";
     }
     std::string text =
-        "| family | robots | better with the diagnosis (95 %) | as good | worse | success as shipped | trained on with "
-        "the file | with the corrected vehicle |\n|---|---|---|---|---|---|---|---|\n";
+        "| family | robots | better with the diagnosis (95 %) | as good | worse | better, ties half | success as "
+        "shipped "
+        "| trained on with the file | with the corrected vehicle |\n|---|---|---|---|---|---|---|---|---|\n";
     Json all;
     for (const auto& [family, row] : rows) {
       const rollout::Rate better = rollout::rate_of(row.better, row.robots);
@@ -201,16 +220,22 @@ class Loop {
       const auto share = [&row = row](std::size_t p) {
         return static_cast<double>(row.succeeded[p]) / static_cast<double>(row.escapes);
       };
-      std::snprintf(line, sizeof line, "| %s | %zu | %.3f (%.3f to %.3f) | %zu | %zu | %.3f | %.3f | %.3f |\n",
-                    family.c_str(), row.robots, better.value, better.low, better.high,
-                    row.robots - row.better - row.worse, row.worse, share(0), share(1), share(2));
+      const std::size_t ties = row.robots - row.better - row.worse;
+      const double half =
+          (static_cast<double>(row.better) + static_cast<double>(ties) / 2) / static_cast<double>(row.robots);
+      std::snprintf(line, sizeof line, "| %s | %zu | %.3f (%.3f to %.3f) | %zu | %zu | %.3f | %.3f | %.3f | %.3f |\n",
+                    family.c_str(), row.robots, better.value, better.low, better.high, ties, row.worse, half, share(0),
+                    share(1), share(2));
       text += line;
-      all[family] = {{"robots", row.robots},   {"better", row.better}, {"worse", row.worse},
+      all[family] = {{"robots", row.robots},   {"better", row.better}, {"worse", row.worse},   {"ties_half", half},
                      {"as_shipped", share(0)}, {"file", share(1)},     {"corrected", share(2)}};
     }
     text += "\nleft out, for they do not hover at the goal for three seconds without a policy:";
     for (const auto& [family, count] : unsteady_) text += " " + family + " " + std::to_string(count);
     text += unsteady_.empty() ? " none\n" : "\n";
+    if (command_.costly) text += "left out, for they escape as often as without their effect:";
+    for (const auto& [family, count] : as_good_) text += " " + family + " " + std::to_string(count);
+    if (command_.costly) text += as_good_.empty() ? " none\n" : "\n";
     std::fputs(text.c_str(), stdout);
     io::write_atomically(fs::path(command_.out) / "loop.csv", lines);
     io::write_atomically(fs::path(command_.out) / "loop.md", text);
@@ -221,6 +246,7 @@ class Loop {
   std::vector<std::unique_ptr<Scored>> scored_;
   std::vector<Robot> robots_;
   std::map<std::string, std::size_t> unsteady_;  ///< by family: robots that fail hover_rules()
+  std::map<std::string, std::size_t> as_good_;   ///< by family: robots whose effect costs no escape
   std::shared_ptr<const learn::TrainInit> start_;
 };
 

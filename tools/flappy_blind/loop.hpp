@@ -18,6 +18,7 @@ struct LoopCommand {
   std::string train = io::config_path("train/escape.toml"), config = io::config_path("fly/escape.toml");
   std::vector<std::string> overrides;  ///< of keys in `train`, as "learn.updates=20000"
   std::size_t robots = 0;              ///< the first robots of each folder, at most; 0: all
+  bool costly = false;  ///< only robots that, with the policy as shipped, escape less often than without their effect
   std::size_t escapes = 50;
   int threads = 0;  ///< number of robots in parallel; 0: one for each processor
 };

@@ -181,6 +181,7 @@ int main(int argc, char** argv) {
   loop.option("--set", looped.overrides, "override a key of that: learn.updates=20000").one_at_a_time();
   loop.option("--config", looped.config, "task and controller that it was trained with").shows_default();
   loop.option("--robots", looped.robots, "of each folder at most").range(1, 1000);
+  loop.flag("--costly", looped.costly, "only robots whose effect costs escapes with the policy as shipped");
   loop.option("--escapes", looped.escapes, "of each robot and policy").range(1, 10000).shows_default();
   loop.option("--threads", looped.threads, "robots at a time; 0: one for each processor").range(0, 1024);
   program.app().expect_commands(1, 1);
