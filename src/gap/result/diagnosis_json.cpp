@@ -211,15 +211,15 @@ Diagnosis read(const Json& json) {
   d.noise_floor = gap.at("noise_floor");
   d.closure = closure_of(gap.at("closure"));
   d.untestable = json.at("untestable");
-  for (const Json& s : json.at("suspects"))
+  for (const Json& s : json.value("suspects", Json::array()))
     d.suspects.push_back({s.at("effect"), s.at("probability"), closure_of(s.at("closure"))});
   if (const Json& v = json.at("validation"); !v.is_null()) d.validation = validation_of(v);
   for (const Json& c : json.at("closed_loop"))
     d.closed_loop.push_back({c.at("flight"), c.at("quantity"), number_of(c.at("recorded")), number_of(c.at("nominal")),
                              number_of(c.at("corrected"))});
   if (const Json& n = json.at("next_experiment"); !n.is_null()) d.next = next_of(n);
-  if (json.contains("sets"))
-    for (const auto& [name, set] : json.at("sets").items()) d.sets.push_back({name, read(set)});
+  const Json sets = json.value("sets", Json::object());
+  for (const auto& [name, set] : sets.items()) d.sets.push_back({name, read(set)});
   return d;
 }
 
