@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "gap/diagnose/diagnose.hpp"
 #include "gap/diagnose/result.hpp"
 #include "io/config.hpp"
 #include "io/files.hpp"
@@ -70,6 +71,25 @@ TEST(Verdict, CountsNatsBeyondChanceByStudentsT) {
   all = {weighed(-1000, 0.5, hypothesis(0, HypothesisKind::parameters)), weighed(-1004, 0.5, hypothesis(0, {"wind"}))};
   set_probabilities(all, rule);
   EXPECT_NEAR(all[1].probability, 0.25 / 1.25, 1e-12);
+}
+
+// A first effect gains 1000 nats, a second one 60 more, and a remainder 150 more.
+TEST(Verdict, OfWhatAnotherLawLeavesOnlyMoreThanAShareCounts) {
+  const auto gains = [](double nats, std::vector<std::string> effects, bool remainder = false) {
+    ScoredHypothesis a = hypothesis(0, std::move(effects));
+    if (remainder) a.unexplained.emplace_back();
+    a.log_evidence = nats;
+    return a;
+  };
+  std::vector<ScoredHypothesis> all = {hypothesis(0, HypothesisKind::parameters), gains(1000, {"wind"}),
+                                       gains(1060, {"wind", "com_offset"}), gains(1150, {"wind"}, true)};
+  VerdictRule rule = read_verdict_rule();
+  rule.gain.by_chance_nats = 0, rule.gain.outside = {};
+  EXPECT_DOUBLE_EQ(beyond_chance(all[2], all, rule), 1060);
+  rule.gain.further_share = 0.05, rule.gain.remainder_share = 0.1;
+  EXPECT_DOUBLE_EQ(beyond_chance(all[1], all, rule), 1000);
+  EXPECT_DOUBLE_EQ(beyond_chance(all[2], all, rule), 1060 - 0.05 * 1000);
+  EXPECT_DOUBLE_EQ(beyond_chance(all[3], all, rule), 1150 - 0.1 * 1000);
 }
 
 TEST(Verdict, NamesTheLargestMass) {
@@ -189,6 +209,22 @@ TEST(Verdict, PredictsWithWhatExplainsMost) {
 }
 
 // Of the files of constants every key is asked for, and none is let pass that nobody asks for.
+TEST(Request, TakesSetsOfReferences) {
+  DiagnosisSettings s;
+  s.vehicle = kConfigs + "vehicles/hummingbird_nominal.toml";
+  s.flights = {"flight"};
+  s.reference = {"full=a", "b", "empty=c", "full=d"};
+  const DiagnosisRequest request = read_request(s);
+  EXPECT_EQ(request.settings.reference, (std::vector<std::string>{"a", "b", "d"}));
+  ASSERT_EQ(request.others.size(), 1u);
+  EXPECT_EQ(request.others[0].name, "empty");
+  EXPECT_EQ(request.others[0].flights, std::vector<std::string>{"c"});
+  EXPECT_GT(request.options.rule.gain.further_share, 0) << "constants of a contrast";
+  s.reference = {"=a"};
+  EXPECT_EQ(test::refusal([&] { read_request(s); }),
+            "--reference =a: no name before \"=\"; accepted: LOG, or NAME=LOG as far=LOG");
+}
+
 TEST(VerdictRule, IsReadStrictly) {
   const flight::Folder folder;
   const std::string path = (folder / "constants.toml").string();
