@@ -188,19 +188,27 @@ void agree(const Fitter& fitter, const Flights& flights, const FittedHypothesis&
 std::vector<Residuals> held_out(const Fitter& fitter, const Flights& flights, const std::vector<FittedHypothesis>& fits,
                                 const std::vector<int>& fold, int threads) {
   const std::size_t folds = static_cast<std::size_t>(*std::ranges::max_element(fold)) + 1;
+  const Evidence& evidence = fitter.evidence();
+  std::vector<Residuals> left(fits.size(), Residuals(flights.size()));
   std::vector<VehicleHypothesis> vehicles;
   std::vector<BasisCoefficients> nuisances;
-  for (const FittedHypothesis& fit : fits)
+  for (std::size_t i = 0; i < fits.size(); ++i)
     for (std::size_t k = 0; k < folds; ++k) {
+      const FittedHypothesis& fit = fits[i];
       std::vector<char> others(flights.size(), 1);
       for (std::size_t f = 0; folds > 1 && f < flights.size(); ++f) others[f] = fold[f] != static_cast<int>(k) ? 1 : 0;
+      if (evidence.contrasts()) {  // references hold the parameters where they were linearised
+        const BasisCoefficients explained = fitter.explained(fit.hypothesis, *fit.fit, others);
+        for (std::size_t f = 0; f < flights.size(); ++f)
+          if (fold[f] == static_cast<int>(k)) left[i][f] = evidence.without(f, fit.fit->residual[f], explained);
+        continue;
+      }
       Fitter::JointFit joint = fitter.joint_fit(fit.hypothesis, *fit.fit, others);
       vehicles.push_back(fit.hypothesis.vehicle(joint.at));
-      nuisances.push_back(joint.nuisances + joint.shared);
+      nuisances.push_back(std::move(joint.nuisances));
     }
-  const Evidence& evidence = fitter.evidence();
+  if (evidence.contrasts()) return left;
   std::vector<Residuals> rows = residuals(flights, vehicles, threads);
-  std::vector<Residuals> left(fits.size(), Residuals(flights.size()));
   for (std::size_t i = 0; i < fits.size(); ++i)
     for (std::size_t f = 0; f < flights.size(); ++f) {
       if (fold[f] == kNever) continue;

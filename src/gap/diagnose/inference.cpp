@@ -29,7 +29,12 @@ class Progress {
 };
 
 VectorXd without_background(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit) {
-  if (!fitter.evidence().policy().background_in_corrected || fitter.evidence().contrasts())
+  if (fitter.evidence().contrasts()) {  // with the parameters of the reference
+    VectorXd at = fit.mean();
+    at.head(hypothesis.shared()) = fit.at.head(hypothesis.shared());
+    return hypothesis.bounded(at);
+  }
+  if (!fitter.evidence().policy().background_in_corrected)
     return fitter.joint_fit(hypothesis, fit, fitter.all_flights(), false).at;
   VectorXd at = fitter.refit_without_background(hypothesis, fit).at;
   // parameters are fitted one by one, so together they may describe a body that cannot exist

@@ -314,24 +314,26 @@ Fitter::JointFit Fitter::joint_fit(const Hypothesis& hypothesis, const Fit& fit,
   Regressors r;
   for (std::size_t i = 0; i < all.columns.size(); ++i)
     if (with_background || all.effects[i] < 0) r.add(*all.columns[i], all.prior_means[i]);
-  const BasisCoefficients sd = discrepancy_sd(hypothesis, fit);
-  const Posterior p =
-      Evidence::posterior(evidence_->reduce(fit.statistics, r.columns, use, sd), r.all, r.prior_mean(), false);
+  const Posterior p = Evidence::posterior(
+      evidence_->reduce(fit.statistics, r.columns, use, discrepancy_sd(hypothesis, fit)), r.all, r.prior_mean(), false);
   VectorXd along = VectorXd::Zero(static_cast<Index>(fit.columns.size()));
   Index k = 0;
   for (std::size_t d = 0; d < fit.columns.size(); ++d)
     if (fit.columns[d].size() > 0) along[static_cast<Index>(d)] = p.mean[k++];
-  const BasisCoefficients none = BasisCoefficients::Zero(kGroups, evidence_->basis().size());
-  JointFit joint{hypothesis.bounded(fit.at + fit.directions.axes * along), none, none};
+  JointFit joint{hypothesis.bounded(fit.at + fit.directions.axes * along),
+                 BasisCoefficients::Zero(kGroups, evidence_->basis().size())};
   for (; k < p.mean.size(); ++k) joint.nuisances += p.mean[k] * *r.columns[static_cast<std::size_t>(k)];
-  if (evidence_->contrasts()) {
-    BasisCoefficients explained = none;
-    for (Index i = 0; i < p.mean.size(); ++i) explained += p.mean[i] * *r.columns[static_cast<std::size_t>(i)];
-    joint.shared = evidence_->discrepancy_mean(fit.statistics, explained, use, sd);
-    for (int i = 0; i < evidence_->basis().size(); ++i)
-      if (evidence_->basis().of_tests(i)) joint.shared.col(i).setZero();
-  }
   return joint;
+}
+
+BasisCoefficients Fitter::explained(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const {
+  const Regressors r = regressors(fit);
+  const BasisCoefficients sd = discrepancy_sd(hypothesis, fit);
+  const Posterior p =
+      Evidence::posterior(evidence_->reduce(fit.statistics, r.columns, use, sd), r.all, r.prior_mean(), false);
+  BasisCoefficients all = BasisCoefficients::Zero(kGroups, evidence_->basis().size());
+  for (Index i = 0; i < p.mean.size(); ++i) all += p.mean[i] * *r.columns[static_cast<std::size_t>(i)];
+  return all + evidence_->discrepancy_mean(fit.statistics, all, use, sd);
 }
 
 Reduced Fitter::reduce(const Fit& fit, const Regressors& r) const {

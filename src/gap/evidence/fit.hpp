@@ -80,14 +80,16 @@ class Fitter {
 
   /// Posterior along all directions of a fit, from some flights alone. `use`: [flight] whether it counts.
   Posterior posterior(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
-  /// The most probable coordinates from some flights alone, and the parts of the residual that nuisances then explain
-  /// and, in a contrast, the discrepancy that references and test flights share.
+  /// The most probable coordinates from some flights alone, and the part of the residual that nuisances then explain.
   struct JointFit {
     Eigen::VectorXd at;
-    BasisCoefficients nuisances, shared;
+    BasisCoefficients nuisances;
   };
   JointFit joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use,
                      bool with_background = true) const;
+  /// The part of a fit's residual that everything explains by linear columns, learnt from some flights alone: in a
+  /// contrast, changes of the parameters, and what the model gets wrong in both sessions or sessions differ by.
+  BasisCoefficients explained(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
   /// Standard deviation, [group][basis], of the deviations of effects that act by the place from the catalogue's laws.
   BasisCoefficients law_sd(const Hypothesis& hypothesis, const Fit& fit) const {
     return law_sd(hypothesis, fit, fit.law_factor);
