@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """A dozen blind robots, made, diagnosed and scored as a person does it, give what they gave before: every diagnosis.json but for its list of all residuals, and
-the verdicts of the scored benchmark. Where a change of the diagnosis is meant to change them, --write makes the golden files anew.
+the verdicts of the scored benchmark. --contrast: the verdicts of a dozen robots that flew two sessions. Where a change of the diagnosis is meant to change
+them, --write makes the golden files anew.
 
-    golden_dozen_test.py BIN PROJECT WORK [--write]
+    golden_dozen_test.py BIN PROJECT WORK [--contrast] [--write]
 """
 
 import csv
@@ -14,6 +15,7 @@ import subprocess
 import sys
 
 PARTS = ["singles", "singles_current", "none", "parameters", "withheld", "pairs"]
+CONTRASTS = ["changed", "changed_short_test", "unchanged", "changed_withheld", "changed_outside", "changed_pairs"]
 VERDICT = ["case", "part", "effects", "verdict", "named"]
 # libm takes other instructions on other processors, and its last bits differ.
 RELATIVE, ABSOLUTE = 1e-6, 1e-9
@@ -39,13 +41,8 @@ def run(work, *words):
         sys.exit(f"{words[0].name} {words[1]}: exit code {done.returncode}: {done.stderr}")
 
 
-def main():
-    tools, project, work = (pathlib.Path(a).resolve() for a in sys.argv[1:4])
-    write = sys.argv[4:] == ["--write"]
-    golden = project / "tests/data/golden_dozen"
-    shutil.rmtree(work, ignore_errors=True)
-    work.mkdir(parents=True)
-    run(work, tools / "flappy-blind", "make", "--out", "bench", "--set", "development", "--cases", 2, "--part", *PARTS)
+def diagnoses(tools, project, work, golden, write):
+    """One line for each place in which the diagnosis of a case differs."""
     found = []
     for case in json.loads((work / "bench/manifest.json").read_text())["cases"]:
         number = f"{case['number']:04}"
@@ -59,14 +56,27 @@ def main():
             file.write_text(json.dumps(diagnosis, indent=1) + "\n")
         else:
             found += [f"{number}{line}" for line in differences(diagnosis, json.loads(file.read_text()))]
+    return found
+
+
+def main():
+    tools, project, work = (pathlib.Path(a).resolve() for a in sys.argv[1:4])
+    contrast, write = "--contrast" in sys.argv[4:], "--write" in sys.argv[4:]
+    golden = project / "tests/data/golden_dozen"
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True)
+    parts = ["--contrast", "--part", *CONTRASTS] if contrast else ["--part", *PARTS]
+    run(work, tools / "flappy-blind", "make", "--out", "bench", "--set", "development", "--cases", 2, *parts)
+    found = [] if contrast else diagnoses(tools, project, work, golden, write)
+    table = golden / ("contrasts.csv" if contrast else "verdicts.csv")
     run(work, tools / "flappy-blind", "score", "bench", "--json", "bench.json")
     with open(work / "bench/score.csv", newline="") as stream:
         verdicts = [[row[key] for key in VERDICT] for row in csv.DictReader(stream)]
     if write:
-        with open(golden / "verdicts.csv", "w", newline="") as stream:
+        with open(table, "w", newline="") as stream:
             csv.writer(stream, lineterminator="\n").writerows([VERDICT, *verdicts])
     else:
-        with open(golden / "verdicts.csv", newline="") as stream:
+        with open(table, newline="") as stream:
             found += [f"verdicts: {line}" for line in differences(verdicts, list(csv.reader(stream))[1:])]
     print("\n".join(found[:50]) or "as before")
     sys.exit(bool(found))
