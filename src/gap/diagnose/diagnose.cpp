@@ -133,11 +133,26 @@ DiagnosisRequest read_request(const DiagnosisSettings& settings) {
           std::move(manoeuvres)};
 }
 
-Diagnosed diagnose(const DiagnosisRequest& request,
-                   const std::function<bool(double share, const std::string& what)>& progress) {
+namespace {
+
+/// Reference flights and their fit, for all sets that are compared with them.
+struct Reference {
+  Flights flights;
+  std::unique_ptr<const RobotFit> fit;
+};
+
+std::shared_ptr<PredictedFlight> predicted(const DiagnosisRequest& request, const std::string& folder,
+                                           flightlog::FlightLog log) {
+  if (request.vehicle.beat_averaged)
+    return std::make_shared<BeatAveragedPrediction>(folder, std::move(log), request.vehicle, request.channels);
+  return std::make_shared<ResetPrediction>(Recording(folder, std::move(log), request.vehicle));
+}
+
+Diagnosed diagnose_flights(const DiagnosisRequest& request, const std::vector<std::string>& tests, Reference& reference,
+                           const std::function<bool(double share, const std::string& what)>& progress) {
   const std::size_t references = request.settings.reference.size();
   std::vector<std::string> folders = request.settings.reference;
-  folders.insert(folders.end(), request.settings.flights.begin(), request.settings.flights.end());
+  folders.insert(folders.end(), tests.begin(), tests.end());
   std::vector<flightlog::FlightLog> logs;
   for (const std::string& folder : folders) logs.push_back(flightlog::read_flight_log(folder));
   std::vector<flightlog::FlightHeader> headers;
@@ -148,29 +163,40 @@ Diagnosed diagnose(const DiagnosisRequest& request,
     d.result = result_of(folders, std::move(faults));
     return d;
   }
-  for (std::size_t f = 0; f < logs.size(); ++f) {
-    std::shared_ptr<PredictedFlight> flight;
-    if (request.vehicle.beat_averaged)
-      flight =
-          std::make_shared<BeatAveragedPrediction>(folders[f], std::move(logs[f]), request.vehicle, request.channels);
-    else flight = std::make_shared<ResetPrediction>(Recording(folders[f], std::move(logs[f]), request.vehicle));
-    if (f < references) flight->set_reference();
-    d.flights.push_back(std::move(flight));
+  while (reference.flights.size() < references) {
+    const std::size_t f = reference.flights.size();
+    const auto flight = predicted(request, folders[f], std::move(logs[f]));
+    flight->set_reference();
+    reference.flights.push_back(flight);
   }
+  d.flights = reference.flights;
+  for (std::size_t f = references; f < logs.size(); ++f)
+    d.flights.push_back(predicted(request, folders[f], std::move(logs[f])));
   InferenceOptions options = request.options;
   options.progress = progress;
-  d.inference = infer(d.flights, request.uncertain, options);
+  if (references > 0 && !reference.fit) {
+    if (progress) progress(0, "fitting the reference");
+    reference.fit = std::unique_ptr<const RobotFit>(new RobotFit(RobotFit::of_references(
+        reference.flights, request.uncertain, options.discrepancy, options.withheld, options.threads)));
+  }
+  d.inference = infer(d.flights, request.uncertain, options, reference.fit.get());
   d.uncertain = request.uncertain;
   d.uncertain->set_minors(d.inference.minors);
-  d.result = result_of(request.settings.flights, d.flights, *d.uncertain, d.inference);
+  d.result = result_of(tests, d.flights, *d.uncertain, d.inference);
   d.result.reference = request.settings.reference;
   if (references > 0) d.result.warnings = contrast_warnings(headers, d.flights);
   if (d.inference.complete) d.corrected = corrected_vehicle(request.vehicle, d.inference, *d.uncertain);
+  return d;
+}
+
+}  // namespace
+
+Diagnosed diagnose(const DiagnosisRequest& request,
+                   const std::function<bool(double share, const std::string& what)>& progress) {
+  Reference reference;
+  Diagnosed d = diagnose_flights(request, request.settings.flights, reference, progress);
   for (const NamedFlights& other : request.others) {
-    DiagnosisRequest alone = request;
-    alone.settings.flights = other.flights;
-    alone.others.clear();
-    d.result.sets.push_back({other.name, diagnose(alone, progress).result});
+    d.result.sets.push_back({other.name, diagnose_flights(request, other.flights, reference, progress).result});
     d.result.complete = d.result.complete && d.result.sets.back().diagnosis.complete;
   }
   return d;

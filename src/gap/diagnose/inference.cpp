@@ -78,18 +78,21 @@ void keep_tests(std::size_t references, Inference& d) {
 
 }  // namespace
 
-Inference infer(const Flights& flights, const sim::Randomisation& uncertain, const InferenceOptions& options) {
+Inference infer(const Flights& flights, const sim::Randomisation& uncertain, const InferenceOptions& options,
+                const RobotFit* reference) {
   const int threads = io::thread_count(options.threads);
   const VerdictRule& rule = options.rule;
   Progress progress(options);
 
   progress(0, "fitting parameters");
   const Flights references = references_of(flights);
-  const RobotFit robot =
-      references.empty()
-          ? RobotFit(flights, uncertain, options.discrepancy, options.withheld, threads)
-          : RobotFit(RobotFit::of_references(references, uncertain, options.discrepancy, options.withheld, threads),
-                     flights);
+  const auto of_references = [&] {
+    return RobotFit::of_references(references, uncertain, options.discrepancy, options.withheld, threads);
+  };
+  const RobotFit robot = references.empty()
+                             ? RobotFit(flights, uncertain, options.discrepancy, options.withheld, threads)
+                         : reference != nullptr ? RobotFit(*reference, flights)
+                                                : RobotFit(of_references(), flights);
   const Baselines baselines = weigh_baselines(robot, rule);
 
   progress(0.3, "screening effects");

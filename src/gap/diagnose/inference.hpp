@@ -74,6 +74,8 @@ struct Inference {
 };
 
 /// Runs all stages on the flights of one robot. After a stop it decides among the hypotheses fitted by then.
-Inference infer(const Flights& flights, const sim::Randomisation& uncertain, const InferenceOptions& options);
+/// `reference`: the fit of the reference flights (RobotFit::of_references); null: they are fitted here.
+Inference infer(const Flights& flights, const sim::Randomisation& uncertain, const InferenceOptions& options,
+                const RobotFit* reference = nullptr);
 
 }  // namespace flappy::gap
