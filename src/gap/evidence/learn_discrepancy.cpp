@@ -255,7 +255,7 @@ SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim
     if (!p.effect.empty()) continue;
     go_on();
     harmless.push_back(std::make_unique<const RobotFit>(of_references(p), p.flights));
-    for (const auto& f : references_of(p.flights)) f->memo().clear();
+    for (const auto& f : p.flights) f->forget();
   }
   ModelDiscrepancy now = start;
   for (int n = 1; n <= kIterations && !harmless.empty(); ++n) {
@@ -275,7 +275,7 @@ SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim
     go_on();
     const RobotFit robot(of_references(p), p.flights);
     if (const auto error = law_error(robot, p.effect, now)) errors.push_back(*error);
-    for (const auto& f : references_of(p.flights)) f->memo().clear();
+    for (const auto& f : p.flights) f->forget();
   }
   if (errors.size() < kFewestLaws) return now.session;
   SessionVariation& s = now.session;

@@ -90,6 +90,10 @@ class PredictedFlight {
   void set_reference() { memo_ = std::make_shared<ResidualMemo>(); }
   /// Only of a reference.
   ResidualMemo& memo() const { return *memo_; }
+  /// Frees what is kept to be faster: hundreds of megabytes.
+  virtual void forget() const {
+    if (memo_) memo_->clear();
+  }
   virtual const std::string& name() const = 0;
   virtual std::size_t beats() const = 0;
   virtual double beats_Hz() const = 0;

@@ -412,6 +412,12 @@ std::shared_ptr<const PredictedFlight> ResetPrediction::with_log(flightlog::Flig
   return std::make_shared<ResetPrediction>(Recording(recording_, std::move(log)));
 }
 
+void ResetPrediction::forget() const {
+  PredictedFlight::forget();
+  const std::scoped_lock lock(mutex_);
+  corrected_.clear();
+}
+
 std::shared_ptr<const PredictedFlight> ResetPrediction::corrected(const EffectValues& sensors) const {
   {
     const std::scoped_lock lock(mutex_);

@@ -39,6 +39,7 @@ class ResetPrediction final : public PredictedFlight {
   std::shared_ptr<const PredictedFlight> with_log(flightlog::FlightLog log) const override;
   /// Undoes errors of sensors in the log. Caches the last kMaxCorrected results; several threads may call it.
   std::shared_ptr<const PredictedFlight> corrected(const EffectValues& sensors) const override;
+  void forget() const override;
   static constexpr std::size_t kMaxCorrected = 8;
 
  private:
