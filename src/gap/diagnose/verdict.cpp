@@ -132,15 +132,16 @@ void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictR
   std::ranges::stable_sort(hypotheses, std::greater{}, &ScoredHypothesis::probability);
 }
 
-void conclude(const VerdictRule& rule, Inference& d) {
+void conclude(const VerdictRule& rule, Inference& d, bool contrast) {
   struct Pool {
     double probability = 0;
     std::size_t best = 0;
   };
   const std::vector<ScoredHypothesis>& all = d.hypotheses;
   std::map<std::string, Pool> pools;  // by key: "/" tells other kinds from groups of effects
-  const auto key = [](const ScoredHypothesis& a) {
-    return a.kind == HypothesisKind::effect ? pool_name(a.effects) : "/" + std::string(name_of(a.kind));
+  const auto key = [&](const ScoredHypothesis& a) {
+    if (a.kind == HypothesisKind::effect) return pool_name(a.effects);
+    return "/" + std::string(name_of(contrast && a.kind == HypothesisKind::none ? HypothesisKind::parameters : a.kind));
   };
   for (std::size_t i = 0; i < all.size(); ++i) {
     const auto [at, fresh] = pools.try_emplace(key(all[i]), Pool{0, i});
@@ -159,10 +160,9 @@ void conclude(const VerdictRule& rule, Inference& d) {
   d.verdict.remainder = best.kind == HypothesisKind::effect && best.has_remainder();
   switch (best.kind) {
     case HypothesisKind::none:
-      d.verdict.kind = VerdictKind::none;
-      return;
     case HypothesisKind::parameters:
-      d.verdict.kind = VerdictKind::parameters;
+      d.verdict.kind = best.kind == HypothesisKind::none ? VerdictKind::none : VerdictKind::parameters;
+      d.verdict.probability = pool.probability;
       return;
     case HypothesisKind::unknown:
       d.verdict.kind = VerdictKind::unknown;
@@ -199,7 +199,7 @@ void decide(const RobotFit& robot, const Fitter& fitter, const Flights& flights,
   if (policy.discrepancy_scales && !robot.evidence().contrasts())
     share_backgrounds(robot, fitter.scales(), rule.unknown.penalty_nats, d.hypotheses);
   set_probabilities(d.hypotheses, rule);
-  conclude(rule, d);
+  conclude(rule, d, robot.evidence().contrasts());
   if (policy.discrepancy_scales) predict_with_the_likeliest(d);
 }
 

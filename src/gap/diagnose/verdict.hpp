@@ -27,8 +27,9 @@ void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictR
 
 /// Sets d.verdict and d.concluded. Hypotheses with effects of the same groups (EffectInfo::group) form a pool, as short
 /// flights often cannot tell them apart. The verdict names the most probable one of the most probable pool if its share
-/// of all, or of that pool, is large enough (`naming` of the rule); else it is `group`.
-void conclude(const VerdictRule& rule, Inference& d);
+/// of all, or of that pool, is large enough (`naming` of the rule); else it is `group`. In a contrast, none and
+/// parameters form a pool, too: in both, nothing that matters changed.
+void conclude(const VerdictRule& rule, Inference& d, bool contrast = false);
 
 /// Sets predicted_with of the conclusion to the effects of the likeliest hypothesis that contains its own. Further
 /// effects may be due to chance, so they are not named; yet a vehicle with them predicts better.

@@ -106,6 +106,17 @@ TEST(Verdict, NamesTheLargestMass) {
   EXPECT_EQ(conclude({hypothesis(0.4, {"wind"}), hypothesis(0.6, HypothesisKind::parameters)}).concluded, 1u);
 }
 
+TEST(Verdict, PoolsWhatIsHarmlessInAContrast) {
+  Inference d;
+  d.hypotheses = {hypothesis(0.4, {"wind"}), hypothesis(0.25, HypothesisKind::parameters),
+                  hypothesis(0.2, HypothesisKind::none), hypothesis(0.15, HypothesisKind::unknown)};
+  gap::conclude(read_verdict_rule(), d);
+  EXPECT_EQ(d.verdict.kind, VerdictKind::effect);
+  gap::conclude(read_verdict_rule(), d, true);
+  EXPECT_EQ(d.verdict.kind, VerdictKind::parameters);
+  EXPECT_DOUBLE_EQ(d.verdict.probability, 0.45);
+}
+
 TEST(Verdict, PoolsRivals) {
   // together they outweigh the parameters, and neither is clear
   const Inference d = conclude({hypothesis(0.4, HypothesisKind::parameters), hypothesis(0.3, {"rotational_lift"}),
