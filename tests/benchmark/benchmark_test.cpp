@@ -280,10 +280,6 @@ TEST_F(BlindContrast, NamesWhatChanged) {
   EXPECT_EQ(json.at("cases"), 1);
 }
 
-TEST_F(BlindContrast, SaysThatWhatChangedIsUnknown) {
-  EXPECT_EQ(made_and_scored("changed_withheld").at("contrast_unknown"), 1.0);
-}
-
 TEST_F(Benchmark, PlansContrasts) {
   const blind::Family& family = family_named("a");
   io::write_atomically(root_ / "detectable.toml", detectability());

@@ -16,7 +16,7 @@
 namespace flappy::benchmark {
 
 /// Answers of all baselines but black_box, by name. `flights`: without references. In a contrast, residuals are what is
-/// left beside what the references show: Inference::refit.
+/// left given what the references show: Inference::refit.
 std::map<std::string, Baseline> baselines(const gap::Flights& flights, const sim::Randomisation& uncertain,
                                           const gap::Inference& inference, const std::vector<std::string>& withheld,
                                           int threads);

@@ -198,7 +198,7 @@ std::vector<Residuals> held_out(const Fitter& fitter, const Flights& flights, co
       std::vector<char> others(flights.size(), 1);
       for (std::size_t f = 0; folds > 1 && f < flights.size(); ++f) others[f] = fold[f] != static_cast<int>(k) ? 1 : 0;
       if (evidence.contrasts()) {  // references hold the parameters where they were linearised
-        const BasisCoefficients explained = fitter.explained(fit.hypothesis, *fit.fit, others);
+        const BasisCoefficients explained = fitter.explained(*fit.fit, others);
         for (std::size_t f = 0; f < flights.size(); ++f)
           if (fold[f] == static_cast<int>(k)) left[i][f] = evidence.without(f, fit.fit->residual[f], explained);
         continue;

@@ -326,9 +326,9 @@ Fitter::JointFit Fitter::joint_fit(const Hypothesis& hypothesis, const Fit& fit,
   return joint;
 }
 
-BasisCoefficients Fitter::explained(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const {
+BasisCoefficients Fitter::explained(const Fit& fit, const std::vector<char>& use) const {
   const Regressors r = regressors(fit);
-  const BasisCoefficients sd = discrepancy_sd(hypothesis, fit);
+  const BasisCoefficients sd = evidence_->discrepancy_sd(scales_);
   const Posterior p =
       Evidence::posterior(evidence_->reduce(fit.statistics, r.columns, use, sd), r.all, r.prior_mean(), false);
   BasisCoefficients all = BasisCoefficients::Zero(kGroups, evidence_->basis().size());

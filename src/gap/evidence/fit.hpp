@@ -88,8 +88,9 @@ class Fitter {
   JointFit joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use,
                      bool with_background = true) const;
   /// The part of a fit's residual that everything explains by linear columns, learnt from some flights alone: in a
-  /// contrast, changes of the parameters, and what the model gets wrong in both sessions or sessions differ by.
-  BasisCoefficients explained(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
+  /// contrast, changes of the parameters, and what the model gets wrong in both sessions or sessions differ by. Effects
+  /// follow the laws of the catalogue.
+  BasisCoefficients explained(const Fit& fit, const std::vector<char>& use) const;
   /// Standard deviation, [group][basis], of the deviations of effects that act by the place from the catalogue's laws.
   BasisCoefficients law_sd(const Hypothesis& hypothesis, const Fit& fit) const {
     return law_sd(hypothesis, fit, fit.law_factor);

@@ -22,8 +22,8 @@ constexpr double kShrink = 6;
 /// Least estimates: smaller ones are due to the small number of robots.
 constexpr double kMinShare = 2e-4, kMinBackground = 0.01;
 /// Errors of laws are learnt from no fewer pairs; least standard deviation of their logarithm.
-constexpr std::size_t kFewestLaws = 5;
-constexpr double kLeastSpread = 0.25;
+constexpr std::size_t kMinLaws = 5;
+constexpr double kMinSpread = 0.25;
 constexpr std::size_t kKinds = static_cast<std::size_t>(BasisFunction::count);
 
 struct Moment {
@@ -277,10 +277,10 @@ SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim
     if (const auto error = law_error(robot, p.effect, now)) errors.push_back(*error);
     for (const auto& f : p.flights) f->forget();
   }
-  if (errors.size() < kFewestLaws) return now.session;
+  if (errors.size() < kMinLaws) return now.session;
   SessionVariation& s = now.session;
   s.law_error = io::median(errors);
-  s.law_spread = std::max(std::log(io::quantile(errors, 0.84) / io::quantile(errors, 0.16)) / 2, kLeastSpread);
+  s.law_spread = std::max(std::log(io::quantile(errors, 0.84) / io::quantile(errors, 0.16)) / 2, kMinSpread);
   s.law_most = std::max(io::quantile(errors, 0.95) / s.law_error, 1.0);
   return s;
 }

@@ -22,12 +22,12 @@ class ResidualMemo {
     const auto at = known_.find(key);
     return at == known_.end() ? std::nullopt : std::optional(at->second);
   }
-  /// Forgets the oldest of more than kMost.
+  /// Forgets the oldest of more than kMaxKept.
   void keep(const Key& key, std::vector<double> rows) {
     const std::scoped_lock lock(mutex_);
     if (!known_.insert_or_assign(key, std::move(rows)).second) return;
     order_.push_back(key);
-    if (order_.size() <= kMost) return;
+    if (order_.size() <= kMaxKept) return;
     known_.erase(order_.front());
     order_.pop_front();
   }
@@ -39,7 +39,7 @@ class ResidualMemo {
 
  private:
   /// A quarter of a megabyte each for a flight of 10 s; a linearisation of all parameters takes some 120.
-  static constexpr std::size_t kMost = 256;
+  static constexpr std::size_t kMaxKept = 256;
   mutable std::mutex mutex_;
   std::map<Key, std::vector<double>> known_;
   std::deque<Key> order_;
