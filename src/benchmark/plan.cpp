@@ -15,7 +15,7 @@ namespace {
 constexpr std::uint64_t kSeedsOfAFamily = 10'000'000, kReported = 8'500'000, kSeedsOfAPart = 10'000;
 /// Least number of cases of most parts; rounded up so that all effects of a part have as many.
 constexpr std::size_t kAtLeast = 100;
-/// The same of a contrast.
+/// Least numbers of cases in parts of a contrast.
 constexpr std::size_t kSingles = 60, kHarmless = 30, kStrange = 15, kPairs = 20;
 constexpr double kOverDetectable = 2, kLargest = 4;
 /// For effects outside the catalogue that the table does not list.

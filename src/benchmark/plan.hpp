@@ -32,7 +32,7 @@ struct PlannedCase {
   bool hover = false, power = false;
   bool own_parameters = false, conventions = false;  ///< as in blind::Assignment
   bool published = false;                            ///< its vehicle is drawn from the published randomisation
-  /// Of a contrast: the robot flies `flights` of another session, and before them `references` without its effects.
+  /// In a contrast, the robot flies `references` flights without its effects, and then `flights` in another session.
   std::size_t references = 0, flights = blind::Family::kFlights;
   bool calm_reference = false;        ///< the references hover and follow slow paths
   std::vector<std::string> withheld;  ///< effects withheld from the catalogue
@@ -48,7 +48,7 @@ struct PlanOptions {
   bool contrast = false;           ///< parts of the contrast; false: of the diagnosis without reference flights
   std::vector<std::string> parts;  ///< empty: all
   std::size_t at_most = 0;         ///< most cases of each part; 0: all
-  std::size_t flights = blind::Family::kFlights;  ///< of a contrast: most flights of a session
+  std::size_t flights = blind::Family::kFlights;  ///< most flights of a session of a contrast
 };
 
 /// Seeds of family b begin at 20,000,000 (development) and 28,500,000 (reported); a and c: 10,000,000 and 30,000,000

@@ -212,7 +212,7 @@ std::map<std::string, Baseline> baselines(const gap::Flights& flights, const sim
   }
   std::vector<gap::Residuals> rows = residuals(flights, vehicles, threads);
   const gap::Residuals& residual = residual_of(flights, d);
-  // of the same flights as `flights`, which come last
+  // the references' residuals come first
   const gap::Residuals here(d.parameters.residual.end() - static_cast<std::ptrdiff_t>(flights.size()),
                             d.parameters.residual.end());
   std::vector<gap::Residuals> columns;

@@ -64,7 +64,7 @@ void add_hypotheses(const RowContext& context, const sim::Randomisation& uncerta
 
 constexpr std::size_t kSuspects = 3;
 
-/// Of hypotheses with an effect, those with it count.
+/// Sums the probabilities of all hypotheses that contain an effect.
 std::vector<Suspect> suspects_of(const std::vector<RankedHypothesis>& hypotheses) {
   std::vector<Suspect> all;
   double any = 0;
