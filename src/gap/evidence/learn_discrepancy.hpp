@@ -18,7 +18,7 @@ ModelDiscrepancy learn_discrepancy(const std::vector<Flights>& flights, const si
 /// Two sessions of a robot.
 struct SessionPair {
   Flights flights;     ///< references and then test flights
-  std::string effect;  ///< what changed between them, of the catalogue; empty: nothing that matters
+  std::string effect;  ///< effect of the catalogue that appeared between them; empty: none
 };
 
 /// Learns what differs between sessions from pairs in which nothing that matters changed, and how far laws of one cause

@@ -44,7 +44,7 @@ struct RankedHypothesis {
 struct Suspect {
   std::string effect;
   double probability = 0;          ///< that it is among the missing effects, given that one is missing
-  std::optional<Closure> closure;  ///< of the effect alone; none: it was not fitted by simulation
+  std::optional<Closure> closure;  ///< none: the effect alone was not fitted by simulation
 };
 
 /// group: one of several effects that the flights cannot tell apart. data: the data forbid a diagnosis.
