@@ -29,8 +29,25 @@ struct Constant {
   bool by_factors;  ///< else by steps of 40 nats or, of a share, half of its range
 };
 
-const std::array<Constant, 9>& constants() {
-  static const std::array<Constant, 9> kAll = {{
+/// Place of a number in the text of a TOML file: first character and length. None: the file lacks it.
+std::optional<std::pair<std::size_t, std::size_t>> find_number(const std::string& text, const std::string& table,
+                                                               const std::string& key) {
+  const std::size_t header = text.find("\n[" + table + "]");
+  if (header == std::string::npos) return std::nullopt;
+  const std::size_t end = text.find("\n[", header + 1), at = text.find("\n" + key + " = ", header);
+  if (at >= end) return std::nullopt;
+  const std::size_t begin = at + key.size() + 4;
+  return std::pair{begin, text.find_first_of(" \n", begin) - begin};
+}
+
+/// Comments and layout stay.
+void set_number(std::string& text, const std::string& table, const std::string& key, const std::string& value) {
+  if (const auto place = find_number(text, table, key)) text.replace(place->first, place->second, value);
+}
+
+/// The constants that a verdict file has.
+std::vector<Constant> constants_of(const std::string& file) {
+  std::vector<Constant> all = {
       {"tempering", "nats", [](VerdictRule& r) -> double& { return r.tempering.nats; }, 0.1, 100, true},
       {"tempering", "freedom", [](VerdictRule& r) -> double& { return r.tempering.freedom; }, 0.3, 30, true},
       {"gain", "by_chance_nats", [](VerdictRule& r) -> double& { return r.gain.by_chance_nats; }, 0, 300, false},
@@ -41,8 +58,9 @@ const std::array<Constant, 9>& constants() {
       {"prior", "parameters", [](VerdictRule& r) -> double& { return r.prior.parameters; }, 0.01, 0.9, true},
       {"prior", "unknown", [](VerdictRule& r) -> double& { return r.prior.unknown; }, 0.01, 0.8, true},
       {"prior", "remainder", [](VerdictRule& r) -> double& { return r.prior.remainder; }, 0.001, 1, true},
-  }};
-  return kAll;
+  };
+  std::erase_if(all, [&](const Constant& c) { return !find_number(file, c.table, c.key); });
+  return all;
 }
 
 struct Case {
@@ -71,7 +89,8 @@ double moved_prior(const ScoredHypothesis& a, const VerdictRule& from, const Ver
 
 class Calibration {
  public:
-  explicit Calibration(const CalibrateCommand& command) : rule_(gap::read_verdict_rule(command.verdict)) {
+  explicit Calibration(const CalibrateCommand& command)
+      : rule_(gap::read_verdict_rule(command.verdict)), constants_(constants_of(io::read_text(command.verdict))) {
     std::map<std::string, std::size_t> parts;
     std::vector<double> counts;
     for (const fs::path& folder : command.folders) {
@@ -108,6 +127,7 @@ class Calibration {
 
   std::size_t cases() const { return cases_.size(); }
   const VerdictRule& start() const { return rule_; }
+  const std::vector<Constant>& constants() const { return constants_; }
 
   /// Weighted mean logarithm of the probability of the right answers.
   double score(const VerdictRule& rule) const {
@@ -135,7 +155,7 @@ class Calibration {
     for (double step = 0.5; step > 0.01; step /= 2)
       for (bool better = true; better;) {
         better = false;
-        for (const Constant& c : constants())
+        for (const Constant& c : constants_)
           for (const double way : {step, -step}) {
             VerdictRule there = rule;
             double& x = c.of(there);
@@ -163,18 +183,11 @@ class Calibration {
   }
 
   VerdictRule rule_;
+  std::vector<Constant> constants_;
   std::vector<Case> cases_;
 };
 
 std::string rounded(double x) { return io::format("%.4g", x); }
-
-/// In the text of a TOML file; comments and layout stay.
-void set_number(std::string& text, const std::string& table, const std::string& key, const std::string& value) {
-  const std::size_t from = text.find("\n[" + table + "]"), at = text.find("\n" + key + " = ", from);
-  if (from == std::string::npos || at == std::string::npos) return;
-  const std::size_t begin = at + key.size() + 4, end = text.find_first_of(" \n", begin);
-  text.replace(begin, end - begin, value);
-}
 
 }  // namespace
 
@@ -189,7 +202,7 @@ Json calibrate(const CalibrateCommand& command) {
   std::string text = io::read_text(command.verdict);
   Json json = {
       {"cases", calibration.cases()}, {"score_before", calibration.score(before)}, {"score", calibration.score(after)}};
-  for (const Constant& c : constants()) {
+  for (const Constant& c : calibration.constants()) {
     set_number(text, c.table, c.key, rounded(c.of(after)));
     json[std::string(c.table) + "." + c.key] = c.of(after);
     std::printf("%-12s %-24s %10.4g, was %.4g\n", c.table, c.key, c.of(after), c.of(before));

@@ -91,6 +91,7 @@ class Predictions {
             .verdict = command_.verdict,
             .sessions = command_.sessions,
             .withheld = withheld,
+            .residual = command_.residual,
             .experiments = command_.experiments};
   }
 

@@ -83,9 +83,9 @@ TEST(Effects, AreTheCatalogue) {
     EXPECT_EQ(model::effect_index(e.info.id), static_cast<int>(ids.size()) - 1);
     if (*e.info.group) groups.insert(e.info.group);
   }
-  EXPECT_EQ(ids.size(), 30u);
+  EXPECT_EQ(ids.size(), 31u);
   EXPECT_EQ(groups, (std::set<std::string_view>{"wing_inertia", "unsteady_lift", "low_voltage", "asymmetry",
-                                                "thrust_loss", "world_force", "drive_lag"}));
+                                                "thrust_loss", "world_force", "drive_lag", "wing_compliance"}));
 }
 
 TEST(Effects, StateTheirParameters) {
@@ -96,6 +96,7 @@ TEST(Effects, StateTheirParameters) {
       "roll_gain_m",       "twist_rad_N", "x_m_s",          "y_m_s",    "z_m_s",
       "gust_m_s",          "per_rad2",    "stribeck_rad_s", "rise_K_W", "fade_V_C",
       "compliance_rad_Nm", "line_kg_m",   "stiffness_N_m"};
+  const std::set<std::string_view> accelerations = {"s2", "s"};  // of the residual, per velocity and rate
   for (const CatalogueEffect& e : effects()) {
     EXPECT_GE(e.info.magnitudes, 1) << e.info.id;
     EXPECT_LE(e.info.magnitudes, static_cast<int>(e.parameters.size())) << e.info.id;
@@ -103,7 +104,9 @@ TEST(Effects, StateTheirParameters) {
     for (std::size_t k = 0; k < e.parameters.size(); ++k) {
       const EffectParameter& p = e.parameters[k];
       const std::string_view name = p.name;
-      EXPECT_TRUE(ratios.contains(name) || compound.contains(name) || units.contains(name.substr(name.rfind('_') + 1)))
+      EXPECT_TRUE(ratios.contains(name) || compound.contains(name) ||
+                  units.contains(name.substr(name.rfind('_') + 1)) ||
+                  (!e.info.cause && accelerations.contains(name.substr(name.rfind('_') + 1))))
           << e.info.id << "." << name;
       EXPECT_LE(p.low, p.prior_low) << e.info.id << "." << name;
       EXPECT_LE(p.prior_low, p.typical) << e.info.id << "." << name;

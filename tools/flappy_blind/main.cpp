@@ -163,6 +163,7 @@ int main(int argc, char** argv) {
               "what models get wrong; of a family: configs/gap/discrepancy/without_FAMILY.toml")
       .shows_default();
   score.option("--sessions", scored.sessions, "what differs between sessions, for a contrast").shows_default();
+  score.flag("--residual", scored.residual, "give corrected vehicles what is left, as a smooth load, for the loop");
   score.option("--verdict", scored.verdict,
                "constants of the verdict; none: configs/gap/verdict.toml, for a contrast contrast_verdict.toml");
   score.option("--threads", scored.threads, "cases at a time; 0: one for each processor").range(0, 1024);

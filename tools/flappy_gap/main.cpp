@@ -124,7 +124,7 @@ Json list_effects(bool beat_averaged) {
   Json all = Json::array();
   std::printf("| effect | stage | parameter | role | typical | accepted | 90 %% of the prior | group | source |\n");
   std::printf("|---|---|---|---|---|---|---|---|---|\n");
-  for (const model::CatalogueEffect& e : model::catalogue_of(vehicle)) {
+  for (const model::CatalogueEffect& e : model::causes_of(vehicle)) {
     Json parameters = Json::array();
     const std::string group = *e.info.group == '\0' ? "-" : e.info.group;
     for (std::size_t k = 0; k < e.parameters.size(); ++k) {
@@ -186,6 +186,8 @@ int main(int argc, char** argv) {
                   "what was flown, as a configuration of flappy-fly; else the recorded paths, under its hover's");
   diagnose.option("--channels", command.settings.channels, "of a beat-averaged vehicle: only these, as force_x");
   diagnose.option("--withhold", command.settings.withheld, "effects to leave out of the catalogue");
+  diagnose.flag("--residual", command.settings.residual,
+                "give the corrected vehicle what is left, as a smooth load without a cause");
   diagnose.option("--out", command.out, "folder for diagnosis.json, the corrected vehicle, tables and figures");
   diagnose.option("--threads", command.settings.threads, "0: one for each processor").range(0, 1024);
   io::Command learn = program.app().command(

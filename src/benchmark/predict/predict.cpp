@@ -20,6 +20,7 @@ Prediction predict(const Question& q) {
   settings.verdict = q.verdict;
   settings.sessions = q.sessions;
   settings.withheld = q.withheld;
+  settings.residual = q.residual;
   settings.experiments = q.experiments;
   settings.threads = 1;
   const gap::DiagnosisRequest request = read_request(settings);

@@ -38,6 +38,7 @@ struct Question {
   /// TOML files. All but the vehicle may be empty: gap::DiagnosisSettings.
   std::filesystem::path vehicle, priors, discrepancy, verdict, sessions;
   std::vector<std::string> withheld;  ///< effects to leave out of the catalogue
+  bool residual = false;              ///< give the corrected vehicle what is left, as a smooth load
   bool baselines = true;              ///< also compute Prediction::baselines and ::features
   /// Folder of manoeuvres (*.toml), one of which is proposed if the verdict abstains; empty: none.
   std::filesystem::path experiments;

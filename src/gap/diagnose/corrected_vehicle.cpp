@@ -1,5 +1,6 @@
 #include "gap/diagnose/corrected_vehicle.hpp"
 
+#include "gap/diagnose/residual_load.hpp"
 #include "model/posterior.hpp"
 
 namespace flappy::gap {
@@ -7,19 +8,25 @@ namespace flappy::gap {
 model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Inference& d,
                                  const sim::Randomisation& uncertain) {
   const ScoredHypothesis& best = d.predicting();
-  const Hypothesis h(uncertain, best.effects);
+  const ResidualLoad* load = d.residual ? &*d.residual : nullptr;
+  const Hypothesis h(uncertain, load != nullptr ? load->hypothesis.effects() : best.effects);
   const Fit& fit = best.kind == HypothesisKind::effect ? best.fit : d.parameters;
   model::Vehicle corrected = vehicle;
-  if (best.kind != HypothesisKind::none) {
-    const Eigen::VectorXd& mean = d.corrected;
-    const Eigen::MatrixXd covariance = fit.covariance();
+  if (best.kind != HypothesisKind::none || load != nullptr) {
+    const Eigen::VectorXd& mean = load != nullptr ? load->at : d.corrected;
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(h.size(), h.size());
+    covariance.topLeftCorner(d.corrected.size(), d.corrected.size()) = fit.covariance();
+    if (load != nullptr)
+      covariance.bottomRightCorner(load->covariance.rows(), load->covariance.cols()) = load->covariance;
+    const auto at = [&](const Eigen::VectorXd& coordinates) {
+      model::Vehicle there = h.vehicle(h.bounded(coordinates)).vehicle;
+      return load != nullptr ? with_limits(std::move(there), *load) : there;
+    };
     std::vector<std::vector<double>> rows;
     for (const auto& row : covariance.rowwise()) rows.emplace_back(row.begin(), row.end());
-    corrected = h.vehicle(mean).vehicle;
+    corrected = at(mean);
     corrected.posterior = model::posterior_of(
-        [&](const std::vector<double>& at) {
-          return h.vehicle(h.bounded(Eigen::Map<const Eigen::VectorXd>(at.data(), h.size()))).vehicle;
-        },
+        [&](const std::vector<double>& there) { return at(Eigen::Map<const Eigen::VectorXd>(there.data(), h.size())); },
         {mean.begin(), mean.end()}, rows);
   }
   corrected.name = vehicle.name + "_corrected";

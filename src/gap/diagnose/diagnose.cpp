@@ -59,7 +59,7 @@ rollout::FlyConfig read_pilot(const std::string& manoeuvre) {
 
 void check_withheld(const std::vector<std::string>& withheld, const model::Vehicle& vehicle) {
   std::vector<std::string> known;
-  for (const model::CatalogueEffect& e : model::catalogue_of(vehicle)) known.emplace_back(e.info.id);
+  for (const model::CatalogueEffect& e : model::causes_of(vehicle)) known.emplace_back(e.info.id);
   for (const std::string& id : withheld)
     if (model::find_effect(vehicle, id) == nullptr)
       throw io::InputError("--withhold " + id + ": no such effect; accepted: those that flappy-gap effects lists" +
@@ -114,10 +114,13 @@ DiagnosisRequest read_request(const DiagnosisSettings& settings) {
   InferenceOptions options;
   options.threads = s.threads;
   if (beat_averaged) {
-    options.max_finalists = static_cast<int>(model::catalogue_of(vehicle).size());
+    options.max_finalists = static_cast<int>(model::causes_of(vehicle).size());
     options.max_effects = kMaxBeatAveragedEffects;
   }
   options.withheld = s.withheld;
+  options.residual = s.residual;
+  if (s.residual && beat_averaged)
+    throw io::InputError("--residual: is not for a beat-averaged vehicle; accepted: a vehicle with wings");
   options.discrepancy = read_model_discrepancy(file(s.discrepancy, "model_discrepancy.toml"));
   const bool contrast = !s.reference.empty() && !beat_averaged;
   options.rule = read_verdict_rule(file(s.verdict, contrast ? "contrast_verdict.toml" : "verdict.toml"));

@@ -4,6 +4,7 @@
 
 #include "gap/diagnose/effect_fits.hpp"
 #include "gap/diagnose/held_out.hpp"
+#include "gap/diagnose/residual_load.hpp"
 #include "gap/diagnose/verdict.hpp"
 #include "io/parallel.hpp"
 
@@ -85,14 +86,9 @@ Inference infer(const Flights& flights, const sim::Randomisation& uncertain, con
   Progress progress(options);
 
   progress(0, "fitting parameters");
-  const Flights references = references_of(flights);
-  const auto of_references = [&] {
-    return RobotFit::of_references(references, uncertain, options.discrepancy, options.withheld, threads);
-  };
-  const RobotFit robot = references.empty()
-                             ? RobotFit(flights, uncertain, options.discrepancy, options.withheld, threads)
-                         : reference != nullptr ? RobotFit(*reference, flights)
-                                                : RobotFit(of_references(), flights);
+  const RobotFit robot = reference != nullptr
+                             ? RobotFit(*reference, flights)
+                             : RobotFit(flights, uncertain, options.discrepancy, options.withheld, threads);
   const Baselines baselines = weigh_baselines(robot, rule);
 
   progress(0.3, "screening effects");
@@ -121,9 +117,10 @@ Inference infer(const Flights& flights, const sim::Randomisation& uncertain, con
   hold_out(fitter, robot.uncertain(), flights, threads, d);
   decide(robot, fitter, flights, rule, d);
   correct(robot, fitter, d);
-  if (robot.evidence().policy().validate && references.empty())
+  if (options.residual && d.complete) d.residual = fit_residual_load(robot, fitter, flights, threads, d);
+  if (robot.evidence().policy().validate && reference == nullptr)
     d.validation = validate(fitter, robot.uncertain(), flights, d, threads);
-  keep_tests(references.size(), d);
+  keep_tests(references_of(flights).size(), d);
   return d;
 }
 

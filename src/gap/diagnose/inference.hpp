@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -41,11 +42,22 @@ struct ScoredHypothesis {
   double explained() const { return log_evidence - log_prior; }
 };
 
+/// A smooth load on the torso that describes what is left (gap/diagnose/residual_load.hpp).
+struct ResidualLoad {
+  Hypothesis hypothesis;                 ///< the effects of Inference::predicting(), and the load
+  Eigen::VectorXd at;                    ///< coordinates of the corrected vehicle, the load's last
+  Eigen::MatrixXd covariance;            ///< of the load's coordinates
+  std::map<std::string, double> limits;  ///< of the flown velocities and rates, by the load's parameter
+  /// Mean losses in held-out flights of the corrected vehicle without the load and with it; none: a single flight.
+  std::optional<double> loss_without, loss;
+};
+
 struct InferenceOptions {
   int threads = 0;
   int max_finalists = 8;                                                ///< effects that are fitted by simulation
   int max_effects = 3;                                                  ///< largest number of effects in a hypothesis
   std::vector<std::string> withheld;                                    ///< effects to leave out of the catalogue
+  bool residual = false;                                                ///< fit a ResidualLoad
   std::function<bool(double share, const std::string& what)> progress;  ///< returns false to fit no further effect
   ModelDiscrepancy discrepancy = read_model_discrepancy();
   VerdictRule rule = read_verdict_rule();
@@ -63,6 +75,7 @@ struct Inference {
   Eigen::VectorXd corrected;
   std::vector<double> minors;            ///< variates for sim::Randomisation::set_minors
   std::vector<SensorFinding> sensors;    ///< errors of declared sensors, given the conclusion
+  std::optional<ResidualLoad> residual;  ///< only if asked for
   std::optional<Validation> validation;  ///< only for a beat-averaged vehicle (DiagnosisPolicy::validate)
   Residuals nominal;                     ///< residuals of the vehicle file
   Residuals refit;                       ///< residuals with parameters fitted to the other flights, without effects
@@ -74,7 +87,7 @@ struct Inference {
 };
 
 /// Runs all stages on the flights of one robot. After a stop it decides among the hypotheses fitted by then.
-/// `reference`: the fit of the reference flights (RobotFit::of_references); null: they are fitted here.
+/// `reference`: the fit of the reference flights among them (RobotFit::of_references); null: there are none.
 Inference infer(const Flights& flights, const sim::Randomisation& uncertain, const InferenceOptions& options,
                 const RobotFit* reference = nullptr);
 

@@ -112,6 +112,7 @@ Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flig
   const RowContext context = row_context_of(tests_of(flights), d.noise_sd);
   add_hypotheses(context, uncertain, d, r);
   r.suspects = suspects_of(r.hypotheses);
+  if (d.residual) r.loss_without_residual = d.residual->loss_without, r.residual_loss = d.residual->loss;
 
   const ScoredHypothesis& concluded = d.conclusion();
   const ScoredHypothesis& unknown =

@@ -205,6 +205,9 @@ std::vector<std::string> summary_of(const Diagnosis& r, const std::string& out) 
     lines.push_back(io::format("the best effect closes %.0f %% of what refitting leaves (90 %%: %.0f to %.0f %%)",
                                100 * r.closure->value, 100 * r.closure->low, 100 * r.closure->high));
   else lines.push_back("how much of that an effect closes cannot be told from noise");
+  if (r.loss_without_residual && r.residual_loss)
+    lines.push_back("mean loss in flights held out of the corrected vehicle: without its residual load " +
+                    loss(r.loss_without_residual) + ", with it " + loss(r.residual_loss));
   if (!r.moved_parameters.empty() && r.verdict.kind != VerdictKind::none) {
     lines.push_back("parameters that moved most, in standard deviations of what was believed:");
     for (std::size_t i = 0; i < r.moved_parameters.size() && i < kMoved; ++i)

@@ -234,24 +234,27 @@ std::map<std::string, BasisCoefficients> Fitter::changes(const Hypothesis& hypot
 
 BasisCoefficients Fitter::law_sd(const Hypothesis& hypothesis, const Fit& fit, double law_factor) const {
   BasisCoefficients squares = BasisCoefficients::Zero(kGroups, evidence_->basis().size());
-  for (const auto& [effect, change] : changes(hypothesis, fit)) squares += law_sd_of(change, law_factor).cwiseAbs2();
+  for (const auto& [effect, change] : changes(hypothesis, fit))
+    squares += law_sd_of(effect, change, law_factor).cwiseAbs2();
   return squares.cwiseSqrt();
 }
 
 bool Fitter::acts_by_place(const Hypothesis& hypothesis, const Fit& fit) const {
   return std::ranges::any_of(changes(hypothesis, fit),
-                             [&](const auto& change) { return law_sd_of(change.second, 1).any(); });
+                             [&](const auto& change) { return law_sd_of(change.first, change.second, 1).any(); });
 }
 
 /// The law of an effect by the place (near surfaces, at a tether, in time) may deviate from the catalogue's. An effect
 /// acts by the place if more than half of its change follows functions of the place; along each of these, each load may
 /// deviate by the rms of the loads times the law factor. Elsewhere the factor, which may be large, does not count, or a
 /// heating motor would explain loads that depend on the heading.
-BasisCoefficients Fitter::law_sd_of(const BasisCoefficients& change, double law_factor) const {
+BasisCoefficients Fitter::law_sd_of(const std::string& effect, const BasisCoefficients& change,
+                                    double law_factor) const {
   const RegimeBasis& basis = evidence_->basis();
   BasisCoefficients sd = BasisCoefficients::Zero(change.rows(), change.cols());
   if (!evidence_->policy().discrepancy_scales) return sd;
-  if (evidence_->contrasts()) return law_factor * evidence_->discrepancy().session.law_error * spread_of(change);
+  if (evidence_->contrasts())
+    return law_factor * evidence_->discrepancy().session.law_error_of(effect) * spread_of(change);
   const auto of_place = [&](int i) { return regimes_of(basis.kind(i)) == Regimes::place; };
   const auto load = [](int g) { return g / kCoefficients <= kForceZ; };
   VectorXd squares = VectorXd::Zero(change.cols());
@@ -407,18 +410,55 @@ Fit Fitter::fit_given(const Hypothesis& hypothesis, const VectorXd& start, const
 
 Fit Fitter::fit_effects(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters) const {
   VectorXd at = hypothesis.bounded(start);
-  const Index effects = hypothesis.size() - hypothesis.shared();
   at.head(hypothesis.shared()) = parameters.at.head(hypothesis.shared());
   for (int n = 0;; ++n) {
     Fit result =
         linearise(hypothesis, at, joint_directions(hypothesis, parameters), shared_columns(hypothesis, parameters));
     if (!result.flown()) return result;
     const Regressors r = regressors(result);
-    result.posterior = solve(result, r, reduce(result, r));
-    const VectorXd there = hypothesis.bounded(result.mean());
-    if (n == kMaxEffectSteps || (there - at).tail(effects).cwiseAbs().maxCoeff() < kFirstReach) return result;
-    at.tail(effects) = there.tail(effects);
+    // in a contrast, what another law of the cause leaves is larger than what sessions differ by
+    const BasisCoefficients sd =
+        evidence_->contrasts() ? discrepancy_sd(hypothesis, result) : evidence_->discrepancy_sd(scales_);
+    result.posterior = solve(result, r, evidence_->reduce(result.statistics, r.columns, all_flights(), sd));
+    VectorXd there = hypothesis.bounded(result.mean());
+    there.head(hypothesis.shared()) = at.head(hypothesis.shared());
+    if (evidence_->contrasts()) there = best_on_the_way(hypothesis, result, there, sd);
+    if (n == kMaxEffectSteps || (there - at).cwiseAbs().maxCoeff() < kFirstReach) return result;
+    at = there;
   }
+}
+
+/// Of points on the way from a fit to `there` and to no effect, the one with the largest evidence. In a contrast a
+/// linear model promises much, and its step may lead to where it does not hold.
+VectorXd Fitter::best_on_the_way(const Hypothesis& hypothesis, const Fit& fit, const VectorXd& there,
+                                 const BasisCoefficients& sd) const {
+  const Index shared = hypothesis.shared(), effects = hypothesis.size() - shared;
+  for (Index i = shared; i < hypothesis.size(); ++i)
+    if (hypothesis.unknowns()[static_cast<std::size_t>(i)].in_log) return there;  // linear
+  constexpr double kShares[] = {1, 0.5, 0.2}, kShrunk[] = {0.5, 0.2};
+  std::vector<VectorXd> tries = {fit.at};
+  for (const double share : kShares) tries.push_back(hypothesis.bounded(fit.at + share * (there - fit.at)));
+  for (const double share : kShrunk) {
+    tries.push_back(fit.at);
+    tries.back().tail(effects) *= share;
+    tries.back() = hypothesis.bounded(tries.back());
+  }
+  std::vector<VehicleHypothesis> vehicles;
+  for (const VectorXd& at : tries) vehicles.push_back(hypothesis.vehicle(at));
+  const std::vector<Residuals> left = residuals(*flights_, vehicles, threads_);
+  Fit parameters = fit;
+  parameters.columns.resize(static_cast<std::size_t>(shared));
+  parameters.directions.axes.conservativeResize(Eigen::NoChange, shared);
+  const Regressors r = regressors(parameters);
+  const VectorXd prior_mean = r.prior_mean();
+  std::vector<double> values(tries.size(), -std::numeric_limits<double>::infinity());
+  io::parallel_for(tries.size(), threads_, [&](std::size_t i) {
+    if (left[i].empty()) return;
+    const Reduced reduced = evidence_->reduce(evidence_->statistics(left[i]), r.columns, all_flights(), sd);
+    values[i] = Evidence::posterior(reduced, r.all, prior_mean, false).log_evidence -
+                0.5 * tries[i].tail(effects).squaredNorm();
+  });
+  return tries[static_cast<std::size_t>(std::ranges::max_element(values) - values.begin())];
 }
 
 Fit Fitter::fit_linear(const Hypothesis& hypothesis, const Fit& parameters,

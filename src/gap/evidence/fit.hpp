@@ -119,7 +119,7 @@ class Fitter {
 
  private:
   std::map<std::string, BasisCoefficients> changes(const Hypothesis& hypothesis, const Fit& fit) const;
-  BasisCoefficients law_sd_of(const BasisCoefficients& change, double law_factor) const;
+  BasisCoefficients law_sd_of(const std::string& effect, const BasisCoefficients& change, double law_factor) const;
   BasisCoefficients spread_of(const BasisCoefficients& change) const;
   BasisCoefficients discrepancy_sd(const Hypothesis& hypothesis, const Fit& fit) const;
   /// Null: the direction is not a linear magnitude.
@@ -132,6 +132,8 @@ class Fitter {
   std::vector<Eigen::VectorXd> around(const Hypothesis& hypothesis, const Eigen::VectorXd& at,
                                       const Directions& directions, const std::vector<BasisCoefficients>& known,
                                       std::vector<VehicleHypothesis>& vehicles) const;
+  Eigen::VectorXd best_on_the_way(const Hypothesis& hypothesis, const Fit& fit, const Eigen::VectorXd& there,
+                                  const BasisCoefficients& sd) const;
   void average(const std::vector<Residuals>& rows, const std::vector<Eigen::VectorXd>& shifts, Fit& fit) const;
   Reduced reduce(const Fit& fit, const Regressors& regressors) const;
   Posterior solve(const Fit& fit, const Regressors& regressors, Reduced reduced, double damping = 0) const;

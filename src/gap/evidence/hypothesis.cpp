@@ -26,6 +26,7 @@ std::vector<Unknown> unknowns_of(const model::CatalogueEffect& effect) {
   std::vector<Unknown> list;
   for (std::size_t k = 0; k < effect.parameters.size(); ++k) {
     const model::EffectParameter& p = effect.parameters[k];
+    if (p.prior_low == p.prior_high) continue;  // known
     Unknown u{effect.info.id, p.name, 0, 1, p.low, p.high, static_cast<int>(k) < effect.info.magnitudes};
     if (u.magnitude) u.scale = std::max(-p.prior_low, p.prior_high) / kHalf90;
     else u.centre = p.typical, u.scale = (p.prior_high - p.prior_low) / (2 * kHalf90);

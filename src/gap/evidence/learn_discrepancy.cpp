@@ -24,6 +24,8 @@ constexpr double kMinShare = 2e-4, kMinBackground = 0.01;
 /// Errors of laws are learnt from no fewer pairs; least standard deviation of their logarithm.
 constexpr std::size_t kMinLaws = 5;
 constexpr double kMinSpread = 0.25;
+/// The centre over all stages counts as much as this many errors of a stage.
+constexpr double kShrinkLaws = 2;
 constexpr std::size_t kKinds = static_cast<std::size_t>(BasisFunction::count);
 
 struct Moment {
@@ -201,13 +203,49 @@ std::optional<double> law_error(const RobotFit& robot, const std::string& effect
   const Regressors regressors = fitter.unscaled_regressors(fit);
   double best = kSmallest, most = -std::numeric_limits<double>::infinity();
   for (double error = kSmallest; error < kLargest; error *= kStep) {
-    const double log_evidence = fitter.evidence()
-                                    .weigh(fit.statistics, regressors, fitter.all_flights(),
-                                           fitter.law_sd(h, fit, error / now.session.law_error), fitter.scales())
-                                    .posterior.log_evidence;
+    const double log_evidence =
+        fitter.evidence()
+            .weigh(fit.statistics, regressors, fitter.all_flights(),
+                   fitter.law_sd(h, fit, error / now.session.law_error_of(effect)), fitter.scales())
+            .posterior.log_evidence;
     if (log_evidence > most) most = log_evidence, best = error;
   }
   return best;
+}
+
+/// Of the logarithm of the session's scale; the start counts as much as kShrink pairs.
+double scale_sd(const Robots& pairs, const ModelDiscrepancy& now) {
+  double sum = kShrink * std::pow(now.session.scale_sd, 2);
+  for (const auto& pair : pairs) {
+    const Fitter fitter = pair->fitter_given(now);
+    const ScaledEvidence w = fitter.evidence().weigh(
+        pair->parameters().statistics, fitter.unscaled_regressors(pair->parameters()), fitter.all_flights(), {}, {});
+    sum += std::pow(std::log(w.scales.session), 2);
+  }
+  return std::sqrt(sum / (kShrink + static_cast<double>(pairs.size())));
+}
+
+/// Law errors of known effects.
+using LawErrors = std::vector<std::pair<std::string, double>>;
+
+/// The centre of each stage, shrunk to that of all, and the spread of errors over the centres.
+void take(const LawErrors& errors, SessionVariation& to) {
+  double all = 0;
+  for (const auto& [effect, error] : errors) all += std::log(error) / static_cast<double>(errors.size());
+  std::array<Moment, kStages> stages;
+  stages.fill({kShrinkLaws * all, kShrinkLaws});
+  for (const auto& [effect, error] : errors) {
+    Moment& m = stages[stage_of(effect)];
+    m.sum += std::log(error);
+    m.count += 1;
+  }
+  for (std::size_t stage = 0; stage < kStages; ++stage)
+    to.law_error[stage] = std::exp(stages[stage].sum / stages[stage].count);
+  std::vector<double> over;
+  over.reserve(errors.size());
+  for (const auto& [effect, error] : errors) over.push_back(error / to.law_error_of(effect));
+  to.law_spread = std::max(std::log(io::quantile(over, 0.84) / io::quantile(over, 0.16)) / 2, kMinSpread);
+  to.law_most = std::max(io::quantile(over, 0.95), 1.0);
 }
 
 }  // namespace
@@ -268,21 +306,18 @@ SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim
     }
     take(shares, backgrounds, now.session.shares, now.session.background);
   }
+  if (!harmless.empty()) now.session.scale_sd = scale_sd(harmless, now);
   harmless.clear();
-  std::vector<double> errors;
+  LawErrors errors;
   for (const SessionPair& p : pairs) {
     if (p.effect.empty()) continue;
     go_on();
     const RobotFit robot(of_references(p), p.flights);
-    if (const auto error = law_error(robot, p.effect, now)) errors.push_back(*error);
+    if (const auto error = law_error(robot, p.effect, now)) errors.emplace_back(p.effect, *error);
     for (const auto& f : p.flights) f->forget();
   }
-  if (errors.size() < kMinLaws) return now.session;
-  SessionVariation& s = now.session;
-  s.law_error = io::median(errors);
-  s.law_spread = std::max(std::log(io::quantile(errors, 0.84) / io::quantile(errors, 0.16)) / 2, kMinSpread);
-  s.law_most = std::max(io::quantile(errors, 0.95) / s.law_error, 1.0);
-  return s;
+  if (errors.size() >= kMinLaws) take(errors, now.session);
+  return now.session;
 }
 
 }  // namespace flappy::gap

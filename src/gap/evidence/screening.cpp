@@ -12,9 +12,13 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// log(2 P(N(mean, sd^2) > 0)). Twice, as the prior of a magnitude that cannot be negative is half-normal.
+/// log(2 P(N(mean, sd^2) > 0)). Twice, as the prior of a magnitude that cannot be negative is half-normal. Far below 0,
+/// where it takes back all that the negative magnitude gained, by the asymptotic series (Abramowitz, Stegun 7.1.23).
 double log_twice_positive(double mean, double sd) {
-  return std::log(std::max(std::erfc(-mean / (sd * std::numbers::sqrt2)), 1e-300));
+  constexpr double kFar = 10;
+  const double x = -mean / (sd * std::numbers::sqrt2);
+  if (x < kFar) return std::log(std::erfc(x));
+  return -x * x - std::log(x * std::sqrt(std::numbers::pi)) + std::log1p(-1 / (2 * x * x));
 }
 
 class Screening {
@@ -143,7 +147,7 @@ std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, 
                                            const ModelDiscrepancy* background) {
   std::vector<MagnitudeStep> steps;
   const model::Vehicle now = Hypothesis(uncertain, {}).vehicle(at).vehicle;
-  for (const model::CatalogueEffect& e : model::catalogue_of(uncertain.nominal())) {
+  for (const model::CatalogueEffect& e : model::causes_of(uncertain.nominal())) {
     const std::string id = e.info.id;
     if (std::ranges::count(withheld, id)) continue;
     const Hypothesis h(uncertain, {id});

@@ -16,9 +16,12 @@ constexpr const char* kSessionHead =
 constexpr const char* kSessionSpread =
     R"(# scale_sd: standard deviation of the logarithm of the scale of a pair of sessions. block_freedom, effect_freedom: degrees of freedom of the scales of
 # single blocks and of single effects; high, for no session differs by a hundred times as much as others. Choices.
-# law_error: how far another law of the same cause deviates from that of the catalogue, as a share of the change by the effect: median over effects and
-# robots. law_spread: standard deviation of its logarithm. law_most: the largest over the median; what deviates more is another cause.
 )";
+constexpr const char* kSessionLaws =
+    R"(# How far another law of the same cause deviates from that of the catalogue, as a share of the change by the effect: by the stage in which it acts, the
+# centre over effects and robots. spread: standard deviation of its logarithm. most: the largest over the centre; what deviates more is another cause.
+)";
+constexpr std::array<const char*, kStages> kStageNames = {"body", "drive", "wing", "air", "world", "sensor"};
 constexpr const char* kSessionParametersHead =
     R"(# Prior standard deviation of the change of a parameter, in standard deviations of its prior (configs/gap/priors.toml), by a part of its name.
 # Weather: density by 1 %. A battery put back: mass by 0.5 %, centre of mass by 0.1 mm. Temperature of the motors: resistance by 2.5 %, torque constant
@@ -38,6 +41,13 @@ double SessionVariation::parameter_sd(const std::string& name) const {
   return at == parameters.end() ? 0 : at->second;
 }
 
+std::size_t stage_of(const std::string& effect) {
+  return static_cast<std::size_t>(
+      model::effects()[static_cast<std::size_t>(model::effect_index(effect.c_str()))].info.stage);
+}
+
+double SessionVariation::law_error_of(const std::string& effect) const { return law_error[stage_of(effect)]; }
+
 double SessionVariation::background_sd(const std::string& effect) const {
   const auto at = background.find(effect);
   return at != background.end() ? at->second : background.at("other");
@@ -47,9 +57,11 @@ std::string session_text(const SessionVariation& s, const std::string& learnt) {
   const auto number = [](double v) { return io::format("%.4g", v); };
   std::string text = kSessionHead + learnt + ".\nschema = 1\n\n" + kSessionSpread +
                      "[spread]\nscale_sd = " + number(s.scale_sd) + "\nblock_freedom = " + number(s.block_freedom) +
-                     "\neffect_freedom = " + number(s.effect_freedom) + "\nlaw_error = " + number(s.law_error) +
-                     "\nlaw_spread = " + number(s.law_spread) + "\nlaw_most = " + number(s.law_most) + "\n\n" +
-                     kSessionParametersHead + "[parameters]\n";
+                     "\neffect_freedom = " + number(s.effect_freedom) + "\n\n" + kSessionLaws + "[law_error]\n";
+  for (std::size_t stage = 0; stage < kStages; ++stage)
+    text += std::string(kStageNames[stage]) + " = " + number(s.law_error[stage]) + "\n";
+  text += "spread = " + number(s.law_spread) + "\nmost = " + number(s.law_most) + "\n\n" + kSessionParametersHead +
+          "[parameters]\n";
   for (const auto& [name, sd] : s.parameters) text += "\"" + name + "\" = " + number(sd) + "\n";
   text += "\n" + shares_text(s.shares) + kSessionBackground + "[background_sd]\n";
   for (const auto& [effect, sd] : s.background) text += effect + " = " + number(sd) + "\n";
@@ -65,9 +77,11 @@ SessionVariation read_session_variation(const std::filesystem::path& path) {
   s.scale_sd = spread.number("scale_sd", io::positive());
   s.block_freedom = spread.number("block_freedom", io::positive());
   s.effect_freedom = spread.number("effect_freedom", io::positive());
-  s.law_error = spread.number("law_error", io::positive());
-  s.law_spread = spread.number("law_spread", io::positive());
-  s.law_most = spread.number("law_most", io::Range{1, 1e3});
+  const io::Table laws = root.table("law_error");
+  for (std::size_t stage = 0; stage < kStages; ++stage)
+    s.law_error[stage] = laws.number(kStageNames[stage], io::positive());
+  s.law_spread = laws.number("spread", io::positive());
+  s.law_most = laws.number("most", io::Range{1, 1e3});
   const io::Table parameters = root.table("parameters");
   for (const std::string& key : parameters.keys())
     s.parameters.emplace_back(key, parameters.number(key, io::positive()));

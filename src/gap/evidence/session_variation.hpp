@@ -2,6 +2,7 @@
 // winding, a battery put back. configs/gap/session_variation.toml has its parameters and how they were learnt.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -13,14 +14,20 @@
 
 namespace flappy::gap {
 
+/// Number of model::Stage.
+inline constexpr std::size_t kStages = 6;
+/// Stage of an effect of the catalogue within the beat.
+std::size_t stage_of(const std::string& effect);
+
 struct SessionVariation {
   /// How far a pair of sessions differs more or less than others: log scale ~ N(0, scale_sd^2).
   double scale_sd = 0.5;
   /// Degrees of freedom of the scales of blocks, and of those of background magnitudes (ScalePrior).
   double block_freedom = 30, effect_freedom = 30;
-  /// Deviation of another law of the same cause from the catalogue's, as a share of the change by the effect: the median
-  /// over effects and robots, the standard deviation of its logarithm, and the largest over the median.
-  double law_error = 0.3, law_spread = 1, law_most = 8;
+  /// Deviation of another law of the same cause from the catalogue's, as a share of the change by the effect: [stage] the
+  /// centre over effects and robots, the standard deviation of its logarithm, and the largest over the centre.
+  std::array<double, kStages> law_error{};
+  double law_spread = 1, law_most = 8;
   /// Prior sd of the change of a parameter, in its prior standard deviations, by a part of its name.
   std::vector<std::pair<std::string, double>> parameters;
   Shares shares{};                           ///< prior of the smooth differences between sessions
@@ -29,6 +36,8 @@ struct SessionVariation {
   /// 0: a parameter that does not change between sessions.
   double parameter_sd(const std::string& name) const;
   double background_sd(const std::string& effect) const;
+  /// Law error of the effect's stage.
+  double law_error_of(const std::string& effect) const;
 };
 
 /// Text of configs/gap/session_variation.toml. `learnt`: source of the values, for the head of the file.

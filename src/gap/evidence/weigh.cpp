@@ -25,8 +25,8 @@ using Eigen::VectorXd;
 constexpr double kSettled_nats = 0.1;
 constexpr double kStrideGrowth = 1.5, kMaxStride = 8;
 /// Blocks of many degrees of freedom hold each other back: in a contrast, blocks and their centres are maximised in
-/// turn, so many times an iteration.
-constexpr int kContrastPasses = 100;
+/// turn until the centres settle, at most so many times an iteration.
+constexpr int kMaxPasses = 100;
 /// Smallest scale of a free block over the scale of the robot.
 constexpr double kMinFree = 2;
 
@@ -267,7 +267,8 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
           effects_freedom += nu_e, effects_inverses += nu_e / (next.effects[e] * next.effects[e]);
       }
     }
-    for (int pass = 0; pass < (contrasts() ? kContrastPasses : 1); ++pass) {
+    for (int pass = 0; pass < (contrasts() ? kMaxPasses : 1); ++pass) {
+      const double robot = next.robot, session = next.session;
       double freedom = effects_freedom, inverses = effects_inverses, session_freedom = 0, session_inverses = 0;
       for (std::size_t b = 0; b < kBlocks; ++b) {
         if (counts[b] == 0) continue;
@@ -291,6 +292,7 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
       }
       if (!scales_held_) next.robot = robot_scale(freedom, inverses, discrepancy_.spread.robot_sd);
       if (contrasts()) next.session = robot_scale(session_freedom, session_inverses, discrepancy_.session.scale_sd);
+      if (next.robot == robot && next.session == session) break;
     }
     now = strided(best.scales, next, stride);
   }

@@ -210,6 +210,10 @@ Diagnosis read(const Json& json) {
   d.effect_loss = optional_of(gap.at("effect"));
   d.noise_floor = gap.at("noise_floor");
   d.closure = closure_of(gap.at("closure"));
+  if (const auto residual = json.find("residual"); residual != json.end()) {
+    d.loss_without_residual = optional_of(residual->at("loss_without"));
+    d.residual_loss = optional_of(residual->at("loss"));
+  }
   d.untestable = json.at("untestable");
   for (const Json& s : json.value("suspects", Json::array()))
     d.suspects.push_back({s.at("effect"), s.at("probability"), closure_of(s.at("closure"))});
@@ -245,7 +249,7 @@ Json to_json(const Diagnosis& d) {
                            {"corrected", finite(c.corrected)}});
   Json sets = Json::object();
   for (const NamedDiagnosis& s : d.sets) sets[s.name] = to_json(s.diagnosis);
-  return {{"schema", kDiagnosisSchema},
+  Json json = {{"schema", kDiagnosisSchema},
           {"flights", d.flights},
           {"reference", d.reference},
           {"warnings", d.warnings},
@@ -276,6 +280,9 @@ Json to_json(const Diagnosis& d) {
           {"validation", d.validation ? to_json(*d.validation) : Json(nullptr)},
           {"locations", locations},
           {"sets", sets}};
+  if (d.residual_loss)
+    json["residual"] = {{"loss_without", optional(d.loss_without_residual)}, {"loss", optional(d.residual_loss)}};
+  return json;
 }
 
 Diagnosis diagnosis_from(const Json& json, const std::filesystem::path& file) {

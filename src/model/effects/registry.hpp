@@ -28,6 +28,7 @@
 #include "model/effects/marker_offset.hpp"
 #include "model/effects/mocap_delay.hpp"
 #include "model/effects/mocap_tilt.hpp"
+#include "model/effects/residual.hpp"
 #include "model/effects/rotational_lift.hpp"
 #include "model/effects/spring_hardening.hpp"
 #include "model/effects/stop_compliance.hpp"
@@ -48,12 +49,13 @@ namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
 /// Order within a stage: changes of the vehicle; the voltage from the command to the motor; stroke and stops; the air,
-/// first what causes the wing's force, then what scales it; loads on the body; sensors last.
-using Effects = std::tuple<ComOffset, InertiaProducts, WingInertiaShape, WingDamage, CommandDelay, DriverDeadZone,
-                           DriverBandwidth, WindingHeating, BatterySag, CoulombFriction, SpringHardening,
-                           StopCompliance, GearBacklash, Wind, WingFlexibility, RotationalLift, WakeCapture,
-                           ClapAndFling, GroundEffect, CeilingEffect, AddedMass, WallEffect, BodyDrag, Tether, GyroBias,
-                           AccelerometerMisalignment, VibrationRectification, MocapTilt, MarkerOffset, MocapDelay>;
+/// first what causes the wing's force, then what scales it; loads on the body; sensors; what is left.
+using Effects =
+    std::tuple<ComOffset, InertiaProducts, WingInertiaShape, WingDamage, CommandDelay, DriverDeadZone, DriverBandwidth,
+               WindingHeating, BatterySag, CoulombFriction, SpringHardening, StopCompliance, GearBacklash, Wind,
+               WingFlexibility, RotationalLift, WakeCapture, ClapAndFling, GroundEffect, CeilingEffect, AddedMass,
+               WallEffect, BodyDrag, Tether, GyroBias, AccelerometerMisalignment, VibrationRectification, MocapTilt,
+               MarkerOffset, MocapDelay, Residual>;
 
 using BeatAveragedEffects = std::tuple<ComOffset, InertiaProducts, CommandDelay, DriverBandwidth, BatteryThrust, Wind,
                                        GroundEffect, BodyDrag, Tether, FlappingCounterForce, TranslationalLift,
@@ -108,6 +110,9 @@ struct CatalogueEffect {
 const std::vector<CatalogueEffect>& effects();
 /// Effects that a vehicle may have: effects(); if beat-averaged, those with such a stage; if jointed, those of sensors.
 const std::vector<CatalogueEffect>& catalogue_of(const Vehicle& vehicle);
+/// Those of effects() that a diagnosis may name, and those of a vehicle's catalogue.
+const std::vector<CatalogueEffect>& causes();
+const std::vector<CatalogueEffect>& causes_of(const Vehicle& vehicle);
 /// Null if the vehicle's catalogue does not have the effect.
 const CatalogueEffect* find_effect(const Vehicle& vehicle, const std::string& id);
 std::uint64_t sensor_effects();

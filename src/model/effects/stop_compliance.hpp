@@ -13,7 +13,7 @@ namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
 struct StopCompliance {
-  static constexpr EffectInfo kInfo{"stop_compliance", Stage::wing, 1, "", "Hunt, Crossley 1975"};
+  static constexpr EffectInfo kInfo{"stop_compliance", Stage::wing, 1, "wing_compliance", "Hunt, Crossley 1975"};
   static constexpr std::array<EffectParameter, 2> kParameters{
       {{"compliance_rad_Nm", 0, 1000, 50, 0, 150}, {"damping_ratio", 0, 2, 0.5, 0.2, 0.8}}};
   static constexpr double kReach_rad = 1.7;  // rotation angle at which the stop is hard again

@@ -12,7 +12,7 @@ namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
 struct WingFlexibility {
-  static constexpr EffectInfo kInfo{"wing_flexibility", Stage::air, 1, "", "Nakata, Liu 2012"};
+  static constexpr EffectInfo kInfo{"wing_flexibility", Stage::air, 1, "wing_compliance", "Nakata, Liu 2012"};
   static constexpr std::array<EffectParameter, 1> kParameters{{{"twist_rad_N", 0, 10, 0.5, 0, 1.5}}};
 
   template <int side, class T>

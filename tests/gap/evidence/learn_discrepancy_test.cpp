@@ -60,6 +60,8 @@ TEST(LearnSessions, FindsHowMuchLessSessionsDiffer) {
   EXPECT_GT(share, 0.004);
   EXPECT_LT(share, 0.02);
   EXPECT_LT(share_of(learnt.shares, kTorqueY, 1, BasisFunction::velocity_x), 0.5 * share);
+  EXPECT_LT(learnt.scale_sd, start.session.scale_sd) << "all pairs differ by as much";
+  EXPECT_EQ(learnt.law_error, start.session.law_error) << "no pair has an effect";
 }
 
 }  // namespace

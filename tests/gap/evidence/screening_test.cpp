@@ -65,6 +65,13 @@ TEST(Screening, RanksEffectsByTheirEvidence) {
   EXPECT_EQ(of("ground_effect").coordinates[0], 0) << "it has one sign";
   EXPECT_LT(of("body_drag").gain, 0.1);
   EXPECT_NEAR(of("body_drag").coordinates[0], 0, 0.1);
+  // however much a magnitude of the forbidden sign would gain, it gains nothing
+  fit.residual = {evidence->without(0, std::move(zero), 500 * ground)};
+  fit.statistics = evidence->statistics(fit.residual);
+  MagnitudeColumn two_sided = columns[0];
+  two_sided.one_sided = false;
+  EXPECT_GT(screen(fitter, fit, {two_sided})[0].gain, 1000);
+  EXPECT_LT(screen(fitter, fit, {columns[0]})[0].gain, 1);
 }
 
 // A magnitude that does nothing near 0, and turns the rows where it is large: only from there on it is linear.
