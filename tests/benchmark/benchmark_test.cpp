@@ -262,22 +262,22 @@ class BlindContrast : public Benchmark {
   nlohmann::ordered_json made_and_scored(const std::string& part) {
     MakeCommand m;
     m.out = root_ / "bench";
-    m.plan = {.contrast = true, .parts = {part}, .at_most = 1, .flights = 1};
+    m.plan = {.contrast = true, .parts = {part}, .at_most = 2, .flights = 1};
     m.threads = 2;
     EXPECT_TRUE(make_bench(m));
     EXPECT_FALSE(fs::exists(m.out / "cases/0001/flight_2"));
     ScoreCommand s;
     s.folders = {m.out};
     s.discrepancy = kConfigs + "gap/discrepancy/without_a.toml";
-    s.threads = 1;
+    s.threads = 2;
     return score_bench(s);
   }
 };
 
 TEST_F(BlindContrast, NamesWhatChanged) {
   const nlohmann::ordered_json json = made_and_scored("changed");
-  EXPECT_EQ(json.at("contrast_top1"), 1.0);
-  EXPECT_EQ(json.at("cases"), 1);
+  EXPECT_EQ(json.at("contrast_top1"), 0.5) << "the dead zone; for wake capture, a flight of 10 s says too little";
+  EXPECT_EQ(json.at("cases"), 2);
 }
 
 TEST_F(Benchmark, PlansContrasts) {

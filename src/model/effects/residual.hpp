@@ -41,7 +41,7 @@ struct Residual {
     T within(1), sum[6];
     for (int i = 1; i < kTerms; ++i) {
       const T& limit = q[6 * kTerms + i - 1];
-      within *= clamp(T(T(3) - T(T(2) * abs(of[i])) / max(limit, T(kLeast))), T(0), T(1));
+      within *= clamp(T(T(3) - T(T(2) * abs(of[i])) / max(limit, T(kMinLimit))), T(0), T(1));
     }
     for (int load_axis = 0; load_axis < 6; ++load_axis) {
       T a = q[load_axis * kTerms];
@@ -56,7 +56,7 @@ struct Residual {
   }
 
  private:
-  static constexpr double kLeast = 1e-6;  ///< least limit, m/s or rad/s
+  static constexpr double kMinLimit = 1e-6;  ///< least limit, m/s or rad/s
 };
 
 }  // namespace FLAPPY_ISA
