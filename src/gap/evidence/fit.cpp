@@ -420,23 +420,24 @@ Fit Fitter::fit_effects(const Hypothesis& hypothesis, const VectorXd& start, con
     const BasisCoefficients sd =
         evidence_->contrasts() ? discrepancy_sd(hypothesis, result) : evidence_->discrepancy_sd(scales_);
     result.posterior = solve(result, r, evidence_->reduce(result.statistics, r.columns, all_flights(), sd));
+    if (n == kMaxEffectSteps) return result;
     VectorXd there = hypothesis.bounded(result.mean());
     there.head(hypothesis.shared()) = at.head(hypothesis.shared());
     if (evidence_->contrasts()) there = best_on_the_way(hypothesis, result, there, sd);
-    if (n == kMaxEffectSteps || (there - at).cwiseAbs().maxCoeff() < kFirstReach) return result;
+    if ((there - at).cwiseAbs().maxCoeff() < kFirstReach) return result;
     at = there;
   }
 }
 
-/// Of points on the way from a fit to `there` and to no effect, the one with the largest evidence. In a contrast a
-/// linear model promises much, and its step may lead to where it does not hold.
+/// Returns the point with the largest evidence among a fit, points from it to `there`, and points from it to no effect.
+/// In a contrast the step of a linear model may lead to where the model does not hold.
 VectorXd Fitter::best_on_the_way(const Hypothesis& hypothesis, const Fit& fit, const VectorXd& there,
                                  const BasisCoefficients& sd) const {
   const Index shared = hypothesis.shared(), effects = hypothesis.size() - shared;
   for (Index i = shared; i < hypothesis.size(); ++i)
     if (hypothesis.unknowns()[static_cast<std::size_t>(i)].in_log) return there;  // linear
   constexpr double kShares[] = {1, 0.5, 0.2}, kShrunk[] = {0.5, 0.2};
-  std::vector<VectorXd> tries = {fit.at};
+  std::vector<VectorXd> tries;
   for (const double share : kShares) tries.push_back(hypothesis.bounded(fit.at + share * (there - fit.at)));
   for (const double share : kShrunk) {
     tries.push_back(fit.at);
@@ -445,7 +446,9 @@ VectorXd Fitter::best_on_the_way(const Hypothesis& hypothesis, const Fit& fit, c
   }
   std::vector<VehicleHypothesis> vehicles;
   for (const VectorXd& at : tries) vehicles.push_back(hypothesis.vehicle(at));
-  const std::vector<Residuals> left = residuals(*flights_, vehicles, threads_);
+  std::vector<Residuals> left = residuals(*flights_, vehicles, threads_);
+  left.push_back(fit.residual);
+  tries.push_back(fit.at);
   Fit parameters = fit;
   parameters.columns.resize(static_cast<std::size_t>(shared));
   parameters.directions.axes.conservativeResize(Eigen::NoChange, shared);
