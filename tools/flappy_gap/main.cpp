@@ -112,11 +112,6 @@ Json check(const std::vector<std::string>& folders) {
   return {{"flights", flights}, {"faults", faults}, {"warnings", warnings}, {"not_tested", not_tested}};
 }
 
-const char* name_of(model::Stage stage) {
-  constexpr const char* kNames[] = {"body", "drive", "wing", "air", "world", "sensor"};
-  return kNames[static_cast<std::size_t>(stage)];
-}
-
 /// Prints the catalogue of effects as a Markdown table, one row a parameter, and returns it as JSON.
 Json list_effects(bool beat_averaged) {
   model::Vehicle vehicle;

@@ -18,9 +18,7 @@ constexpr double kHalf90 = 1.645;
 
 double Unknown::value(double coordinate) const { return std::clamp(centre + scale * coordinate, low, high); }
 
-std::vector<Unknown> unknowns_of(const std::string& effect) {
-  return unknowns_of(model::effects()[static_cast<std::size_t>(model::effect_index(effect.c_str()))]);
-}
+std::vector<Unknown> unknowns_of(const std::string& effect) { return unknowns_of(model::effect_within_beat(effect)); }
 
 std::vector<Unknown> unknowns_of(const model::CatalogueEffect& effect) {
   std::vector<Unknown> list;

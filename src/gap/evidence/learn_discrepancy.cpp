@@ -213,7 +213,7 @@ std::optional<double> law_error(const RobotFit& robot, const std::string& effect
   return best;
 }
 
-/// Of the logarithm of the session's scale; the start counts as much as kShrink pairs.
+/// Standard deviation of the logarithm of the sessions' scales; that of `now` counts as much as kShrink pairs.
 double scale_sd(const Robots& pairs, const ModelDiscrepancy& now) {
   double sum = kShrink * std::pow(now.session.scale_sd, 2);
   for (const auto& pair : pairs) {
@@ -232,14 +232,14 @@ using LawErrors = std::vector<std::pair<std::string, double>>;
 void take(const LawErrors& errors, SessionVariation& to) {
   double all = 0;
   for (const auto& [effect, error] : errors) all += std::log(error) / static_cast<double>(errors.size());
-  std::array<Moment, kStages> stages;
+  std::array<Moment, model::kStages> stages;
   stages.fill({kShrinkLaws * all, kShrinkLaws});
   for (const auto& [effect, error] : errors) {
     Moment& m = stages[stage_of(effect)];
     m.sum += std::log(error);
     m.count += 1;
   }
-  for (std::size_t stage = 0; stage < kStages; ++stage)
+  for (std::size_t stage = 0; stage < model::kStages; ++stage)
     to.law_error[stage] = std::exp(stages[stage].sum / stages[stage].count);
   std::vector<double> over;
   over.reserve(errors.size());

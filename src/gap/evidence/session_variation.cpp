@@ -21,7 +21,7 @@ constexpr const char* kSessionLaws =
     R"(# How far another law of the same cause deviates from that of the catalogue, as a share of the change by the effect: by the stage in which it acts, the
 # centre over effects and robots. spread: standard deviation of its logarithm. most: the largest over the centre; what deviates more is another cause.
 )";
-constexpr std::array<const char*, kStages> kStageNames = {"body", "drive", "wing", "air", "world", "sensor"};
+const char* stage_name(std::size_t stage) { return name_of(static_cast<model::Stage>(stage)); }
 constexpr const char* kSessionParametersHead =
     R"(# Prior standard deviation of the change of a parameter, in standard deviations of its prior (configs/gap/priors.toml), by a part of its name.
 # Weather: density by 1 %. A battery put back: mass by 0.5 %, centre of mass by 0.1 mm. Temperature of the motors: resistance by 2.5 %, torque constant
@@ -42,8 +42,7 @@ double SessionVariation::parameter_sd(const std::string& name) const {
 }
 
 std::size_t stage_of(const std::string& effect) {
-  return static_cast<std::size_t>(
-      model::effects()[static_cast<std::size_t>(model::effect_index(effect.c_str()))].info.stage);
+  return static_cast<std::size_t>(model::effect_within_beat(effect).info.stage);
 }
 
 double SessionVariation::law_error_of(const std::string& effect) const { return law_error[stage_of(effect)]; }
@@ -58,8 +57,8 @@ std::string session_text(const SessionVariation& s, const std::string& learnt) {
   std::string text = kSessionHead + learnt + ".\nschema = 1\n\n" + kSessionSpread +
                      "[spread]\nscale_sd = " + number(s.scale_sd) + "\nblock_freedom = " + number(s.block_freedom) +
                      "\neffect_freedom = " + number(s.effect_freedom) + "\n\n" + kSessionLaws + "[law_error]\n";
-  for (std::size_t stage = 0; stage < kStages; ++stage)
-    text += std::string(kStageNames[stage]) + " = " + number(s.law_error[stage]) + "\n";
+  for (std::size_t stage = 0; stage < model::kStages; ++stage)
+    text += std::string(stage_name(stage)) + " = " + number(s.law_error[stage]) + "\n";
   text += "spread = " + number(s.law_spread) + "\nmost = " + number(s.law_most) + "\n\n" + kSessionParametersHead +
           "[parameters]\n";
   for (const auto& [name, sd] : s.parameters) text += "\"" + name + "\" = " + number(sd) + "\n";
@@ -78,8 +77,8 @@ SessionVariation read_session_variation(const std::filesystem::path& path) {
   s.block_freedom = spread.number("block_freedom", io::positive());
   s.effect_freedom = spread.number("effect_freedom", io::positive());
   const io::Table laws = root.table("law_error");
-  for (std::size_t stage = 0; stage < kStages; ++stage)
-    s.law_error[stage] = laws.number(kStageNames[stage], io::positive());
+  for (std::size_t stage = 0; stage < model::kStages; ++stage)
+    s.law_error[stage] = laws.number(stage_name(stage), io::positive());
   s.law_spread = laws.number("spread", io::positive());
   s.law_most = laws.number("most", io::Range{1, 1e3});
   const io::Table parameters = root.table("parameters");

@@ -11,12 +11,11 @@
 
 #include "gap/evidence/discrepancy_shares.hpp"
 #include "io/installation.hpp"
+#include "model/effects/effect.hpp"
 
 namespace flappy::gap {
 
-/// Number of model::Stage.
-inline constexpr std::size_t kStages = 6;
-/// Stage of an effect of the catalogue within the beat.
+/// Index of the model::Stage of an effect within the beat.
 std::size_t stage_of(const std::string& effect);
 
 struct SessionVariation {
@@ -24,9 +23,10 @@ struct SessionVariation {
   double scale_sd = 0.5;
   /// Degrees of freedom of the scales of blocks, and of those of background magnitudes (ScalePrior).
   double block_freedom = 30, effect_freedom = 30;
-  /// Deviation of another law of the same cause from the catalogue's, as a share of the change by the effect: [stage] the
-  /// centre over effects and robots, the standard deviation of its logarithm, and the largest over the centre.
-  std::array<double, kStages> law_error{};
+  /// Deviation of another law of the same cause from the catalogue's, as a share of the change by the effect. law_error:
+  /// [stage] the centre over effects and robots; law_spread: standard deviation of its logarithm; law_most: the largest
+  /// over the centre.
+  std::array<double, model::kStages> law_error{};
   double law_spread = 1, law_most = 8;
   /// Prior sd of the change of a parameter, in its prior standard deviations, by a part of its name.
   std::vector<std::pair<std::string, double>> parameters;

@@ -26,6 +26,8 @@ struct Vehicle;
 
 /// The stage of the step in which an effect acts. body: it changes the vehicle itself, which costs the step nothing.
 enum class Stage { body, drive, wing, air, world, sensor };
+inline constexpr std::size_t kStages = 6;
+const char* name_of(Stage stage);
 
 struct EffectParameter {
   const char* name;   ///< including the unit as suffix

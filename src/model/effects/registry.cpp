@@ -71,6 +71,11 @@ std::vector<CatalogueEffect> list(std::integer_sequence<int, I...>) {
 
 }  // namespace
 
+const char* name_of(Stage stage) {
+  constexpr std::array<const char*, kStages> kNames = {"body", "drive", "wing", "air", "world", "sensor"};
+  return kNames[static_cast<std::size_t>(stage)];
+}
+
 std::vector<double> CatalogueEffect::values(const std::map<std::string, double>& given) const {
   std::vector<double> list;
   for (const EffectParameter& p : parameters) {
@@ -150,6 +155,10 @@ int effect_index(const char* id) {
   for (std::size_t i = 0; i < effects().size(); ++i)
     if (std::strcmp(effects()[i].info.id, id) == 0) return static_cast<int>(i);
   return -1;
+}
+
+const CatalogueEffect& effect_within_beat(const std::string& id) {
+  return effects()[static_cast<std::size_t>(effect_index(id.c_str()))];
 }
 
 bool is_effect(const std::string& id) { return effect_named(id) != nullptr; }

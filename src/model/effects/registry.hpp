@@ -118,6 +118,8 @@ const CatalogueEffect* find_effect(const Vehicle& vehicle, const std::string& id
 std::uint64_t sensor_effects();
 /// Index of `id` in effects(), or -1.
 int effect_index(const char* id);
+/// The entry of effects() with this id, which has to exist.
+const CatalogueEffect& effect_within_beat(const std::string& id);
 bool is_effect(const std::string& id);
 /// The group of an effect (EffectInfo::group), or its own id if it has no group.
 std::string group_of(const std::string& id);
