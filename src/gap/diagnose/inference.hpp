@@ -46,8 +46,8 @@ struct ScoredHypothesis {
 struct ResidualLoad {
   Hypothesis hypothesis;                 ///< the effects of Inference::predicting(), and the load
   Eigen::VectorXd at;                    ///< coordinates of the corrected vehicle, the load's last
-  Eigen::MatrixXd covariance;            ///< of the load's coordinates
-  std::map<std::string, double> limits;  ///< of the flown velocities and rates, by the load's parameter
+  Eigen::MatrixXd covariance;            ///< posterior covariance of the load's coordinates
+  std::map<std::string, double> limits;  ///< largest flown velocity or rate, by name of the load's limit
   /// Mean losses in held-out flights of the corrected vehicle without the load and with it; none: a single flight.
   std::optional<double> loss_without, loss;
 };

@@ -11,6 +11,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+constexpr const char* kResidual = "residual";
 constexpr const char* kLimits[] = {"u_limit_m_s",   "v_limit_m_s",   "w_limit_m_s",
                                    "p_limit_rad_s", "q_limit_rad_s", "r_limit_rad_s"};
 

@@ -26,9 +26,9 @@ double tempered(double nats, const VerdictRule& rule);
 void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictRule& rule);
 
 /// Sets d.verdict and d.concluded. Hypotheses with effects of the same groups (EffectInfo::group) form a pool, as short
-/// flights often cannot tell them apart. The verdict names the most probable one of the most probable pool if its share
-/// of all, or of that pool, is large enough (`naming` of the rule); else it is `group`. In a contrast, none and
-/// parameters form a pool, too: in both, nothing that matters changed.
+/// flights often cannot tell them apart. The verdict names the most probable hypothesis of the most probable pool if
+/// its share of the whole probability, or of that pool's, is large enough (`naming` of the rule); else it is `group`. In
+/// a contrast, none and parameters form a pool, too: in both, nothing that matters changed.
 void conclude(const VerdictRule& rule, Inference& d, bool contrast = false);
 
 /// Sets predicted_with of the conclusion to the effects of the likeliest hypothesis that contains its own. Further

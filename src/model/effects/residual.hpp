@@ -1,5 +1,5 @@
-// What is left of the difference between a robot and its vehicle file once parameters and effects are fitted: a smooth
-// load on the torso, without a cause. It accelerates the body by
+// A smooth load on the torso. It describes how a robot still differs from its vehicle once parameters and effects are
+// fitted, and names no cause. It accelerates the body by
 //   a = f (a_0 + A v + B w)      in x, y, z, m/s^2, and about x, y, z (roll, pitch, yaw), rad/s^2
 // v = (u, v, w): velocity of the torso origin in the air; w = (p, q, r): body rate; all in B. The force is the mass times
 // the first three; the moment the diagonal of the inertia about the torso origin, wings at their shoulders, times the
@@ -13,7 +13,7 @@ namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
 struct Residual {
-  static constexpr int kTerms = 7;  ///< of each acceleration: the constant, u, v, w, p, q, r
+  static constexpr int kTerms = 7;  ///< number of terms of an acceleration: a constant, u, v, w, p, q, r
   static constexpr EffectInfo kInfo{"residual", Stage::world, 6 * kTerms, "", "Kennedy, O'Hagan 2001", false};
   // clang-format off
   static constexpr std::array<EffectParameter, 7 * kTerms - 1> kParameters{{
