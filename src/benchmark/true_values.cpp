@@ -97,9 +97,9 @@ BasisCoefficients Subject::added(blind::Effect effect, double magnitude) const {
 BasisCoefficients Subject::sensed(const blind::Magnitudes& magnitudes) const {
   blind::Case c = case_;
   c.magnitudes = magnitudes;
-  std::vector<blind::RobotFlight> seen = fly_all(c, threads_);
+  const std::vector<blind::RobotFlight> seen = fly_all(c, threads_);
   gap::Flights flights;
-  for (std::size_t k = 0; k < blind::kFlights; ++k) flights.push_back(flights_[k]->with_log(std::move(seen[k].log)));
+  for (std::size_t k = 0; k < blind::kFlights; ++k) flights.push_back(flights_[k]->with_log(seen[k].log));
   return evidence_->basis_coefficients(difference(gap::residuals(flights, {{case_.vehicle}}, threads_)[0], left_));
 }
 

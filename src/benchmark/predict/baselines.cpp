@@ -156,9 +156,9 @@ Baseline stlsq(const Regression& r) {
   return b;
 }
 
-std::vector<double> features(const gap::Flights& flights, const gap::Inference& d) {
-  const gap::Residuals& residual = residual_of(flights, d);
-  const Energy whole = energy(flights, d.noise_sd, residual);
+std::vector<double> features(const gap::Flights& flights, const gap::Inference& inference) {
+  const gap::Residuals& residual = residual_of(flights, inference);
+  const Energy whole = energy(flights, inference.noise_sd, residual);
   std::vector<double> list;
   for (std::size_t g = 0; g < gap::kGroups; ++g) list.push_back(std::log1p(whole.rms(g)));
   std::vector<std::vector<gap::RegimeFunction>> functions;
@@ -168,10 +168,10 @@ std::vector<double> features(const gap::Flights& flights, const gap::Inference& 
   MatrixXd own = MatrixXd::Zero(gap::kGroups, 3), sum = MatrixXd::Zero(gap::kGroups, count), square = sum,
            product = sum;
   for (std::size_t f = 0; f < flights.size(); ++f)
-    for_rows(flights, d.noise_sd, f, [&](std::size_t g, std::size_t row) {
+    for_rows(flights, inference.noise_sd, f, [&](std::size_t g, std::size_t row) {
       if (g % gap::kCoefficients > 2) return;
       const auto j = static_cast<Index>(row / gap::kRowsPerBeat), i = static_cast<Index>(g);
-      const double r = residual[f][row] / d.noise_sd[g];
+      const double r = residual[f][row] / inference.noise_sd[g];
       own.row(i) += Eigen::RowVector3d(1, r, r * r);
       for (Index k = 0; k < count; ++k) {
         const double b = functions[f][static_cast<std::size_t>(k)].values[j];
@@ -193,10 +193,10 @@ std::vector<double> features(const gap::Flights& flights, const gap::Inference& 
 }
 
 std::map<std::string, Baseline> baselines(const gap::Flights& flights, const sim::Randomisation& uncertain,
-                                          const gap::Inference& d, const std::vector<std::string>& withheld,
+                                          const gap::Inference& inference, const std::vector<std::string>& withheld,
                                           int threads) {
   const gap::Hypothesis no_effects(uncertain, {});
-  const VectorXd at = d.parameters.at;
+  const VectorXd at = inference.parameters.at;
   Regression r;
   std::vector<gap::VehicleHypothesis> vehicles;
   std::vector<std::string> effects;
@@ -211,10 +211,10 @@ std::map<std::string, Baseline> baselines(const gap::Flights& flights, const sim
     effects.push_back(std::move(s.effect));
   }
   std::vector<gap::Residuals> rows = residuals(flights, vehicles, threads);
-  const gap::Residuals& residual = residual_of(flights, d);
+  const gap::Residuals& residual = residual_of(flights, inference);
   // the references' residuals come first
-  const gap::Residuals here(d.parameters.residual.end() - static_cast<std::ptrdiff_t>(flights.size()),
-                            d.parameters.residual.end());
+  const gap::Residuals here(inference.parameters.residual.end() - static_cast<std::ptrdiff_t>(flights.size()),
+                            inference.parameters.residual.end());
   std::vector<gap::Residuals> columns;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     if (rows[k].empty()) continue;
@@ -235,9 +235,10 @@ std::map<std::string, Baseline> baselines(const gap::Flights& flights, const sim
       count += static_cast<double>(filled);
       filled = 0;
     };
-    for_rows(flights, d.noise_sd, f, [&](std::size_t g, std::size_t row) {
-      for (Index k = 0; k < n; ++k) some(filled, k) = columns[static_cast<std::size_t>(k)][f][row] / d.noise_sd[g];
-      some(filled, n) = residual[f][row] / d.noise_sd[g];
+    for_rows(flights, inference.noise_sd, f, [&](std::size_t g, std::size_t row) {
+      for (Index k = 0; k < n; ++k)
+        some(filled, k) = columns[static_cast<std::size_t>(k)][f][row] / inference.noise_sd[g];
+      some(filled, n) = residual[f][row] / inference.noise_sd[g];
       if (++filled == kTogether) empty();
     });
     empty();
@@ -245,9 +246,9 @@ std::map<std::string, Baseline> baselines(const gap::Flights& flights, const sim
     r.rows.push_back(count);
   }
   std::vector<Energy> shown;
-  for (const gap::Residuals& c : columns) shown.push_back(energy(flights, d.noise_sd, c));
-  return {{"largest_residual", largest_residual(shown, r.effects, energy(flights, d.noise_sd, residual))},
-          {"best_rmse", best_rmse(flights, d)},
+  for (const gap::Residuals& c : columns) shown.push_back(energy(flights, inference.noise_sd, c));
+  return {{"largest_residual", largest_residual(shown, r.effects, energy(flights, inference.noise_sd, residual))},
+          {"best_rmse", best_rmse(flights, inference)},
           {"stlsq", stlsq(r)}};
 }
 

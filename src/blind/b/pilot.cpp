@@ -115,7 +115,8 @@ Beat Pilot::steer(const View& view, const Target& target) {
   return b;
 }
 
-Programme::Programme(const Assignment& a, std::uint64_t flight, const RobotParameters& f, const Surroundings& room)
+Programme::Programme(const Assignment& a, std::uint64_t flight, const RobotParameters& parameters,
+                     const Surroundings& room)
     : proposed_(a.proposed) {
   if (proposed_) {
     const auto [x, y, z, facing] = proposed_->goal(0);
@@ -157,7 +158,7 @@ Programme::Programme(const Assignment& a, std::uint64_t flight, const RobotParam
     }
     return;
   }
-  const double ceiling = room.ceiling_z_m - f.above_m, wall = room.wall_y_m - f.around_m;
+  const double ceiling = room.ceiling_z_m - parameters.above_m, wall = room.wall_y_m - parameters.around_m;
   at = flight == 0   ? about(0, 0, 0.35, 0.1)
        : flight == 1 ? about(0, -0.2, ceiling - 0.4, 0.1)
                      : about(-0.4, wall - 0.4, 0.9, 0.1);

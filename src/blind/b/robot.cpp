@@ -6,18 +6,18 @@
 
 namespace flappy::blind::b {
 
-std::array<double, 2> waveform(const RobotParameters& f, const Beat& b, double time_s) {
-  const double phase = time_s * f.flapping_Hz;
+std::array<double, 2> waveform(const RobotParameters& parameters, const Beat& b, double time_s) {
+  const double phase = time_s * parameters.flapping_Hz;
   const double t = phase - std::floor(phase);
-  const double amplitude = std::clamp(b.amplitude_V, 0.0, f.amplitude_limit_V);
-  const double difference = std::clamp(b.difference_V, -f.difference_limit_V, f.difference_limit_V);
-  const double bias = std::clamp(b.bias_V, -f.bias_limit_V, f.bias_limit_V);
-  const double split = std::clamp(b.split_cycle, -f.split_cycle_limit, f.split_cycle_limit);
+  const double amplitude = std::clamp(b.amplitude_V, 0.0, parameters.amplitude_limit_V);
+  const double difference = std::clamp(b.difference_V, -parameters.difference_limit_V, parameters.difference_limit_V);
+  const double bias = std::clamp(b.bias_V, -parameters.bias_limit_V, parameters.bias_limit_V);
+  const double split = std::clamp(b.split_cycle, -parameters.split_cycle_limit, parameters.split_cycle_limit);
   std::array<double, 2> volts{};
   for (std::size_t j = 0; j < 2; ++j) {
     const double sign = j == 0 ? 1 : -1, first = 0.5 - sign * split;
     const double angle = t < first ? std::numbers::pi * t / first : std::numbers::pi * (t - 1) / (1 - first);
-    const double limit = f.side[j].motor.voltage_limit_V;
+    const double limit = parameters.side[j].motor.voltage_limit_V;
     volts[j] = std::clamp((amplitude + sign * difference) * std::cos(angle) + bias, -limit, limit);
   }
   return volts;

@@ -121,11 +121,11 @@ RobotParameters read_parameters(const std::filesystem::path& file) {
   return f;
 }
 
-void draw_parameters(std::uint64_t seed, RobotParameters& f) {
+void draw_parameters(std::uint64_t seed, RobotParameters& parameters) {
   Random random(seed, 0, Stream::kParameters);
-  draw_link(random, f.torso, 0.07);
-  f.density_kg_m3 *= factor(random, 0.02);  // weather, in addition to the coefficients of each wing
-  for (Side& s : f.side) {
+  draw_link(random, parameters.torso, 0.07);
+  parameters.density_kg_m3 *= factor(random, 0.02);  // weather, in addition to the coefficients of each wing
+  for (Side& s : parameters.side) {
     draw_link(random, s.edge, 0.07);
     draw_link(random, s.wing, 0.07);
     for (double& x : s.shoulder_m) x += 0.3e-3 * random.normal_within_three();

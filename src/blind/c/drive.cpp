@@ -11,20 +11,20 @@ constexpr double kInternal_ohm = 1.2, kBuffer_s = 5e-3;
 
 }  // namespace
 
-Inputs clipped(Inputs in, const RobotParameters& f) {
-  in.amplitude_V = std::clamp(in.amplitude_V, 0.0, f.amplitude_limit_V);
-  in.difference_V = std::clamp(in.difference_V, -f.difference_limit_V, f.difference_limit_V);
-  in.bias_V = std::clamp(in.bias_V, -f.bias_limit_V, f.bias_limit_V);
-  in.split_cycle = std::clamp(in.split_cycle, -f.split_cycle_limit, f.split_cycle_limit);
+Inputs clipped(Inputs in, const RobotParameters& parameters) {
+  in.amplitude_V = std::clamp(in.amplitude_V, 0.0, parameters.amplitude_limit_V);
+  in.difference_V = std::clamp(in.difference_V, -parameters.difference_limit_V, parameters.difference_limit_V);
+  in.bias_V = std::clamp(in.bias_V, -parameters.bias_limit_V, parameters.bias_limit_V);
+  in.split_cycle = std::clamp(in.split_cycle, -parameters.split_cycle_limit, parameters.split_cycle_limit);
   return in;
 }
 
-std::array<double, 2> beat_voltages(const Inputs& in, double phase, const RobotParameters& f) {
+std::array<double, 2> beat_voltages(const Inputs& in, double phase, const RobotParameters& parameters) {
   std::array<double, 2> volts{};
   for (std::size_t side = 0; side < 2; ++side) {
     const double sign = side == 0 ? 1 : -1, first = 0.5 - sign * in.split_cycle;
     const double half = phase < first ? phase / first : 1 + (phase - first) / (1 - first);  // half periods, from 0 to 2
-    const double limit = f.sides[side].motor.voltage_limit_V;
+    const double limit = parameters.sides[side].motor.voltage_limit_V;
     volts[side] =
         std::clamp((in.amplitude_V + sign * in.difference_V) * std::cos(M_PI * half) + in.bias_V, -limit, limit);
   }

@@ -135,7 +135,8 @@ double to_number(std::string_view text, bool decimal_comma) {
   if (error == std::errc::result_out_of_range)
     value = std::strtod(std::string(text).c_str(), nullptr);  // underflow gives 0, overflow infinity
   if (error != std::errc::invalid_argument && stop == text.data() + text.size()) return value;
-  return is_one_of(text, {"", "na", "n/a", "none", "null"}) ? kMissing : kNoNumber;
+  if (is_one_of(text, {"", "na", "n/a", "none", "null"})) return kMissing;
+  return kNoNumber;
 }
 
 /// The names of the columns, and where the rows begin.

@@ -5,17 +5,17 @@
 
 namespace flappy::gap {
 
-model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Inference& d,
+model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Inference& inference,
                                  const sim::Randomisation& uncertain) {
-  const ScoredHypothesis& best = d.predicting();
-  const ResidualLoad* load = d.residual ? &*d.residual : nullptr;
+  const ScoredHypothesis& best = inference.predicting();
+  const ResidualLoad* load = inference.residual ? &*inference.residual : nullptr;
   const Hypothesis h(uncertain, load != nullptr ? load->hypothesis.effects() : best.effects);
-  const Fit& fit = best.kind == HypothesisKind::effect ? best.fit : d.parameters;
+  const Fit& fit = best.kind == HypothesisKind::effect ? best.fit : inference.parameters;
   model::Vehicle corrected = vehicle;
   if (best.kind != HypothesisKind::none || load != nullptr) {
-    const Eigen::VectorXd& mean = load != nullptr ? load->at : d.corrected;
+    const Eigen::VectorXd& mean = load != nullptr ? load->at : inference.corrected;
     Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(h.size(), h.size());
-    covariance.topLeftCorner(d.corrected.size(), d.corrected.size()) = fit.covariance();
+    covariance.topLeftCorner(inference.corrected.size(), inference.corrected.size()) = fit.covariance();
     if (load != nullptr)
       covariance.bottomRightCorner(load->covariance.rows(), load->covariance.cols()) = load->covariance;
     const auto at = [&](const Eigen::VectorXd& coordinates) {

@@ -197,17 +197,17 @@ void EffectFits::take(const Hypothesis& h, Fit fit, const Scales& scales, Scored
 }
 
 /// An effect fitted only linearly counts for no gain. Where flights say little of it, its posterior is near its prior.
-ScoredHypothesis EffectFits::linear(const ScreenedEffect& s) const {
+ScoredHypothesis EffectFits::linear(const ScreenedEffect& effect) const {
   ScoredHypothesis a;
   a.kind = HypothesisKind::effect;
-  a.effects = {s.effect};
+  a.effects = {effect.effect};
   const Hypothesis h(robot_.uncertain(), a.effects);
   std::vector<BasisCoefficients> columns(static_cast<std::size_t>(h.size() - h.shared()));
   for (const MagnitudeColumn& m : robot_.magnitudes())
-    if (m.effect == s.effect) columns[static_cast<std::size_t>(m.unknown)] = m.change;
+    if (m.effect == effect.effect) columns[static_cast<std::size_t>(m.unknown)] = m.change;
   a.fit = robot_.fitter().fit_linear(h, robot_.parameters(), columns);
   a.log_prior = log_prior_of_one();
-  a.log_evidence = baselines_.parameters.explained() + std::min(s.gain, 0.0) + a.log_prior;
+  a.log_evidence = baselines_.parameters.explained() + std::min(effect.gain, 0.0) + a.log_prior;
   Posterior& p = a.fit.posterior;
   const Index first = h.shared();
   if (h.unknowns()[static_cast<std::size_t>(first)].low < 0) return a;

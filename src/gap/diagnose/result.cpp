@@ -102,45 +102,47 @@ std::vector<Estimate> estimates_of(const ScoredHypothesis& hypothesis, const sim
 }
 
 Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flights,
-                    const sim::Randomisation& uncertain, const Inference& d) {
+                    const sim::Randomisation& uncertain, const Inference& inference) {
   Diagnosis r;
   r.flights = folders;
-  r.complete = d.complete;
-  r.verdict = d.verdict;
-  r.validation = d.validation;
-  r.untestable = d.untestable;
-  const RowContext context = row_context_of(tests_of(flights), d.noise_sd);
-  add_hypotheses(context, uncertain, d, r);
+  r.complete = inference.complete;
+  r.verdict = inference.verdict;
+  r.validation = inference.validation;
+  r.untestable = inference.untestable;
+  const RowContext context = row_context_of(tests_of(flights), inference.noise_sd);
+  add_hypotheses(context, uncertain, inference, r);
   r.suspects = suspects_of(r.hypotheses);
-  if (d.residual) r.loss_without_residual = d.residual->loss_without, r.residual_loss = d.residual->loss;
+  if (inference.residual)
+    r.loss_without_residual = inference.residual->loss_without, r.residual_loss = inference.residual->loss;
 
-  const ScoredHypothesis& concluded = d.conclusion();
+  const ScoredHypothesis& concluded = inference.conclusion();
   const ScoredHypothesis& unknown =
-      concluded.has_remainder() ? concluded
-                                : *std::ranges::find(d.hypotheses, HypothesisKind::unknown, &ScoredHypothesis::kind);
+      concluded.has_remainder()
+          ? concluded
+          : *std::ranges::find(inference.hypotheses, HypothesisKind::unknown, &ScoredHypothesis::kind);
   const RegimeBasis basis(flights);
   for (const FreeBlock& b : unknown.unexplained) r.unexplained.push_back(term_of(b, basis));
   if (concluded.other_law) r.other_law = term_of(*concluded.other_law, basis);
   r.jointly_with = unknown.jointly_with;
 
-  for (const SensorFinding& s : d.sensors) {
+  for (const SensorFinding& s : inference.sensors) {
     const double reach = kHalf90 * s.sd;
     if (std::abs(s.value) > std::max(reach, kMinSensorError * s.prior_sd))
       r.sensors.push_back({s.name, s.value, s.value - reach, s.value + reach, unit_of(s.name)});
   }
-  const ScoredHypothesis& predicting = d.predicting();
+  const ScoredHypothesis& predicting = inference.predicting();
   const bool effects = predicting.kind == HypothesisKind::effect;
   r.moved_parameters =
-      moved_parameters(effects ? predicting.fit : d.parameters, Hypothesis(uncertain, predicting.effects));
+      moved_parameters(effects ? predicting.fit : inference.parameters, Hypothesis(uncertain, predicting.effects));
   if (effects) r.background = estimates_of(predicting, uncertain);
   std::erase_if(r.background, [&](const Estimate& e) {
     return std::ranges::any_of(concluded.effects,
                                [&](const std::string& effect) { return e.name.starts_with(effect + "."); });
   });
 
-  const ScoredHypothesis* best = best_fitted(d);
-  const std::pair<Stage, const Residuals*> stages[] = {{Stage::nominal, &d.nominal},
-                                                       {Stage::refit, &d.refit},
+  const ScoredHypothesis* best = best_fitted(inference);
+  const std::pair<Stage, const Residuals*> stages[] = {{Stage::nominal, &inference.nominal},
+                                                       {Stage::refit, &inference.refit},
                                                        {Stage::effect, best != nullptr ? &best->held_out : nullptr}};
   for (const auto& [stage, residual] : stages) {
     if (residual == nullptr) continue;

@@ -128,121 +128,132 @@ std::string words_of(const RankedHypothesis& c) {
 
 }  // namespace
 
-std::vector<std::string> summary_of(const Diagnosis& r, const std::string& out) {
+std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::string& out) {
   std::vector<std::string> lines = {
-      r.complete ? verdict_line(r.verdict, !r.reference.empty())
-                 : "Stopped before every effect was weighed: this is no verdict, only what was weighed until then"};
-  if (r.verdict.kind == VerdictKind::data) {
-    for (std::size_t i = 0; i < r.faults.size() && i + 3 < kSummaryLines; ++i)
-      lines.push_back(io::format("  %s:%zu: %s", r.faults[i].file.c_str(), r.faults[i].line, r.faults[i].what.c_str()));
-    lines.push_back(next_line(r, out));
+      diagnosis.complete
+          ? verdict_line(diagnosis.verdict, !diagnosis.reference.empty())
+          : "Stopped before every effect was weighed: this is no verdict, only what was weighed until then"};
+  if (diagnosis.verdict.kind == VerdictKind::data) {
+    for (std::size_t i = 0; i < diagnosis.faults.size() && i + 3 < kSummaryLines; ++i)
+      lines.push_back(io::format("  %s:%zu: %s", diagnosis.faults[i].file.c_str(), diagnosis.faults[i].line,
+                                 diagnosis.faults[i].what.c_str()));
+    lines.push_back(next_line(diagnosis, out));
     return lines;
   }
-  for (const NamedDiagnosis& s : r.sets) lines.push_back(s.name + ": " + verdict_line(s.diagnosis.verdict, true));
-  for (const std::string& warning : r.warnings) lines.push_back("warning: " + warning);
+  for (const NamedDiagnosis& s : diagnosis.sets)
+    lines.push_back(s.name + ": " + verdict_line(s.diagnosis.verdict, true));
+  for (const std::string& warning : diagnosis.warnings) lines.push_back("warning: " + warning);
   std::vector<const RankedHypothesis*> ranked;
-  for (const RankedHypothesis& c : r.hypotheses) ranked.push_back(&c);
+  for (const RankedHypothesis& c : diagnosis.hypotheses) ranked.push_back(&c);
   std::ranges::stable_sort(ranked, std::greater{}, &RankedHypothesis::probability);
-  const bool named = r.verdict.kind == VerdictKind::effect || r.verdict.kind == VerdictKind::group;
+  const bool named = diagnosis.verdict.kind == VerdictKind::effect || diagnosis.verdict.kind == VerdictKind::group;
   const RankedHypothesis* concluded = nullptr;
   for (const RankedHypothesis* c : ranked)
     if (concluded == nullptr && named && c->kind == HypothesisKind::effect &&
         std::ranges::all_of(c->effects,
-                            [&](const std::string& e) { return std::ranges::count(r.verdict.effects, e) > 0; }))
+                            [&](const std::string& e) { return std::ranges::count(diagnosis.verdict.effects, e) > 0; }))
       concluded = c;
   if (concluded != nullptr) {
     lines.push_back("magnitude, with its 90 % interval:");
     for (std::size_t i = 0; i < concluded->parameters.size() && i < kParameters; ++i)
       lines.push_back(estimate_line(concluded->parameters[i]));
   }
-  if (r.other_law)
+  if (diagnosis.other_law)
     lines.push_back(io::format("by another law than the catalogue's, most so in %s, on %s (%s)",
-                               place_of(*r.other_law).c_str(), r.other_law->regime.c_str(),
-                               r.other_law->function.c_str()));
-  if (!r.background.empty()) {
+                               place_of(*diagnosis.other_law).c_str(), diagnosis.other_law->regime.c_str(),
+                               diagnosis.other_law->function.c_str()));
+  if (!diagnosis.background.empty()) {
     lines.push_back("besides, in the corrected vehicle, not told from chance:");
-    for (std::size_t i = 0; i < r.background.size() && i < kBackground; ++i)
-      lines.push_back(estimate_line(r.background[i]));
+    for (std::size_t i = 0; i < diagnosis.background.size() && i < kBackground; ++i)
+      lines.push_back(estimate_line(diagnosis.background[i]));
   }
-  if ((r.verdict.kind == VerdictKind::unknown || r.verdict.remainder) && !r.unexplained.empty()) {
-    lines.push_back(r.jointly_with.empty()
+  if ((diagnosis.verdict.kind == VerdictKind::unknown || diagnosis.verdict.remainder) &&
+      !diagnosis.unexplained.empty()) {
+    lines.push_back(diagnosis.jointly_with.empty()
                         ? "what is left depends on:"
-                        : "what is left, with " + listed(r.jointly_with, "and") + " in force, depends on:");
-    for (std::size_t i = 0; i < r.unexplained.size() && i < kTerms; ++i)
+                        : "what is left, with " + listed(diagnosis.jointly_with, "and") + " in force, depends on:");
+    for (std::size_t i = 0; i < diagnosis.unexplained.size() && i < kTerms; ++i)
       lines.push_back(io::format("  %s on %s (%s), %.1f times what models of this robot get wrong",
-                                 place_of(r.unexplained[i]).c_str(), r.unexplained[i].regime.c_str(),
-                                 r.unexplained[i].function.c_str(), r.unexplained[i].times_prior_scale));
+                                 place_of(diagnosis.unexplained[i]).c_str(), diagnosis.unexplained[i].regime.c_str(),
+                                 diagnosis.unexplained[i].function.c_str(),
+                                 diagnosis.unexplained[i].times_prior_scale));
   }
   std::string others;
   std::size_t shown = 0;
   for (const RankedHypothesis* c : ranked) {
-    const bool is = named ? c == concluded : name_of(c->kind) == std::string(name_of(r.verdict.kind));
+    const bool is = named ? c == concluded : name_of(c->kind) == std::string(name_of(diagnosis.verdict.kind));
     if (is || shown == kRunnersUp) continue;
     others += io::format("%s%s %.2g", shown == 0 ? "" : ", ", words_of(*c).c_str(), c->probability);
     ++shown;
   }
   lines.push_back("runners-up: " + others);
-  if (r.reference.empty() && r.verdict.kind != VerdictKind::effect && !r.suspects.empty()) {
+  if (diagnosis.reference.empty() && diagnosis.verdict.kind != VerdictKind::effect && !diagnosis.suspects.empty()) {
     std::string suspects;
-    for (const Suspect& s : r.suspects)
+    for (const Suspect& s : diagnosis.suspects)
       suspects += (suspects.empty() ? "" : ", ") + s.effect +
                   (s.closure ? io::format(" %.2f (closes %.0f %%)", s.probability, 100 * s.closure->value)
                              : io::format(" %.2f", s.probability));
     lines.push_back("if an effect is missing, then most probably " + suspects);
     lines.push_back("that would be decided by flights of the same robot without it, given as --reference");
   }
-  const std::vector<ResidualLocation> locations = one_of_each_test(r);
+  const std::vector<ResidualLocation> locations = one_of_each_test(diagnosis);
   lines.push_back(locations.empty() ? "with parameters refitted nothing stands out of the noise"
                                     : "where the gap lies, with parameters refitted (rms, that of noise):");
   for (const ResidualLocation& p : locations)
     lines.push_back(io::format("  %-12s %-34s %8.3g, noise %.3g %s", p.channel.c_str(),
                                text_of(p.regime, p.test).c_str(), p.gap, p.noise_floor, p.unit.c_str()));
   const auto loss = [](const std::optional<double>& e) { return e ? io::format("%.3g", *e) : std::string("-"); };
-  lines.push_back("mean loss in flights held out: vehicle's file " + loss(r.nominal_loss) + ", parameters refitted " +
-                  loss(r.refit_loss) + ", with the best effect " + loss(r.effect_loss) + ", noise alone " +
-                  loss(r.noise_floor));
-  if (r.closure)
+  lines.push_back("mean loss in flights held out: vehicle's file " + loss(diagnosis.nominal_loss) +
+                  ", parameters refitted " + loss(diagnosis.refit_loss) + ", with the best effect " +
+                  loss(diagnosis.effect_loss) + ", noise alone " + loss(diagnosis.noise_floor));
+  if (diagnosis.closure)
     lines.push_back(io::format("the best effect closes %.0f %% of what refitting leaves (90 %%: %.0f to %.0f %%)",
-                               100 * r.closure->value, 100 * r.closure->low, 100 * r.closure->high));
+                               100 * diagnosis.closure->value, 100 * diagnosis.closure->low,
+                               100 * diagnosis.closure->high));
   else lines.push_back("how much of that an effect closes cannot be told from noise");
-  if (r.loss_without_residual && r.residual_loss)
+  if (diagnosis.loss_without_residual && diagnosis.residual_loss)
     lines.push_back("mean loss in flights held out of the corrected vehicle: without its residual load " +
-                    loss(r.loss_without_residual) + ", with it " + loss(r.residual_loss));
-  if (!r.moved_parameters.empty() && r.verdict.kind != VerdictKind::none) {
+                    loss(diagnosis.loss_without_residual) + ", with it " + loss(diagnosis.residual_loss));
+  if (!diagnosis.moved_parameters.empty() && diagnosis.verdict.kind != VerdictKind::none) {
     lines.push_back("parameters that moved most, in standard deviations of what was believed:");
-    for (std::size_t i = 0; i < r.moved_parameters.size() && i < kMoved; ++i)
-      lines.push_back(io::format("  %-36s %+10.2f", r.moved_parameters[i].first.c_str(), r.moved_parameters[i].second));
+    for (std::size_t i = 0; i < diagnosis.moved_parameters.size() && i < kMoved; ++i)
+      lines.push_back(io::format("  %-36s %+10.2f", diagnosis.moved_parameters[i].first.c_str(),
+                                 diagnosis.moved_parameters[i].second));
   }
-  if (!r.sensors.empty()) {
+  if (!diagnosis.sensors.empty()) {
     lines.push_back("in addition to what the headers declare (90 %):");
-    for (std::size_t i = 0; i < r.sensors.size() && i < kSensors; ++i) lines.push_back(sensor_line(r.sensors[i]));
+    for (std::size_t i = 0; i < diagnosis.sensors.size() && i < kSensors; ++i)
+      lines.push_back(sensor_line(diagnosis.sensors[i]));
   }
-  if (!r.untestable.empty()) lines.push_back("cannot be tested on these logs: " + io::joined(r.untestable));
-  if (r.validation) {
+  if (!diagnosis.untestable.empty())
+    lines.push_back("cannot be tested on these logs: " + io::joined(diagnosis.untestable));
+  if (diagnosis.validation) {
     std::string head = "rms in flights held out (in kinds of flights):";
-    for (const HeldOutError& e : r.validation->ladder.front().errors) head += io::format(" %18s", e.channel.c_str());
+    for (const HeldOutError& e : diagnosis.validation->ladder.front().errors)
+      head += io::format(" %18s", e.channel.c_str());
     lines.push_back(head);
-    for (const Validation::Rung& rung : r.validation->ladder) {
+    for (const Validation::Rung& rung : diagnosis.validation->ladder) {
       std::string line = io::format(
           "  %-44s",
-          ((&rung == &r.validation->ladder.front() || rung.added == "parameters" ? "" : "+ ") + rung.added).c_str());
+          ((&rung == &diagnosis.validation->ladder.front() || rung.added == "parameters" ? "" : "+ ") + rung.added)
+              .c_str());
       for (const HeldOutError& e : rung.errors) line += io::format("  %8.3f (%6.3f)", e.rms, e.by_type);
       lines.push_back(line);
     }
-    for (const Validation::Control& c : r.validation->controls)
+    for (const Validation::Control& c : diagnosis.validation->controls)
       lines.push_back(io::format("  %-24s takes %4.1f %% off %s; shifted in time, at best %4.1f %%", c.effect.c_str(),
                                  100 * c.gain, c.channel.c_str(), 100 * c.best_of_shifted));
   }
-  if (const ClosedLoop* c = most_corrected(r.closed_loop))
+  if (const ClosedLoop* c = most_corrected(diagnosis.closed_loop))
     lines.push_back(
         io::format("in closed loop, %s: %s recorded %.3g, by the vehicle's file %.3g, by the corrected one %.3g",
                    std::filesystem::path(c->flight).filename().c_str(), c->quantity.c_str(), c->recorded, c->nominal,
                    c->corrected));
-  if (r.next)
+  if (diagnosis.next)
     lines.push_back(io::format("%s and %s differ most in configs/gap/experiments/%s.toml (%.3g nats expected)",
-                               r.next->separates.front().c_str(), r.next->separates.back().c_str(),
-                               r.next->manoeuvre.c_str(), r.next->expected_nats));
-  lines.push_back(r.complete ? next_line(r, out) : "next: the same command again, to its end");
+                               diagnosis.next->separates.front().c_str(), diagnosis.next->separates.back().c_str(),
+                               diagnosis.next->manoeuvre.c_str(), diagnosis.next->expected_nats));
+  lines.push_back(diagnosis.complete ? next_line(diagnosis, out) : "next: the same command again, to its end");
   return lines;
 }
 

@@ -102,26 +102,26 @@ std::vector<VectorXd> Fitter::around(const Hypothesis& hypothesis, const VectorX
 
 /// The residual at one point is rough, so statistics are averaged over points around. The columns take each point back
 /// to the fit; nothing is averaged if one is missing.
-void Fitter::average(const std::vector<Residuals>& rows, const std::vector<VectorXd>& shifts, Fit& l) const {
+void Fitter::average(const std::vector<Residuals>& rows, const std::vector<VectorXd>& shifts, Fit& fit) const {
   for (Index d = 0; !shifts.empty() && d < shifts[0].size(); ++d)
-    if (shifts[0][d] != 0 && l.columns[static_cast<std::size_t>(d)].size() == 0) return;
+    if (shifts[0][d] != 0 && fit.columns[static_cast<std::size_t>(d)].size() == 0) return;
   std::vector<SufficientStatistics> around(rows.size());
   io::parallel_for(rows.size(), threads_, [&](std::size_t i) {
     if (rows[i].empty()) return;
     around[i] = evidence_->statistics(rows[i]);
     BasisCoefficients back = BasisCoefficients::Zero(kGroups, evidence_->basis().size());
     for (Index d = 0; d < shifts[i].size(); ++d)
-      if (shifts[i][d] != 0) back += shifts[i][d] * l.columns[static_cast<std::size_t>(d)];
+      if (shifts[i][d] != 0) back += shifts[i][d] * fit.columns[static_cast<std::size_t>(d)];
     evidence_->add(1, back, around[i]);
   });
   double n = 1;
   for (const SufficientStatistics& there : around) {
     if (there.sums.empty()) continue;
     for (std::size_t f = 0; f < there.sums.size(); ++f)
-      for (std::size_t g = 0; g < there.sums[f].size(); ++g) l.statistics.sums[f][g] += there.sums[f][g];
+      for (std::size_t g = 0; g < there.sums[f].size(); ++g) fit.statistics.sums[f][g] += there.sums[f][g];
     n += 1;
   }
-  for (auto& flight : l.statistics.sums)
+  for (auto& flight : fit.statistics.sums)
     for (VectorXd& sum : flight) sum /= n;
 }
 

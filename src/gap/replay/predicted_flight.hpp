@@ -119,7 +119,7 @@ class PredictedFlight {
   /// Null for beat-averaged vehicles.
   virtual const Recording* recording() const { return nullptr; }
   /// The same beats with another log. Null for beat-averaged vehicles.
-  virtual std::shared_ptr<const PredictedFlight> with_log(flightlog::FlightLog /*log*/) const { return nullptr; }
+  virtual std::shared_ptr<const PredictedFlight> with_log(const flightlog::FlightLog& /*log*/) const { return nullptr; }
   /// The same beats with the given errors of sensors undone in the log. Null for beat-averaged vehicles, whose
   /// prediction includes the effects of their sensors.
   virtual std::shared_ptr<const PredictedFlight> corrected(const EffectValues& /*sensors*/) const { return nullptr; }

@@ -408,8 +408,8 @@ std::vector<RegimeQuantity> ResetPrediction::regimes() const {
   return list;
 }
 
-std::shared_ptr<const PredictedFlight> ResetPrediction::with_log(flightlog::FlightLog log) const {
-  return std::make_shared<ResetPrediction>(Recording(recording_, std::move(log)));
+std::shared_ptr<const PredictedFlight> ResetPrediction::with_log(const flightlog::FlightLog& log) const {
+  return std::make_shared<ResetPrediction>(Recording(recording_, log));
 }
 
 void ResetPrediction::forget() const {

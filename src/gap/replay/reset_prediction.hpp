@@ -36,7 +36,7 @@ class ResetPrediction final : public PredictedFlight {
   std::vector<RegimeQuantity> inputs() const override;
   const DiagnosisPolicy& policy() const override { return kWingPolicy; }
   const Recording* recording() const override { return &recording_; }
-  std::shared_ptr<const PredictedFlight> with_log(flightlog::FlightLog log) const override;
+  std::shared_ptr<const PredictedFlight> with_log(const flightlog::FlightLog& log) const override;
   /// Undoes errors of sensors in the log. Caches the last kMaxCorrected results; several threads may call it.
   std::shared_ptr<const PredictedFlight> corrected(const EffectValues& sensors) const override;
   void forget() const override;
