@@ -15,7 +15,8 @@ std::optional<double> change_over_noise(const blind::Family& family, const blind
   for (std::size_t flight = 0; flight < flights; ++flight)
     for (const std::array<double, 30>& change : family.contrast(robot, flight, effect, magnitude).change)
       for (std::size_t i = 0; i < change.size(); ++i) {
-        const auto harmonic = static_cast<double>((i % 5 + 1) / 2);
+        const std::size_t number = (i % 5 + 1) / 2;  // rows: the mean, then cosine and sine of each harmonic
+        const auto harmonic = static_cast<double>(number);
         const double of_wave = harmonic > 0 ? std::numbers::sqrt2 : 1;
         const double slope = harmonic > 0 ? 2 * std::numbers::pi * harmonic / beat_s : std::sqrt(12.0) / beat_s;
         const double sd = of_wave * (i < 15 ? force : rate * slope);

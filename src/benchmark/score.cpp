@@ -218,10 +218,23 @@ ScoreLine redeclared_line(const Cases& cases, const Cases& singles) {
               proportion(unchanged, count));
 }
 
+/// A maker's word, and how the channels and regimes of a diagnosis that it covers begin.
+constexpr std::pair<const char*, const char*> kCovers[] = {
+    {"mocap", "path_"},          {"mocap", "rotate_"},       {"gyro", "torque_"},     {"gyro", "rotate_"},
+    {"accelerometer", "force_"}, {"accelerometer", "path_"}, {"current", "current_"}, {"current", "battery"},
+    {"place", "height"},         {"place", "ceiling"},       {"place", "wall"},       {"temperature", "time"},
+    {"stroke", "always"}};
+
+bool covered(const Names& sealed, const std::string& said) {
+  return std::ranges::any_of(sealed, [&](const std::string& word) {
+    return word == said ||
+           std::ranges::any_of(kCovers, [&](const auto& c) { return c.first == word && said.starts_with(c.second); });
+  });
+}
+
 bool described(const ScoredCase& c) {
   const std::optional<Where>& w = c.prediction.where;
-  return w && std::ranges::count(c.truth.channels, w->channel) > 0 &&
-         std::ranges::count(c.truth.regimes, w->regime) > 0;
+  return w && covered(c.truth.channels, w->channel) && covered(c.truth.regimes, w->regime);
 }
 
 bool next_brings_truth(const ScoredCase& c) {
@@ -337,13 +350,14 @@ bool needs_change_over_noise(const ScoredCase& c) {
          c.truth.part != "changed_outside" && !right(c.truth, c.prediction);
 }
 
-Scores score(const std::vector<ScoredCase>& all) {
-  std::vector<ScoredCase> cases = all;
-  std::erase_if(cases, within_noise);
+Scores score(const std::vector<ScoredCase>& cases) {
+  std::vector<ScoredCase> counted = cases;
+  std::erase_if(counted, within_noise);
   Scores s;
   const auto of_contrast = [](const ScoredCase& c) { return std::ranges::count(kContrastParts, c.truth.part) > 0; };
-  if (!std::ranges::all_of(cases, of_contrast)) s.lines = absolute_lines(cases);
-  if (std::ranges::any_of(cases, of_contrast)) std::ranges::move(contrast_lines(cases), std::back_inserter(s.lines));
+  if (!std::ranges::all_of(counted, of_contrast)) s.lines = absolute_lines(counted);
+  if (std::ranges::any_of(counted, of_contrast))
+    std::ranges::move(contrast_lines(counted), std::back_inserter(s.lines));
   s.unbeaten = unbeaten_lines(s.lines);
   return s;
 }

@@ -182,6 +182,13 @@ TEST(Score, FalseAlarmsAndUnknownTruths) {
   cases[5].prediction.where = {"torque_y", "heading"};
   cases[8].prediction.where = {"torque_y", "height"};
   EXPECT_DOUBLE_EQ(*main_score(cases, "unknown_where").value, 0.5);
+  // makers say "mocap" and "place" of what diagnoses name by channel and regime
+  for (ScoredCase& c : cases) c.truth.channels = {"mocap"}, c.truth.regimes = {"place"};
+  cases[5].prediction.where = {"path_x", "ceiling"};
+  cases[8].prediction.where = {"path_x", "velocity"};
+  EXPECT_DOUBLE_EQ(*main_score(cases, "unknown_where").value, 0.5);
+  cases[8].prediction.where = {"force_x", "ceiling"};
+  EXPECT_DOUBLE_EQ(*main_score(cases, "unknown_where").value, 0.5);
 }
 
 TEST(Score, OfAContrast) {

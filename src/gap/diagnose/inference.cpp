@@ -7,6 +7,7 @@
 #include "gap/diagnose/residual_load.hpp"
 #include "gap/diagnose/verdict.hpp"
 #include "io/parallel.hpp"
+#include "model/effects/registry.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -77,18 +78,29 @@ void keep_tests(std::size_t references, Inference& d) {
   for (ScoredHypothesis& a : d.hypotheses) keep(a.held_out);
 }
 
+/// With what effects of models gain by chance where references do not cover the regimes of the tests.
+VerdictRule rule_of(const InferenceOptions& options, const RobotFit& robot) {
+  VerdictRule rule = options.rule;
+  if (!robot.evidence().contrasts() || robot.evidence().basis().covers_all()) return rule;
+  rule.gain.outside_by_chance_nats = rule.gain.by_chance_nats;
+  rule.gain.by_chance_nats = rule.gain.uncovered_by_chance_nats;
+  for (const model::CatalogueEffect& e : model::causes_of(robot.uncertain().nominal()))
+    if (!std::ranges::count(options.discrepancy.of_models, e.info.id)) rule.gain.outside.emplace_back(e.info.id);
+  return rule;
+}
+
 }  // namespace
 
-Inference infer(const Flights& flights, const sim::Randomisation& uncertain, const InferenceOptions& options,
+Inference infer(const Flights& flights, const sim::Randomisation& uncertain, InferenceOptions options,
                 const RobotFit* reference) {
   const int threads = io::thread_count(options.threads);
-  const VerdictRule& rule = options.rule;
   Progress progress(options);
 
   progress(0, "fitting parameters");
   const RobotFit robot = reference != nullptr
                              ? RobotFit(*reference, flights)
                              : RobotFit(flights, uncertain, options.discrepancy, options.withheld, threads);
+  const VerdictRule& rule = options.rule = rule_of(options, robot);
   const Baselines baselines = weigh_baselines(robot, rule);
 
   progress(0.3, "screening effects");

@@ -88,7 +88,7 @@ struct Inference {
 
 /// Runs all stages on the flights of one robot. After a stop it decides among the hypotheses fitted by then.
 /// `reference`: the fit of the reference flights among them (RobotFit::of_references); null: there are none.
-Inference infer(const Flights& flights, const sim::Randomisation& uncertain, const InferenceOptions& options,
+Inference infer(const Flights& flights, const sim::Randomisation& uncertain, InferenceOptions options,
                 const RobotFit* reference = nullptr);
 
 }  // namespace flappy::gap

@@ -26,7 +26,9 @@ VerdictRule read_verdict_rule(const std::filesystem::path& path) {
             {},
             {},
             {},
+            {},
             {}};
+  r.gain.uncovered_by_chance_nats = gain.number_or("uncovered_by_chance_nats", r.gain.by_chance_nats, kNats);
   if (const auto law = root.optional_table("another_law")) {
     r.gain.further_share = law->number("further_share", kShare);
     r.gain.remainder_share = law->number("remainder_share", kShare);

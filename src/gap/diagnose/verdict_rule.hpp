@@ -21,6 +21,9 @@ struct VerdictRule {
     double further_share, remainder_share;
     /// Effects of surroundings and sensors: errors of a robot's model do not look like these.
     std::vector<std::string> outside;
+    /// In a contrast, of effects of models (ModelDiscrepancy::of_models) where references do not cover the regimes of
+    /// the tests.
+    double uncovered_by_chance_nats;
     double chance_of(const std::string& effect) const {
       return std::ranges::count(outside, effect) > 0 ? outside_by_chance_nats : by_chance_nats;
     }

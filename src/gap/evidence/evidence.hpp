@@ -11,6 +11,9 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <functional>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -36,6 +39,11 @@ class RegimeBasis {
   bool contrasts() const { return functions_.back().of_tests; }
   /// The same change in the test flights alone. `coefficients`: [group][size()].
   Eigen::MatrixXd in_tests(const Eigen::MatrixXd& coefficients) const { return coefficients * in_tests_; }
+  /// A change of the test flights alone, as it would be in all flights.
+  Eigen::MatrixXd in_all(const Eigen::MatrixXd& coefficients) const { return coefficients * in_all_; }
+  /// Whether the references vary enough in this class of regimes to tell what differs in the tests.
+  bool covers(Regimes regimes) const { return covered_[static_cast<std::size_t>(regimes)]; }
+  bool covers_all() const { return std::ranges::all_of(covered_, std::identity()); }
   /// [beat][size()].
   const Eigen::MatrixXd& values(std::size_t flight) const { return values_[flight]; }
 
@@ -47,10 +55,13 @@ class RegimeBasis {
   };
   void append_functions(const Flights& flights);
   void append_of_tests(const Flights& flights);
+  void find_covered(const Flights& flights);
   const Function& function(int i) const { return functions_[static_cast<std::size_t>(i)]; }
   std::vector<Function> functions_;
   std::vector<Eigen::MatrixXd> values_;
   Eigen::MatrixXd in_tests_;  ///< [function][function in the tests alone]
+  Eigen::MatrixXd in_all_;    ///< [function in the tests alone][function]
+  std::array<bool, static_cast<std::size_t>(Regimes::count)> covered_{};
 };
 
 /// The part of rows that is a smooth function of the regime: [group][basis].

@@ -96,6 +96,8 @@ class Fitter {
     return law_sd(hypothesis, fit, fit.law_factor);
   }
   BasisCoefficients law_sd(const Hypothesis& hypothesis, const Fit& fit, double law_factor) const;
+  /// The same of one effect that changes the rows by `change`.
+  BasisCoefficients law_sd_of(const std::string& effect, const BasisCoefficients& change, double law_factor) const;
   bool acts_by_place(const Hypothesis& hypothesis, const Fit& fit) const;
 
   /// A fit without a posterior. `known`: columns of the first directions, which are not simulated again.
@@ -119,7 +121,6 @@ class Fitter {
 
  private:
   std::map<std::string, BasisCoefficients> changes(const Hypothesis& hypothesis, const Fit& fit) const;
-  BasisCoefficients law_sd_of(const std::string& effect, const BasisCoefficients& change, double law_factor) const;
   BasisCoefficients spread_of(const BasisCoefficients& change) const;
   BasisCoefficients discrepancy_sd(const Hypothesis& hypothesis, const Fit& fit) const;
   /// Null: the direction is not a linear magnitude.

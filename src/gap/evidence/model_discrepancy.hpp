@@ -63,6 +63,9 @@ struct ModelDiscrepancy {
 /// effect.
 inline constexpr const char *kSessionParameters = "session of parameters", *kSessionOf = "session of ";
 
+/// Prefix of an effect's background magnitude in all flights of a contrast: what the model gets wrong in both sessions.
+inline constexpr const char* kModelOf = "model of ";
+
 /// Suffix of the background magnitude that both wings share, for an effect with a magnitude for each wing.
 inline constexpr const char* kOfBoth = "_of_both";
 

@@ -8,6 +8,7 @@ namespace flappy::gap {
 RegimeBasis::RegimeBasis(const Flights& flights) {
   append_functions(flights);
   append_of_tests(flights);
+  find_covered(flights);
 }
 
 void RegimeBasis::append_functions(const Flights& flights) {
@@ -71,16 +72,18 @@ void RegimeBasis::append_of_tests(const Flights& flights) {
     }
     functions_.push_back({name(i), quantity(i), kind(i), true});
   }
-  in_tests_ = Eigen::MatrixXd::Zero(size(), size());
+  in_all_ = in_tests_ = Eigen::MatrixXd::Zero(size(), size());
   int again = once;
   for (int i = 0; i < once; ++i) {
     if (kind(i) != BasisFunction::flight) {
       in_tests_(i, again) = in_tests_(again, again) = 1;
+      in_all_(i, i) = in_all_(again, i) = 1;
       ++again;
       continue;
     }
     // the offset of a flight: one value in it, another in all others
     const auto largest = std::ranges::max_element(values_, {}, [&](const auto& v) { return v(0, i); });
+    in_all_(i, i) = 1;
     const double elsewhere =
         std::ranges::min_element(values_, {}, [&](const auto& v) { return v(0, i); })->operator()(0, i);
     in_tests_(i, once) = elsewhere;
@@ -88,6 +91,30 @@ void RegimeBasis::append_of_tests(const Flights& flights) {
     in_tests_(i, i) = 1;
     in_tests_(i, 0) = -elsewhere;
   }
+}
+
+/// By the mean over a class's functions of their variance in the references over that in the tests, at most 1 each.
+void RegimeBasis::find_covered(const Flights& flights) {
+  constexpr double kCovered = 0.5;
+  const Flights references = references_of(flights);
+  const auto variance = [&](int i, bool of_reference) {
+    double sum = 0, squares = 0, n = 0;
+    for (std::size_t f = 0; f < flights.size(); ++f) {
+      if (flights[f]->is_reference() != of_reference) continue;
+      const auto v = values_[f].col(i);
+      sum += v.sum(), squares += v.squaredNorm(), n += static_cast<double>(v.size());
+    }
+    return squares / n - sum * sum / (n * n);
+  };
+  std::array<double, static_cast<std::size_t>(Regimes::count)> shares{}, counts{};
+  for (int i = 1; !references.empty() && i < size() && !of_tests(i); ++i) {
+    if (kind(i) == BasisFunction::flight) continue;
+    const auto c = static_cast<std::size_t>(regimes_of(kind(i)));
+    const double in_tests = variance(i, false);
+    shares[c] += in_tests > 0 ? std::min(1.0, variance(i, true) / in_tests) : 1;
+    counts[c] += 1;
+  }
+  for (std::size_t c = 0; c < covered_.size(); ++c) covered_[c] = counts[c] == 0 || shares[c] >= kCovered * counts[c];
 }
 
 }  // namespace flappy::gap

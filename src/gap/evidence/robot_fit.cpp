@@ -35,7 +35,7 @@ bool of_sides(const model::CatalogueEffect& effect) {
 
 }  // namespace
 
-RobotFit::RobotFit(ParametersAlone, const Flights& flights, const sim::Randomisation& uncertain,
+RobotFit::RobotFit(Stages stages, const Flights& flights, const sim::Randomisation& uncertain,
                    const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads)
     : flights_(flights),
       uncertain_(uncertain),
@@ -43,18 +43,27 @@ RobotFit::RobotFit(ParametersAlone, const Flights& flights, const sim::Randomisa
       threads_(io::thread_count(threads)),
       fitter_(flights, std::make_shared<const Evidence>(flights, discrepancy, threads_), threads_),
       no_effects_(uncertain_, {}) {
+  if (stages == Stages::planned) {
+    parameters_ = nominal_ = fitter_.linearise(no_effects_, no_effects_.start(), Fitter::axes(no_effects_));
+    find_nuisance_columns();
+    return;
+  }
   fit_parameters();
+  if (stages == Stages::all) refit_with_nuisances();
 }
 
 RobotFit::RobotFit(const Flights& flights, const sim::Randomisation& uncertain, const ModelDiscrepancy& discrepancy,
                    std::vector<std::string> withheld, int threads)
-    : RobotFit(ParametersAlone(), flights, uncertain, discrepancy, std::move(withheld), threads) {
-  refit_with_nuisances();
-}
+    : RobotFit(Stages::all, flights, uncertain, discrepancy, std::move(withheld), threads) {}
 
 RobotFit RobotFit::of_references(const Flights& flights, const sim::Randomisation& uncertain,
                                  const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads) {
-  return RobotFit(ParametersAlone(), flights, uncertain, discrepancy, std::move(withheld), threads);
+  return RobotFit(Stages::parameters, flights, uncertain, discrepancy, std::move(withheld), threads);
+}
+
+RobotFit RobotFit::planned(const Flights& flights, const sim::Randomisation& uncertain,
+                           const ModelDiscrepancy& discrepancy, int threads) {
+  return RobotFit(Stages::planned, flights, uncertain, discrepancy, {}, threads);
 }
 
 RobotFit::RobotFit(const RobotFit& reference, const Flights& flights)
@@ -66,9 +75,7 @@ RobotFit::RobotFit(const RobotFit& reference, const Flights& flights)
               threads_),
       no_effects_(uncertain_, {}) {
   linearise_around(reference.parameters_);
-  find_magnitudes();
-  find_nuisances();
-  set_nuisances();
+  find_nuisance_columns();
   Scales scales = find_scales(no_effects_, parameters_, {});
   // what an effect explains is no difference between sessions
   scales.session = 1;
@@ -99,9 +106,15 @@ Fitter RobotFit::fitter_given(const ModelDiscrepancy& discrepancy) const {
       .with_nuisances(nuisance_regressors(), all_backgrounds(discrepancy), parameters_);
 }
 
-/// With shapes; in a contrast, what changes between sessions.
+/// With shapes. In a contrast, what changes between sessions; then, where references do not cover the regimes of the
+/// tests, so that errors of the model do not cancel, what the model gets wrong in both, without shapes.
 std::vector<Background> RobotFit::all_backgrounds(const ModelDiscrepancy& discrepancy) const {
-  return evidence().contrasts() ? session_changes(discrepancy.session) : background(discrepancy, true);
+  if (!evidence().contrasts()) return background(discrepancy, true);
+  std::vector<Background> list = session_changes(discrepancy.session);
+  if (evidence().basis().covers_all()) return list;
+  for (const Background& b : background(discrepancy, false))
+    list.push_back({kModelOf + b.effect, evidence().basis().in_all(b.column)});
+  return list;
 }
 
 /// Learns the noise; fits nothing.
@@ -151,10 +164,14 @@ void RobotFit::fit_parameters() {
   nominal_.statistics = evidence().statistics(nominal_.residual);
 }
 
-void RobotFit::refit_with_nuisances() {
+void RobotFit::find_nuisance_columns() {
   find_magnitudes();
   find_nuisances();
   set_nuisances();
+}
+
+void RobotFit::refit_with_nuisances() {
+  find_nuisance_columns();
   if (evidence().policy().discrepancy_scales) widen_effects();
   else learn_remainder();
   parameters_ = fitter_.refit(no_effects_, parameters_, kRefitIterations);

@@ -24,6 +24,10 @@ class RobotFit {
   /// A contrast: `flights` are those of `reference`, set_reference(), and test flights of the same robot. Linearises
   /// around the parameters of `reference`; an effect's magnitude acts in the test flights alone.
   RobotFit(const RobotFit& reference, const Flights& flights);
+  /// For flights like those that are planned, references first: fits nothing, and takes the declared noise and the
+  /// prior scales of what models get wrong.
+  static RobotFit planned(const Flights& flights, const sim::Randomisation& uncertain,
+                          const ModelDiscrepancy& discrepancy, int threads);
   RobotFit(const RobotFit&) = delete;
   RobotFit& operator=(const RobotFit&) = delete;
 
@@ -67,11 +71,13 @@ class RobotFit {
   Scales find_scales(const Hypothesis& hypothesis, const Fit& fit, const Scales& start) const;
 
  private:
-  struct ParametersAlone {};
-  RobotFit(ParametersAlone, const Flights& flights, const sim::Randomisation& uncertain,
+  /// planned: fits nothing; parameters: fits them alone; all: fits them with all nuisances.
+  enum class Stages { planned, parameters, all };
+  RobotFit(Stages stages, const Flights& flights, const sim::Randomisation& uncertain,
            const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads);
   void fit_parameters();
   void linearise_around(const Fit& parameters);
+  void find_nuisance_columns();
   std::vector<Background> all_backgrounds(const ModelDiscrepancy& discrepancy) const;
   void refit_with_nuisances();
   void learn_remainder();

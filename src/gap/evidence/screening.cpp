@@ -23,7 +23,8 @@ double log_twice_positive(double mean, double sd) {
 
 class Screening {
  public:
-  Screening(const Fitter& fitter, const Fit& fit, const std::vector<MagnitudeColumn>& columns)
+  Screening(const Fitter& fitter, const Fit& fit, const std::vector<MagnitudeColumn>& columns,
+            const BasisCoefficients& law_sd)
       : fitter_(fitter), columns_(columns) {
     Regressors r = fitter.regressors(fit);
     base_ = r.all;
@@ -37,8 +38,9 @@ class Screening {
       }
     }
     const Evidence& evidence = fitter.evidence();
-    reduced_ =
-        evidence.reduce(fit.statistics, r.columns, fitter.all_flights(), evidence.discrepancy_sd(fitter.scales()));
+    BasisCoefficients sd = evidence.discrepancy_sd(fitter.scales());
+    if (law_sd.size() > 0) sd = (sd.cwiseAbs2() + law_sd.cwiseAbs2()).cwiseSqrt();
+    reduced_ = evidence.reduce(fit.statistics, r.columns, fitter.all_flights(), sd);
     mean_ = r.prior_mean();
     without_ = Evidence::posterior(reduced_, base_, mean_(base_)).log_evidence;
   }
@@ -186,8 +188,9 @@ std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, 
   return steps;
 }
 
-std::vector<ScreenedEffect> screen(const Fitter& fitter, const Fit& fit, const std::vector<MagnitudeColumn>& columns) {
-  const Screening screening(fitter, fit, columns);
+std::vector<ScreenedEffect> screen(const Fitter& fitter, const Fit& fit, const std::vector<MagnitudeColumn>& columns,
+                                   const BasisCoefficients& law_sd) {
+  const Screening screening(fitter, fit, columns, law_sd);
   std::vector<ScreenedEffect> ranking;
   for (const MagnitudeColumn& c : columns)
     if (ranking.empty() || ranking.back().effect != c.effect) ranking.push_back(screening.screened(c.effect));

@@ -48,6 +48,8 @@ struct ScreenedEffect {
 };
 
 /// Screens each effect that has columns; the largest gain first. The columns of one effect have to be consecutive.
-std::vector<ScreenedEffect> screen(const Fitter& fitter, const Fit& fit, const std::vector<MagnitudeColumn>& columns);
+/// `law_sd`: [group][basis] standard deviation of what the law of the robot's effect deviates by; empty: 0.
+std::vector<ScreenedEffect> screen(const Fitter& fitter, const Fit& fit, const std::vector<MagnitudeColumn>& columns,
+                                   const BasisCoefficients& law_sd = {});
 
 }  // namespace flappy::gap

@@ -100,7 +100,7 @@ int Evidence::block_of(int group, int function) const {
 /// Whether an excess is a sign of an unknown cause. Blocks of few degrees of freedom have tails that hold any model
 /// error; in a contrast these errors cancel in the test flights.
 bool Evidence::may_be_free(std::size_t block) const {
-  if (contrasts()) return block_of_tests(block);
+  if (contrasts()) return block_of_tests(block) && basis().covers(regimes_of_block(block));
   return discrepancy_.freedom_of(regimes_of_block(block)) >= discrepancy_.spread.place_freedom;
 }
 

@@ -72,9 +72,26 @@ TEST(RegimeBasis, HasFunctionsOfTheTestsAgain) {
     const Eigen::VectorXd all = basis.values(f) * change.transpose(), part = basis.values(f) * in_tests.transpose();
     EXPECT_LT((part - (f < 2 ? 0.0 : 1.0) * all).cwiseAbs().maxCoeff(), 1e-12) << f;
   }
+  // and back again, but for the offsets of flights
+  for (int i = 0; i < basis.size(); ++i)
+    if (basis.kind(i) == BasisFunction::flight || basis.of_tests(i)) change(0, i) = 0;
+  EXPECT_LT((basis.in_all(basis.in_tests(change)) - change).cwiseAbs().maxCoeff(), 1e-12);
   made[2]->set_reference();
   made[3]->set_reference();
   EXPECT_FALSE(RegimeBasis(as_flights(made)).contrasts()) << "nothing to compare with";
+}
+
+TEST(RegimeBasis, SaysWhatReferencesDoNotVisit) {
+  const auto made = synthetic_flights(4, synthetic_law);
+  made[0]->set_reference();
+  made[1]->set_reference();
+  EXPECT_TRUE(RegimeBasis(as_flights(made)).covers_all());
+  for (std::size_t f : {0, 1}) made[f]->velocity *= 0.1;
+  const RegimeBasis calm(as_flights(made));
+  EXPECT_FALSE(calm.covers(Regimes::velocity));
+  EXPECT_TRUE(calm.covers(Regimes::inputs) && calm.covers(Regimes::place) && calm.covers(Regimes::always));
+  for (std::size_t f : {2, 3}) made[f]->velocity *= 0.1;
+  EXPECT_TRUE(RegimeBasis(as_flights(made)).covers_all()) << "as calm as the tests";
 }
 
 }  // namespace

@@ -166,5 +166,30 @@ TEST(Contrast, TellsWhatAppearedFromWhatWasAlwaysOff) {
   EXPECT_LT(gain(0), 1);
 }
 
+// Something acts along the velocity in the tests alone. Where references never moved, it may have acted before.
+TEST(Contrast, CallsUnknownOnlyWhatReferencesWouldHaveShown) {
+  const sim::Randomisation priors = synthetic_priors();
+  const auto freed = [&](double calm) {
+    auto made = synthetic_flights(4, synthetic_law);
+    for (std::size_t f = 0; f < 4; ++f) {
+      if (f < 2) made[f]->velocity *= calm;
+      made[f]->fly(Hypothesis(priors, {}).vehicle(Hypothesis(priors, {}).start()));
+      if (f >= 2) made[f]->add_measured(kTorqueY, 1, made[f]->velocity);
+      if (f < 2) made[f]->set_reference();
+    }
+    const Flights flights = as_flights(made);
+    ModelDiscrepancy discrepancy = read_model_discrepancy();
+    discrepancy.session = read_session_variation();
+    const Flights references = references_of(flights);
+    const RobotFit robot(RobotFit::of_references(references, priors, discrepancy, {}, 2), flights);
+    EXPECT_EQ(robot.fitter().place_of(std::string(kModelOf) + "body_drag") >= 0, calm < 1)
+        << "errors of the model do not cancel";
+    const ScaledEvidence w = robot.weigh(robot.no_effects(), robot.parameters(), robot.fitter().scales(), 10);
+    return std::ranges::count(w.scales.free, 1);
+  };
+  EXPECT_GE(freed(1), 1);
+  EXPECT_EQ(freed(0.05), 0);
+}
+
 }  // namespace
 }  // namespace flappy::gap::robot_fit_test
