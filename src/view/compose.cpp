@@ -14,9 +14,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kAccepted =
     "a flight log or a folder of them, a run folder or a folder of runs of flappy-train, JSON of flappy-eval, "
-    "flappy-gap diagnose (or its "
-    "folder) or "
-    "flappy-identify forces, a folder or score.csv of flappy-blind score";
+    "flappy-gap diagnose or plan (or its folder) or flappy-identify forces, a folder or score.csv of flappy-blind "
+    "score";
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& what) {
   throw io::InputError(path.string() + ": " + what + "; accepted: " + kAccepted);
@@ -29,6 +28,7 @@ Kind recognised_folder(const fs::path& path) {
   };
   if (has("flight.toml")) return Kind::flight;
   if (has("diagnosis.json")) return Kind::diagnosis;
+  if (has("plan.json")) return Kind::plan;
   if (has("run.json")) return Kind::run;
   if (has("score.csv")) return Kind::benchmark;
   if (has("manifest.json")) refuse(path, "is a blind benchmark that is not scored yet");
@@ -43,6 +43,7 @@ Kind recognised_json(const fs::path& path) {
   const auto has = [&](const char* key) { return json.is_object() && json.contains(key); };
   if (has("verdict") && (has("hypotheses") || has("candidates")) && has("where"))
     return Kind::diagnosis;  // "candidates" is the key in schema 1
+  if (has("effects") && has("choices")) return Kind::plan;
   if (has("policy") && has("success_rate")) return Kind::evaluation;
   if (has("parameters") && has("total_error_after")) return Kind::identification;
   refuse(path, "is JSON of something else");
@@ -112,6 +113,9 @@ std::vector<Section> composed(const std::vector<fs::path>& given, const FlightOp
         break;
       case Kind::diagnosis:
         sections.push_back(diagnosis_section(fs::is_directory(path) ? path / "diagnosis.json" : path));
+        break;
+      case Kind::plan:
+        sections.push_back(plan_section(fs::is_directory(path) ? path / "plan.json" : path));
         break;
       case Kind::identification:
         sections.push_back(identification_section(path));

@@ -11,9 +11,9 @@
 
 namespace flappy::view {
 
-enum class Kind { flight, run, evaluation, diagnosis, identification, benchmark };
+enum class Kind { flight, run, evaluation, diagnosis, plan, identification, benchmark };
 
-/// A flight log; a run folder or a folder of runs; results of flappy-eval, flappy-gap diagnose (or its folder),
+/// A flight log; a run folder or a folder of runs; results of flappy-eval, flappy-gap diagnose or plan (or its folder),
 /// flappy-identify forces or flappy-blind score (its folder, or score.csv). Throws InputError for anything else, also
 /// for a folder of flight logs, which composed() expands.
 Kind recognised(const std::filesystem::path& path);

@@ -20,6 +20,8 @@ Section evaluation_section(const std::filesystem::path& file);  ///< of flappy-e
 
 Section identification_section(const std::filesystem::path& file);  ///< of flappy-identify forces
 
+Section plan_section(const std::filesystem::path& file);  ///< of flappy-gap plan
+
 Section run_section(const std::filesystem::path& folder);  ///< a run of flappy-train, or several (--seeds)
 
 /// A scored blind benchmark: its folder, or score.csv alone, such as docs/results/blind_reported.csv; reads predictions

@@ -6,6 +6,7 @@
 #include "flightlog/check/data_faults.hpp"
 #include "gap/diagnose/diagnose_command.hpp"
 #include "gap/diagnose/learn_command.hpp"
+#include "gap/plan/plan_command.hpp"
 #include "import_command.hpp"
 #include "io/config.hpp"
 #include "io/program.hpp"
@@ -185,6 +186,19 @@ int main(int argc, char** argv) {
                 "give the corrected vehicle what is left, as a smooth load without a cause");
   diagnose.option("--out", command.out, "folder for diagnosis.json, the corrected vehicle, tables and figures");
   diagnose.option("--threads", command.settings.threads, "0: one for each processor").range(0, 1024);
+  io::Command plan = program.app().command("plan", "before any flight: which effects flights could tell apart");
+  gap::PlanCommand planned;
+  plan.option("--vehicle", planned.settings.vehicle, "the vehicle's file, as it is believed").required();
+  plan.option("--manoeuvre", planned.settings.manoeuvre, "what is flown, by its name in --experiments").shows_default();
+  plan.option("--experiments", planned.settings.experiments, "folder of manoeuvres [configs/gap/experiments]");
+  plan.option("--like", planned.settings.like, "flight logs whose inputs and paths are flown, in place of --manoeuvre");
+  plan.option("--sensors", planned.settings.sensors, "file of the sensors; else the manoeuvres'");
+  plan.option("--flights", planned.settings.flights, "number of flights").range(1, 100).shows_default();
+  plan.option("--duration", planned.settings.duration_s, "of a flight at most, s").range(2.0, 600.0).shows_default();
+  plan.flag("--reference", planned.settings.reference, "with as many reference flights of the same robot");
+  plan.option("--magnitude", planned.magnitudes, "EFFECT=FACTOR on the typical magnitude");
+  plan.option("--out", planned.out, "folder for plan.json and matrix.csv");
+  plan.option("--threads", planned.settings.threads, "0: one for each processor").range(0, 1024);
   io::Command learn = program.app().command(
       "learn-discrepancy", "what models get wrong, from robots of which all is known that the vehicle's file says");
   gap::LearnCommand lessons{.vehicle = {},
@@ -219,6 +233,8 @@ int main(int argc, char** argv) {
       program.write_json(gap::list_effects(beat_averaged));
     } else if (import.given()) {
       program.write_json(gap::run_import(import_command));
+    } else if (plan.given()) {
+      program.write_json(gap::run_plan(planned));
     } else if (learn.given()) {
       gap::run_learn_discrepancy(lessons);
     } else {

@@ -266,12 +266,12 @@ std::optional<NextExperiment> expected_information(const Manoeuvre& m, const std
 
 }  // namespace
 
-std::vector<Manoeuvre> read_manoeuvres(const fs::path& folder) {
+std::vector<Manoeuvre> read_manoeuvres(const fs::path& folder, const std::vector<std::string>& overrides) {
   std::vector<Manoeuvre> list;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error))
     if (entry.path().extension() == ".toml")
-      list.push_back({entry.path().stem().string(), rollout::read_fly_config(entry.path())});
+      list.push_back({entry.path().stem().string(), rollout::read_fly_config(entry.path(), overrides)});
   if (list.empty())
     throw io::InputError(folder.string() + ": holds no manoeuvre; accepted: a folder of configurations of flappy-fly");
   std::ranges::sort(list, {}, &Manoeuvre::name);

@@ -30,7 +30,8 @@ struct Manoeuvre {
 };
 
 /// The configurations (*.toml) of a folder by name. io::InputError if there is none or a faulty one.
-std::vector<Manoeuvre> read_manoeuvres(const std::filesystem::path& folder);
+std::vector<Manoeuvre> read_manoeuvres(const std::filesystem::path& folder,
+                                       const std::vector<std::string>& overrides = {});
 
 struct NextOptions {
   int threads = 0;

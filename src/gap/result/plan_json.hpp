@@ -1,0 +1,18 @@
+// plan.json and matrix.csv of a plan (docs/reference/plan.md).
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "gap/result/plan.hpp"
+
+namespace flappy::gap {
+
+inline constexpr const char* kPlanFile = "plan.json";
+inline constexpr const char* kMatrixFile = "matrix.csv";
+
+nlohmann::ordered_json to_json(const Plan& plan);
+/// A row for each effect, a column for each rival, nats.
+std::string matrix_csv(const Plan& plan);
+
+}  // namespace flappy::gap
