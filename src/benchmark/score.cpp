@@ -242,7 +242,7 @@ bool next_brings_truth(const ScoredCase& c) {
   return v && names_set(v->kind) && same(v->effects, c.truth.effects);
 }
 
-ScoreLine pairs_line(const Cases& cases) {
+ScoreLine pairs_line(const Cases& cases, double must = 0.75) {
   std::vector<std::pair<Names, Names>> own;
   std::map<std::string, std::vector<std::pair<Names, Names>>> others;
   for (const ScoredCase* c : cases) {
@@ -251,7 +251,7 @@ ScoreLine pairs_line(const Cases& cases) {
   }
   std::map<std::string, ScoreValue> baselines;
   for (const auto& [name, list] : others) baselines[name] = f1_score(list);
-  return line("pairs_f1", "pairs: F1 of names", Bar::at_least, 0.75, 0.92, f1_score(own), std::move(baselines));
+  return line("pairs_f1", "pairs: F1 of names", Bar::at_least, must, 0.92, f1_score(own), std::move(baselines));
 }
 
 /// Standard error of the difference of two scores as if independent; they share cases, so it is rather too large.
@@ -458,7 +458,7 @@ std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases) {
   ScoreLine closed = closure_line(changed);
   closed.key = "contrast_closure", closed.what = "contrast: closure as a share of the truth's, median";
   l.push_back(std::move(closed));
-  ScoreLine pairs = pairs_line(of("changed_pairs"));
+  ScoreLine pairs = pairs_line(of("changed_pairs"), 0.80);
   pairs.key = "contrast_pairs_f1", pairs.what = "contrast: pairs, F1 of names";
   l.push_back(std::move(pairs));
   return l;

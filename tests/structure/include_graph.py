@@ -12,7 +12,7 @@ from self_test import misjudged, run
 BASE = {"io", "model", "sim"}
 FLIGHT = BASE | {"policy", "flight"}
 ROLLOUT = FLIGHT | {"flightlog", "flightlog/check", "flightlog/ros", "rollout"}
-GAP = ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/localise", "gap/diagnose"}
+GAP = ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/localise", "gap/diagnose", "gap/plan"}
 # What a room may include besides itself. A folder is a room; a folder in it that is named here is a room of its own.
 ROOMS = {
     "io": set(),
@@ -36,6 +36,7 @@ ROOMS = {
     "gap/evidence": BASE | {"flightlog", "gap/replay"},
     "gap/localise": BASE | {"flightlog", "gap/result", "gap/replay", "gap/evidence"},
     "gap/diagnose": ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/localise"},
+    "gap/plan": ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/diagnose"},
     "server": set(),  # what several of its rooms share
     "server/dds": {"io", "flightlog", "flightlog/ros"},
     "server/telemetry": ROLLOUT | {"server/dds"},

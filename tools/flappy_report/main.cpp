@@ -68,7 +68,7 @@ int main(int argc, char** argv) {
   const io::Command& app = program.app();
   view::Request r;
   app.option("path", r.paths,
-             "flight logs, run folders, results of flappy-eval, flappy-gap diagnose, flappy-identify forces, "
+             "flight logs, run folders, results of flappy-eval, flappy-gap diagnose and plan, flappy-identify forces, "
              "flappy-blind score")
       .required();
   app.option("--out", r.out, "the page").shows_default();

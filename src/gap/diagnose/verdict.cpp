@@ -151,8 +151,20 @@ void conclude(const VerdictRule& rule, Inference& d, bool contrast) {
   d.verdict = {};
   d.concluded = 0;
   if (pools.empty()) return;
-  const auto& [name, pool] =
-      *std::ranges::max_element(pools, {}, [](const auto& named) { return named.second.probability; });
+  const auto groups_of = [](const ScoredHypothesis& a) {
+    std::set<std::string> groups;
+    for (const std::string& e : a.effects) groups.insert(pool_name({e}));
+    return groups;
+  };
+  const auto counted = [&](const auto& named) {
+    const auto& [own_name, own] = named;
+    if (own_name.starts_with('/')) return own.probability;
+    double present = 0;
+    for (const ScoredHypothesis& a : all)
+      if (std::ranges::includes(groups_of(a), groups_of(all[own.best]))) present += a.probability;
+    return present >= rule.naming.least ? own.probability : 0;
+  };
+  const auto& [name, pool] = *std::ranges::max_element(pools, {}, counted);
   const ScoredHypothesis& best = all[pool.best];
   d.concluded = pool.best;
   d.verdict.effects = best.effects;

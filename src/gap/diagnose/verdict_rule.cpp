@@ -49,7 +49,7 @@ VerdictRule read_verdict_rule(const std::filesystem::path& path) {
   r.tempering = {tempering.number("nats", kPositive), tempering.number("freedom", kPositive)};
   const io::Table naming = root.table("naming");
   r.naming = {naming.number("of_all", kShare), naming.number("of_pool", kShare),
-              naming.number("member_of_pool", kShare)};
+              naming.number("member_of_pool", kShare), naming.number_or("least", 0, kShare)};
   root.finish();
   return r;
 }

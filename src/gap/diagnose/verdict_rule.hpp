@@ -42,6 +42,7 @@ struct VerdictRule {
   } tempering;
   struct Naming {
     double of_all, of_pool, member_of_pool;
+    double least;  ///< effects are named if they, alone or with others, are at least this probable
   } naming;
 };
 

@@ -117,6 +117,22 @@ TEST(Verdict, PoolsWhatIsHarmlessInAContrast) {
   EXPECT_DOUBLE_EQ(d.verdict.probability, 0.45);
 }
 
+TEST(Verdict, NamesOfAContrastWhatIsMoreProbableThanNot) {
+  VerdictRule rule = read_verdict_rule();
+  rule.naming.least = 0.5;
+  Inference d;
+  d.hypotheses = {hypothesis(0.45, {"wind"}), hypothesis(0.3, HypothesisKind::parameters),
+                  hypothesis(0.25, HypothesisKind::unknown)};
+  gap::conclude(rule, d, true);
+  EXPECT_EQ(d.verdict.kind, VerdictKind::parameters);
+  EXPECT_DOUBLE_EQ(d.verdict.probability, 0.3);
+  // with another effect or without it
+  d.hypotheses = {hypothesis(0.3, {"wind"}), hypothesis(0.25, {"wind", "com_offset"}),
+                  hypothesis(0.29, HypothesisKind::parameters), hypothesis(0.16, {"com_offset"})};
+  gap::conclude(rule, d, true);
+  EXPECT_EQ(d.verdict.effects, std::vector<std::string>{"wind"});
+}
+
 TEST(Verdict, PoolsRivals) {
   // together they outweigh the parameters, and neither is clear
   const Inference d = conclude({hypothesis(0.4, HypothesisKind::parameters), hypothesis(0.3, {"rotational_lift"}),
