@@ -217,6 +217,8 @@ class Planner {
     for (const auto& [id, d] : of_)
       if (!id.starts_with("outside_")) all.push_back(id);
     shuffle(all);
+    if (!options_.effects.empty())
+      std::erase_if(all, [&](const std::string& id) { return !std::ranges::count(options_.effects, id); });
     random_.seed(first_seed_);
     return all;
   }

@@ -44,10 +44,11 @@ blind::Assignment assignment_of(const PlannedCase& planned, const std::filesyste
 std::optional<blind::Assignment> reference_of(const PlannedCase& planned, const std::filesystem::path& vehicle);
 
 struct PlanOptions {
-  bool reported = false;           ///< seeds of the reported scores; false: seeds for development
-  bool contrast = false;           ///< parts of the contrast; false: of the diagnosis without reference flights
-  std::vector<std::string> parts;  ///< empty: all
-  std::size_t at_most = 0;         ///< most cases of each part; 0: all
+  bool reported = false;             ///< seeds of the reported scores; false: seeds for development
+  bool contrast = false;             ///< parts of the contrast; false: of the diagnosis without reference flights
+  std::vector<std::string> parts;    ///< empty: all
+  std::vector<std::string> effects;  ///< robots of contrasts have these effects alone; empty: all
+  std::size_t at_most = 0;           ///< most cases of each part; 0: all
   std::size_t flights = blind::Family::kFlights;  ///< most flights of a session of a contrast
 };
 

@@ -256,28 +256,32 @@ TEST_F(Benchmark, TakesNoPredictionOnceLabelsAreOpen) {
       (root_ / "bench").string() + ": begun with another plan; accepted: the same options, or a name for a new folder");
 }
 
-/// A blind contrast from start to end: two flights of each of two sessions.
+/// A blind contrast from start to end: a cable that was not there before, one or two flights of each of two sessions.
 class BlindContrast : public Benchmark {
  protected:
-  nlohmann::ordered_json made_and_scored(const std::string& part) {
+  nlohmann::ordered_json made_and_scored(const std::string& part, std::size_t flights) {
     MakeCommand m;
     m.out = root_ / "bench";
-    m.plan = {.contrast = true, .parts = {part}, .at_most = 1, .flights = 2};
+    m.plan = {.contrast = true, .parts = {part}, .effects = {"tether"}, .at_most = 1, .flights = flights};
     m.threads = 2;
     EXPECT_TRUE(make_bench(m));
-    EXPECT_FALSE(fs::exists(m.out / "cases/0001/flight_3"));
+    EXPECT_FALSE(fs::exists(m.out / "cases/0001" / ("flight_" + std::to_string(flights + 1))));
     ScoreCommand s;
     s.folders = {m.out};
     s.discrepancy = kConfigs + "gap/discrepancy/without_a.toml";
+    s.sessions = kConfigs + "gap/sessions/without_a.toml";
+    s.verdict = kConfigs + "gap/sessions/verdict_without_a.toml";
     s.threads = 1;
-    return score_bench(s);
+    nlohmann::ordered_json json = score_bench(s);
+    EXPECT_EQ(json.at("cases"), 1);
+    return json;
   }
 };
 
-TEST_F(BlindContrast, NamesWhatChanged) {
-  const nlohmann::ordered_json json = made_and_scored("changed");
-  EXPECT_EQ(json.at("contrast_top1"), 1.0);
-  EXPECT_EQ(json.at("cases"), 1);
+TEST_F(BlindContrast, NamesWhatChanged) { EXPECT_EQ(made_and_scored("changed", 1).at("contrast_top1"), 1.0); }
+
+TEST_F(BlindContrast, CallsUnknownWhatTheCatalogueLacks) {
+  EXPECT_EQ(made_and_scored("changed_withheld", 2).at("contrast_unknown"), 1.0);
 }
 
 TEST_F(Benchmark, PlansContrasts) {
