@@ -120,7 +120,7 @@ PowerHeader parse_power_header(const io::Table& power, bool declared_inputs) {
 FlightHeader parse_header(const io::Table& root) {
   root.schema(1);
   root.accept({"schema", "vehicle", "vehicle_sha256", "flapping_Hz", "gravity_m_s2", "ambient", "command", "mocap",
-               "imu", "power", "wings", "attitude"});
+               "imu", "power", "wings", "attitude", "changes"});
   FlightHeader h;
   h.vehicle = root.string("vehicle");
   if (h.vehicle.empty() || h.vehicle.find_first_of("/\\") != std::string::npos)
@@ -147,6 +147,7 @@ FlightHeader parse_header(const io::Table& root) {
   if (const auto attitude = root.optional_table("attitude"))
     h.attitude = {attitude->number("rate_hz", rate), attitude->number("latency_s", latency),
                   attitude->number("noise_rad", non_negative(1))};
+  h.changes = model::read_changes(root);
   root.finish();
   return h;
 }
@@ -231,6 +232,7 @@ std::string header_text(const FlightHeader& h) {
     number("latency_s", h.attitude->latency_s);
     number("noise_rad", h.attitude->noise_rad);
   }
+  text += model::changes_text(h.changes);
   return text;
 }
 

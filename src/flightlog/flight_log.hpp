@@ -26,6 +26,7 @@
 #include <vector>
 
 #include "io/files.hpp"
+#include "model/changes.hpp"
 
 namespace flappy::io {
 class Table;
@@ -103,6 +104,7 @@ struct FlightHeader {
   std::optional<PowerHeader> power;
   std::optional<WingsHeader> wings;
   std::optional<AttitudeHeader> attitude;
+  model::Changes changes;  ///< what was done to the robot on purpose before this flight
   bool operator==(const FlightHeader&) const = default;
 };
 

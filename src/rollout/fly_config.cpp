@@ -127,12 +127,13 @@ class Reader {
   FlyConfig read() {
     root_.schema(1);
     root_.accept({"schema", "precision", "flight", "world", "constant_input", "excitation", "log", "vehicle", "task",
-                  "sensors", "controller", "randomisation", "actor", "dds"});
+                  "sensors", "controller", "randomisation", "actor", "dds", "changes"});
     c_.precision = root_.choice("precision", {"float", "double"});
     read_flight();
     c_.fleet.batch.world = read_world(root_);
     c_.excitation = flight::read_excitation(root_, c_.duration_s);
     c_.log = read_log(root_, c_.fleet.control_hz);
+    c_.changes = model::read_changes(root_);
     c_.dds = io::read_dds_config(root_);
     read_files();
     if (root_.has("actor")) c_.actor = fitting_actor(root_, c_.fleet.task);
@@ -309,6 +310,7 @@ class Reader {
 model::Vehicle FlyConfig::vehicle_of(std::uint32_t flapper, std::uint32_t episode) const {
   model::Vehicle v = randomisation ? randomisation->sample({fleet.seed, flapper, episode}) : vehicle;
   for (const auto& [id, values] : added_effects) v.effects[id] = values;
+  apply(changes, v);
   return v;
 }
 

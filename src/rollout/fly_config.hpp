@@ -11,6 +11,7 @@
 //   [[world.box]]     centre_m, edges_m, rotation_rad = [x, y, z] (a rotation vector, optional)
 //   [[world.cylinder]] from_m, to_m (ends of its axis), radius_m
 //   [constant_input]  and [[excitation]]: excitation.hpp
+//   [changes]         what was done to the robot on purpose: model/changes.hpp
 //   [log.power]       battery_nominal_V, rate_hz, latency_s, voltage_noise_V, current_noise_A
 //   [log.wings]       rate_hz, noise_rad
 //   [dds]             io/dds_config.hpp; it does not change the flights, so `resolved` leaves it out
@@ -25,6 +26,7 @@
 #include "flight/fleet.hpp"
 #include "flightlog/flight_log.hpp"
 #include "io/dds_config.hpp"
+#include "model/changes.hpp"
 #include "rollout/watch.hpp"
 #include "sim/randomise.hpp"
 
@@ -43,6 +45,7 @@ struct FlyConfig {
   std::optional<sim::Randomisation> randomisation;
   /// Effects that are added to every vehicle, randomised or not; same form as model::Vehicle::effects.
   std::map<std::string, std::map<std::string, double>> added_effects;
+  model::Changes changes;  ///< made to every vehicle, last
   flight::FleetOptions fleet;
   std::string precision;
   double duration_s = 0, settle_s = 0;

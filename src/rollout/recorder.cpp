@@ -156,6 +156,7 @@ struct Recorder<T>::Storage {
     h.imu = imu_header(o.sensors.imu);
     h.power = config.log.power;
     h.wings = config.log.wings;
+    h.changes = config.changes;
     if (vehicle.beat_averaged || vehicle.jointed) {
       for (const model::BeatAveraged::Input& input : model::mixed_inputs(vehicle)) h.inputs.push_back(input.name);
       log.command.declared.resize(h.inputs.size());

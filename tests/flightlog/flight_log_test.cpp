@@ -256,7 +256,7 @@ TEST(FlightLog, RefusesFaultyHeaders) {
             "log/flight.toml:1:10: schema: 2 is read by a newer flappy than this one; accepted: 1");
   EXPECT_EQ(header("schema = 1", "schema = 0"), "log/flight.toml:1:10: schema: 0 is read by no flappy; accepted: 1");
   EXPECT_EQ(header("gravity_m_s2", "gravity"),
-            "log/flight.toml:5:1: gravity: unknown key; accepted: ambient, attitude, command, flapping_Hz, "
+            "log/flight.toml:5:1: gravity: unknown key; accepted: ambient, attitude, changes, command, flapping_Hz, "
             "gravity_m_s2, imu, "
             "mocap, power, schema, vehicle, vehicle_sha256, wings");
   EXPECT_EQ(header("gravity_m_s2 = 9.8", "# "),

@@ -32,6 +32,7 @@ struct Session {
   const Manoeuvre* manoeuvre = nullptr;  ///< null: flights of PlanSettings::like
   std::size_t flights = 3;
   bool reference = false, power = false, wings = false;
+  model::Changes changes;  ///< made before as many further flights; none: no further flights
 };
 
 class Planner {
@@ -120,6 +121,14 @@ class Planner {
         [](Session& s) { s.reference = !s.reference; });
     add("currents", "battery voltage and motor currents logged, too", [](Session& s) { s.power = true; });
     add("filmed_wings", "the wings' angles filmed, too", [](Session& s) { s.wings = true; });
+    const std::string further = ", before " + std::to_string(asked.flights) + " further flights";
+    add("swapped_wings", "the wings swapped" + further, [](Session& s) { s.changes.swapped_wings = true; });
+    add("added_weight", "a weight of 0.5 g 20 mm ahead of the origin" + further, [](Session& s) {
+      s.changes.added_mass_kg = 0.5e-3, s.changes.added_at_m = {0.02, 0, 0};
+    });
+    add("cable_off", "cables and markers taken off and put on anew" + further, [](Session& s) {
+      s.changes.without = {"tether", "marker_offset"};
+    });
     for (const std::size_t n : {kFew, kMany})
       if (n != asked.flights)
         add(std::to_string(n) + (n == 1 ? "_flight" : "_flights"),
@@ -144,9 +153,13 @@ class Planner {
     if (session.power)
       config.log.power = flightlog::PowerHeader{kBattery_V, kLog_Hz, 0, kVoltageNoise_V, kCurrentNoise_A};
     if (session.wings) config.log.wings = flightlog::WingsHeader{kLog_Hz, kWingNoise_rad};
-    const std::size_t all = session.flights * (session.reference ? 2 : 1);
-    std::vector<rollout::SimulatedFlight> flown = simulate(config, vehicle_, all, config.settle_s);
-    for (std::size_t i = 0; i < all; ++i) {
+    const std::size_t before = session.flights * (session.reference ? 2 : 1);
+    std::vector<rollout::SimulatedFlight> flown = simulate(config, vehicle_, before, config.settle_s);
+    if (session.changes.any()) {
+      config.changes = session.changes;
+      std::ranges::move(simulate(config, vehicle_, session.flights, config.settle_s), std::back_inserter(flown));
+    }
+    for (std::size_t i = 0; i < flown.size(); ++i) {
       if (flown[i].lost || !flown[i].log) return {};
       const auto flight =
           std::make_shared<ResetPrediction>(Recording(session.manoeuvre->name, std::move(*flown[i].log), vehicle_));

@@ -239,6 +239,7 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const VehicleHypoth
   const ProjectBlock project = *project_block_kernels[sim::place_of("")];
   const auto driven = [&](std::size_t i) {
     model::Vehicle vehicle = vehicles[std::min(i, vehicles.size() - 1)]->vehicle;
+    apply(r.log.header.changes, vehicle);
     vehicle.air_density_kg_m3 *= r.density_ratio;
     vehicle.driver.hold_s = kPredictionStep_s;
     return vehicle;
@@ -418,7 +419,9 @@ void ResetPrediction::forget() const {
   corrected_.clear();
 }
 
-std::shared_ptr<const PredictedFlight> ResetPrediction::corrected(const EffectValues& sensors) const {
+std::shared_ptr<const PredictedFlight> ResetPrediction::corrected(const EffectValues& given) const {
+  EffectValues sensors = given;
+  for (const std::string& id : recording_.log.header.changes.without) sensors.erase(id);
   {
     const std::scoped_lock lock(mutex_);
     for (const auto& [effects, flight] : corrected_)

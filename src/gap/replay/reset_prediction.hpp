@@ -38,7 +38,7 @@ class ResetPrediction final : public PredictedFlight {
   const Recording* recording() const override { return &recording_; }
   std::shared_ptr<const PredictedFlight> with_log(const flightlog::FlightLog& log) const override;
   /// Undoes errors of sensors in the log. Caches the last kMaxCorrected results; several threads may call it.
-  std::shared_ptr<const PredictedFlight> corrected(const EffectValues& sensors) const override;
+  std::shared_ptr<const PredictedFlight> corrected(const EffectValues& given) const override;
   void forget() const override;
   static constexpr std::size_t kMaxCorrected = 8;
 

@@ -84,6 +84,26 @@ TEST_F(SeparationOfTour, IsSureFromTheMagnitudeThatItSays) {
   }
 }
 
+// A wing that lost area flies on the other side: predicted so, nothing is left but what was left before.
+TEST(Changes, ArePredictedInTheFlightsBeforeWhichTheyWereMade) {
+  std::vector<Manoeuvre> all = read_manoeuvres(kTestConfigs + "gap/experiments");
+  rollout::FlyConfig config = std::ranges::find(all, "tour", &Manoeuvre::name)->config;
+  config.duration_s = config.settle_s + 3;
+  const model::Vehicle robot = with("wing_damage", 2);
+  const auto left = [&](bool swapped, bool declared) {
+    config.changes.swapped_wings = swapped;
+    flightlog::FlightLog log = std::move(*simulate(config, robot, 1, config.settle_s)[0].log);
+    EXPECT_EQ(log.header.changes.swapped_wings, swapped);
+    log.header.changes.swapped_wings = declared;
+    const Flights flight = {std::make_shared<ResetPrediction>(Recording("tour", std::move(log), nominal_vehicle()))};
+    const std::vector<Residuals> r = residuals(flight, {VehicleHypothesis{.vehicle = robot}}, 1);
+    return rms(*flight[0], r[0][0], kTorqueX * kCoefficients);
+  };
+  const double before = left(false, false);
+  EXPECT_NEAR(left(true, true), before, 0.2 * before);
+  EXPECT_GT(left(true, false), 2 * before);
+}
+
 TEST(Plan, RefusesWhatCannotBeFlown) {
   PlanSettings s;
   s.vehicle = kVehicle;
