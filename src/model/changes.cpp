@@ -22,14 +22,11 @@ void swap_mirrored(RigidBody& left, RigidBody& right) {
 
 /// Effects whose parameters are of one wing: "left_..." of the left.
 void swap_effects(Vehicle& v) {
-  for (auto& [id, values] : v.effects) {
-    const auto old = values;
+  for (auto& [id, values] : v.effects)
     for (auto& [name, value] : values)
-      if (name.starts_with("left_")) {
-        const std::string other = "right_" + name.substr(5);
-        if (const auto right = old.find(other); right != old.end()) value = right->second, values[other] = old.at(name);
-      }
-  }
+      if (name.starts_with("left_"))
+        if (const auto right = values.find("right_" + name.substr(5)); right != values.end())
+          std::swap(value, right->second);
 }
 
 void add_mass(double mass_kg, const std::array<double, 3>& at, RigidBody& torso) {

@@ -42,12 +42,16 @@ def run(work, *words):
         sys.exit(f"{words[0].name} {words[1]}: exit code {done.returncode}: {done.stderr}")
 
 
+def folders_of(case):
+    return sorted({str(pathlib.Path("bench", file).parent) for file in case["files"]})
+
+
 def diagnoses(tools, project, work, golden, write):
     """One line for each place in which the diagnosis of a case differs."""
     found = []
     for case in json.loads((work / "bench/manifest.json").read_text())["cases"]:
         number = f"{case['number']:04}"
-        flights = sorted({str(pathlib.Path("bench", file).parent) for file in case["files"]})
+        flights = folders_of(case)
         withheld = ["--withhold", *case["withheld"]] if case["withheld"] else []
         vehicle = project / "configs/vehicles/hummingbird_nominal.toml"
         run(work, tools / "flappy-gap", "diagnose", "--vehicle", vehicle, "--flights", *flights, *withheld, "--out", number)
@@ -66,8 +70,7 @@ def what_is_left(tools, project, work, outside):
     for case in json.loads((work / "bench/manifest.json").read_text())["cases"]:
         if str(case["number"]) not in outside:
             continue
-        folders = sorted({str(pathlib.Path("bench", file).parent) for file in case["files"]})
-        reference, flights = ([f for f in folders if ("/reference_" in f) == first] for first in (True, False))
+        reference, flights = ([f for f in folders_of(case) if ("/reference_" in f) == first] for first in (True, False))
         out = f"left_{case['number']}"
         vehicle = project / "configs/vehicles/hummingbird_nominal.toml"
         run(work, tools / "flappy-gap", "diagnose", "--vehicle", vehicle, "--reference", *reference, "--flights", *flights, "--residual", "--out", out)

@@ -1,5 +1,7 @@
 #include "gap/diagnose/diagnose.hpp"
 
+#include <algorithm>
+
 #include "flappy/vehicle_file.hpp"
 #include "flightlog/check/data_faults.hpp"
 #include "gap/diagnose/closed_loop_prediction.hpp"
@@ -57,15 +59,6 @@ rollout::FlyConfig read_pilot(const std::string& manoeuvre) {
   return pilot;
 }
 
-void check_withheld(const std::vector<std::string>& withheld, const model::Vehicle& vehicle) {
-  std::vector<std::string> known;
-  for (const model::CatalogueEffect& e : model::causes_of(vehicle)) known.emplace_back(e.info.id);
-  for (const std::string& id : withheld)
-    if (model::find_effect(vehicle, id) == nullptr)
-      throw io::InputError("--withhold " + id + ": no such effect; accepted: those that flappy-gap effects lists" +
-                           io::did_you_mean(id, known));
-}
-
 /// Sets of reference flights, the first of which is the reference. NAME=LOG begins a set, or goes on with it.
 std::vector<NamedFlights> sets_of(const std::vector<std::string>& reference) {
   std::vector<NamedFlights> sets;
@@ -88,6 +81,14 @@ std::vector<NamedFlights> sets_of(const std::vector<std::string>& reference) {
 
 }  // namespace
 
+void check_effect(const std::string& option, const std::string& id, const model::Vehicle& vehicle) {
+  std::vector<std::string> known;
+  for (const model::CatalogueEffect& e : model::causes_of(vehicle)) known.emplace_back(e.info.id);
+  if (std::ranges::count(known, id) > 0) return;
+  throw io::InputError(option + " " + id + ": no such effect; accepted: those that flappy-gap effects lists" +
+                       io::did_you_mean(id, known));
+}
+
 DiagnosisRequest read_request(const DiagnosisSettings& settings) {
   DiagnosisSettings s = settings;
   std::vector<NamedFlights> sets = sets_of(settings.reference);
@@ -101,7 +102,7 @@ DiagnosisRequest read_request(const DiagnosisSettings& settings) {
   }
   model::Vehicle vehicle = read_believed_vehicle(s.vehicle);
   const bool beat_averaged = vehicle.beat_averaged.has_value();
-  check_withheld(s.withheld, vehicle);
+  for (const std::string& id : s.withheld) check_effect("--withhold", id, vehicle);
   rollout::FlyConfig pilot = read_pilot(s.manoeuvre);
   const auto file = [&](const std::string& given, const std::string& name) {
     return given.empty() ? fs::path(io::config_path((beat_averaged ? "gap/beat_averaged/" : "gap/") + name))

@@ -49,6 +49,8 @@ struct DiagnosisRequest {
   rollout::FlyConfig pilot;
   std::vector<Manoeuvre> manoeuvres;
 };
+/// io::InputError if the vehicle's catalogue lacks the effect that an option names.
+void check_effect(const std::string& option, const std::string& id, const model::Vehicle& vehicle);
 /// Reads and checks all files but the logs. io::InputError for a setting or file that is not accepted.
 DiagnosisRequest read_request(const DiagnosisSettings& settings);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "flappy/vehicle_file.hpp"
+#include "gap/diagnose/diagnose.hpp"
 #include "gap/diagnose/next_experiment.hpp"
 #include "gap/diagnose/verdict.hpp"
 #include "gap/plan/separation.hpp"
@@ -26,7 +27,7 @@ constexpr double kNamed = 0.5;
 /// Other numbers of flights that are weighed.
 constexpr std::size_t kFew = 1, kMany = 6;
 
-/// What could be measured and flown.
+/// The flights of a robot, and the sensors that log them.
 struct Session {
   std::string name, what;
   const Manoeuvre* manoeuvre = nullptr;  ///< null: flights of PlanSettings::like
@@ -41,8 +42,9 @@ class Planner {
       : settings_(settings),
         threads_(io::thread_count(settings.threads)),
         vehicle_(read_vehicle(settings.vehicle)),
-        uncertain_(sim::read_randomisation(vehicle_, io::Config::load(file(settings.priors, "priors.toml")).root())) {
-    const auto folder = file(settings.experiments, "experiments");
+        uncertain_(sim::read_randomisation(vehicle_, io::Config::load(io::config_path("gap/priors.toml")).root())) {
+    const fs::path folder =
+        settings.experiments.empty() ? fs::path(io::config_path("gap/experiments")) : fs::path(settings.experiments);
     const std::vector<std::string> overrides =
         settings.sensors.empty() ? std::vector<std::string>()
                                  : std::vector{"sensors=" + io::toml_string(fs::absolute(settings.sensors).string())};
@@ -55,18 +57,12 @@ class Planner {
       throw io::InputError("--manoeuvre " + settings.manoeuvre + ": no such configuration in " + folder.string() +
                            "; accepted: " + io::joined(names) + io::did_you_mean(settings.manoeuvre, names));
     }
-    std::vector<std::string> known;
-    for (const model::CatalogueEffect& e : model::causes_of(vehicle_)) known.emplace_back(e.info.id);
-    for (const std::string& effect : known) asked_[effect] = 1;
+    for (const model::CatalogueEffect& e : model::causes_of(vehicle_)) asked_[e.info.id] = 1;
     for (const auto& [effect, times] : settings.magnitudes) {
-      if (!std::ranges::count(known, effect))
-        throw io::InputError("--magnitude " + effect +
-                             ": no such effect; accepted: those that flappy-gap effects lists" +
-                             io::did_you_mean(effect, known));
+      check_effect("--magnitude", effect, vehicle_);
       asked_[effect] = times;
       if (!(times > 0)) throw io::InputError("--magnitude " + effect + ": is not positive; accepted: a factor above 0");
     }
-    discrepancy_ = read_model_discrepancy(file(settings.discrepancy, "model_discrepancy.toml"));
   }
 
   Plan run() {
@@ -76,19 +72,15 @@ class Planner {
       throw io::InputError("--manoeuvre " + settings_.manoeuvre + ": " + vehicle_.name +
                            " cannot fly it; accepted: a manoeuvre that the vehicle flies, as hover");
     Plan plan = described(*s);
-    if (settings_.choices)
-      for (const Session& other : choices(asked)) {
-        if (io::interrupted()) break;
-        plan.choices.push_back(weighed(other, plan));
-      }
+    for (const Session& other : choices(asked)) {
+      if (io::interrupted()) break;
+      plan.choices.push_back(weighed(other, plan));
+    }
     std::ranges::stable_sort(plan.choices, std::greater{}, &PlannedChoice::probability);
     return plan;
   }
 
  private:
-  static fs::path file(const std::string& given, const std::string& name) {
-    return given.empty() ? fs::path(io::config_path("gap/" + name)) : fs::path(given);
-  }
   static model::Vehicle read_vehicle(const std::string& path) {
     const model::Vehicle any = model::read_any_vehicle(path);
     if (any.beat_averaged || any.jointed)
@@ -169,14 +161,16 @@ class Planner {
     return flights;
   }
 
+  static VerdictRule rule_of(const Session& session) {
+    return read_verdict_rule(io::config_path(session.reference ? "gap/contrast_verdict.toml" : "gap/verdict.toml"));
+  }
+
   std::optional<Separation> separation(const Session& session, bool sure) const {
     const Flights flights = fly(session);
     if (flights.empty()) return {};
     ModelDiscrepancy discrepancy = discrepancy_;
-    if (session.reference)
-      discrepancy.session =
-          settings_.sessions.empty() ? read_session_variation() : read_session_variation(settings_.sessions);
-    const VerdictRule rule = read_verdict_rule(file("", session.reference ? "contrast_verdict.toml" : "verdict.toml"));
+    if (session.reference) discrepancy.session = read_session_variation();
+    const VerdictRule rule = rule_of(session);
     const RobotFit robot = RobotFit::planned(flights, uncertain_, discrepancy, threads_);
     return separation_of(flights, robot, asked_, rule, threads_, sure);
   }
@@ -188,8 +182,7 @@ class Planner {
     plan.flights = asked_session().flights;
     plan.reference = settings_.reference;
     plan.rivals = s.rivals;
-    const VerdictRule rule =
-        read_verdict_rule(file("", settings_.reference ? "contrast_verdict.toml" : "verdict.toml"));
+    const VerdictRule rule = rule_of(asked_session());
     for (std::size_t i = 0; i < s.effects.size(); ++i) {
       const model::CatalogueEffect& e = *model::find_effect(vehicle_, s.effects[i]);
       PlannedEffect p{s.effects[i], pool_name({s.effects[i]}), {}, s.probability[i], s.sure_from[i], {}, {}};
@@ -261,7 +254,7 @@ class Planner {
   sim::Randomisation uncertain_;
   std::vector<Manoeuvre> manoeuvres_;
   std::map<std::string, double> asked_;  ///< [effect] magnitude over the typical one
-  ModelDiscrepancy discrepancy_;
+  ModelDiscrepancy discrepancy_ = read_model_discrepancy();
 };
 
 }  // namespace

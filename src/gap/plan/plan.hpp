@@ -11,18 +11,16 @@
 namespace flappy::gap {
 
 struct PlanSettings {
-  std::string vehicle;                        ///< the vehicle file
-  std::string sensors;                        ///< empty: as the manoeuvres have them
-  std::string experiments;                    ///< folder of manoeuvres; empty: configs/gap/experiments
-  std::string manoeuvre = "tour";             ///< of the folder
-  std::vector<std::string> like;              ///< folders of flights in place of a manoeuvre
-  int flights = 3;                            ///< of each session
-  double duration_s = 10;                     ///< of a flight; longer than the manoeuvre: the whole manoeuvre
-  bool reference = false;                     ///< with as many reference flights
-  bool choices = true;                        ///< also weigh other choices
-  std::map<std::string, double> magnitudes;   ///< of an effect: magnitude over the typical one
-  std::string discrepancy, sessions, priors;  ///< empty: the files of configs/gap
-  int threads = 0;                            ///< 0: one for each processor
+  std::string vehicle;                       ///< the vehicle file
+  std::string sensors;                       ///< empty: as the manoeuvres have them
+  std::string experiments;                   ///< folder of manoeuvres; empty: configs/gap/experiments
+  std::string manoeuvre = "tour";            ///< name of a configuration in `experiments`
+  std::vector<std::string> like;             ///< folders of flights in place of a manoeuvre
+  int flights = 3;                           ///< number of flights, and of reference flights
+  double duration_s = 10;                    ///< a flight ends after this time, or with the manoeuvre
+  bool reference = false;                    ///< with as many reference flights
+  std::map<std::string, double> magnitudes;  ///< [effect] the magnitude asked about over the typical one
+  int threads = 0;                           ///< 0: one for each processor
 };
 
 /// io::InputError for a setting or file that is not accepted, a vehicle without wings and motors, or a manoeuvre that

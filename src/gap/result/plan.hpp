@@ -26,12 +26,12 @@ struct PlannedChoice {
   bool flies = true;                ///< whether the vehicle can fly it
   double probability = 0;           ///< mean over all effects that it is given
   std::vector<std::string> named;   ///< effects that are given with a probability of at least one half
-  std::vector<std::string> gained;  ///< of these, those that the flights asked about do not name
+  std::vector<std::string> gained;  ///< effects in `named` that the flights asked about do not name
 };
 
 struct Plan {
   std::string vehicle, manoeuvre;                ///< file; name of what is flown, or the flights that it is like
-  std::size_t flights = 0;                       ///< of each session
+  std::size_t flights = 0;                       ///< number of flights, and of reference flights
   bool reference = false;                        ///< whether as many reference flights are flown
   std::vector<std::string> rivals;               ///< the effects, then "parameters"
   std::vector<PlannedEffect> effects;            ///< in the order of the rivals
