@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <ranges>
 
 #include "flappy/vehicle_file.hpp"
 #include "flightlog/check/data_faults.hpp"
@@ -63,8 +62,11 @@ void run_learn_discrepancy(const LearnCommand& command) {
   }
   std::vector<SessionPair> pairs;
   for (const std::string& pair : command.pairs) {
-    std::vector<std::string> parts;
-    for (const auto part : std::views::split(pair, ':')) parts.emplace_back(part.begin(), part.end());
+    std::vector<std::string> parts(1);
+    for (const char c : pair) {
+      if (c == ':') parts.emplace_back();
+      else parts.back() += c;
+    }
     if (parts.size() < 2 || parts.size() > 3)
       throw io::InputError("--pairs " + pair +
                            ": accepted: REFERENCE:TEST, two folders of flights, or REFERENCE:TEST:EFFECT");

@@ -59,7 +59,7 @@ nlohmann::ordered_json run_plan(const PlanCommand& command) {
   io::stop_on_interrupt();
   const Plan plan = make_plan(settings);
   print(plan);
-  const nlohmann::ordered_json json = to_json(plan);
+  nlohmann::ordered_json json = to_json(plan);
   if (!out.empty()) {
     io::write_atomically(out / kPlanFile, json.dump(1) + "\n");
     io::write_atomically(out / kMatrixFile, matrix_csv(plan));
