@@ -104,7 +104,7 @@ class Calibration {
     std::vector<double> counts;
     for (const fs::path& folder : command.folders) {
       const Manifest manifest = read_manifest(folder);
-      if (!fs::exists(folder / "true_fits"))
+      if (!fs::exists(true_fits(folder)))
         throw io::InputError(folder.string() + ": was not scored; accepted: folders of flappy-blind score");
       std::map<std::size_t, CaseTruth> truths;
       const Json sealed = open_labels(folder, manifest);

@@ -17,7 +17,7 @@ constexpr std::uint64_t kSeedsOfAFamily = 10'000'000, kReported = 8'500'000, kSe
 constexpr std::size_t kAtLeast = 100;
 /// Least numbers of cases in parts of a contrast.
 constexpr std::size_t kSingles = 60, kHarmless = 30, kStrange = 15, kPairs = 20;
-constexpr double kOverDetectable = 2, kLargest = 4;
+constexpr double kLargest = 4;
 /// For effects outside the catalogue that the table does not list.
 constexpr double kOutsideMagnitude = 2;
 

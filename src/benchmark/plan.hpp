@@ -19,6 +19,9 @@ struct Detectability {
   bool hidden = false;        ///< hover alone does not show twice the detectable magnitude
 };
 
+/// Magnitude of most effects over the detectable one.
+inline constexpr double kOverDetectable = 2;
+
 /// Reads the table for every effect of a family that the catalogue has, and listed ones outside it. InputError if an
 /// effect of the catalogue is missing.
 std::map<std::string, Detectability> read_detectability(const std::filesystem::path& file, const blind::Family& family);

@@ -106,6 +106,8 @@ std::string sum_line(const std::filesystem::path& folder, std::size_t number) {
   return io::sha256(io::read_text(file)) + "  " + file.lexically_relative(folder).string() + "\n";
 }
 
+std::filesystem::path true_fits(const std::filesystem::path& folder) { return folder / "true_fits"; }
+
 Json open_labels(const std::filesystem::path& folder, const Manifest& manifest) {
   const std::filesystem::path sealed = folder / "sealed" / "labels.json";
   if (io::sha256(io::read_text(sealed)) != manifest.labels_sha256) refuse_changed(sealed);

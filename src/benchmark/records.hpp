@@ -45,6 +45,8 @@ std::filesystem::path prediction_file(const std::filesystem::path& folder, std::
 std::string sum_line(const std::filesystem::path& folder, std::size_t number);
 /// InputError if the predictions are not sealed, or if one has changed since.
 void check_predictions(const std::filesystem::path& folder, const Manifest& manifest);
+/// Folder that is made when the labels are opened; from then on, no prediction is accepted.
+std::filesystem::path true_fits(const std::filesystem::path& folder);
 /// The content of sealed/labels.json. InputError if it has changed.
 Json open_labels(const std::filesystem::path& folder, const Manifest& manifest);
 

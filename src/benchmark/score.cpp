@@ -297,6 +297,7 @@ Answer answer_of(const Prediction& p) {
   a.features = p.features;
   for (const gap::Suspect& s : d.suspects) a.suspects.push_back(s.effect);
   for (const gap::RankedHypothesis& h : d.hypotheses) {
+    a.evidence.push_back({h.effects, h.log_evidence - h.log_prior});
     if (h.kind == gap::HypothesisKind::none) a.none = h.probability;
     if (h.kind == gap::HypothesisKind::parameters) a.parameters = h.probability;
     if (h.kind == gap::HypothesisKind::unknown) a.unknown = h.probability;
@@ -321,6 +322,17 @@ bool right(const CaseTruth& t, const Answer& p) {
   if (t.part == "parameters" || t.part == "own_parameters") return p.kind == "parameters";
   if (t.part == "withheld" || t.part == "outside") return p.kind == "unknown";
   return (names_set(p.kind) && same(p.effects, t.effects)) || (p.kind == "group" && holds(p.effects, t.effects));
+}
+
+std::optional<double> realised_nats(const ScoredCase& c) {
+  if (c.truth.effects.size() != 1) return std::nullopt;
+  std::optional<double> own, rival;
+  for (const Weighed& w : c.prediction.evidence) {
+    std::optional<double>& best = same(w.effects, c.truth.effects) ? own : rival;
+    best = std::max(best.value_or(w.nats), w.nats);
+  }
+  if (!own || !rival) return std::nullopt;
+  return *own - *rival;
 }
 
 std::optional<double> closure(const ScoredCase& c) {
@@ -363,6 +375,45 @@ Scores score(const std::vector<ScoredCase>& cases) {
 }
 
 namespace {
+
+/// How the plans of cases compare with what became of them; nothing without plans.
+void add_foresight(const std::string& key, const std::string& what, const Cases& cases, std::vector<ScoreLine>& lines) {
+  constexpr std::ptrdiff_t kFewestWrong = 10;
+  std::vector<Claim> claims;
+  std::vector<double> expected, realised;
+  for (const ScoredCase* c : cases) {
+    const std::optional<double> nats = realised_nats(*c);
+    if (!c->foreseen || !nats) continue;
+    claims.push_back({c->foreseen->probability, named_alone(*c)});
+    expected.push_back(c->foreseen->nats);
+    realised.push_back(*nats);
+  }
+  if (claims.empty()) return;
+  const auto some = [](const auto& all, const std::vector<std::size_t>& which) {
+    std::decay_t<decltype(all)> chosen;
+    for (const std::size_t i : which) chosen.push_back(all[i]);
+    return chosen;
+  };
+  lines.push_back(line(key + "_rank", what + ": rank correlation of expected and realised nats", Bar::at_least, 0.60,
+                       0.80, resampled(claims.size(), [&](const std::vector<std::size_t>& which) {
+                         return rank_correlation(some(expected, which), some(realised, which));
+                       })));
+  const std::ptrdiff_t wrong = std::ranges::count(claims, false, &Claim::right);
+  lines.push_back(
+      line(key + "_auc", what + ": area under the curve for \"named first\"", Bar::at_least, 0.75, 0.90,
+           wrong < kFewestWrong ? ScoreValue{} : resampled(claims.size(), [&](const std::vector<std::size_t>& which) {
+             return area_under_curve(some(claims, which));
+           })));
+  lines.push_back(line(key + "_ece", what + ": calibration error of \"named first\"", Bar::at_most, 0.06, 0.03,
+                       calibration_score(claims)));
+  ScoreLine hope{key + "_hope", what + ": expected over realised nats, of medians", "", "",
+                 resampled(claims.size(), [&](const std::vector<std::size_t>& which) -> std::optional<double> {
+                   const double brought = io::median(some(realised, which));
+                   if (!(brought > 0)) return std::nullopt;
+                   return io::median(some(expected, which)) / brought;
+                 })};
+  lines.push_back(std::move(hope));
+}
 
 std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases) {
   std::vector<ScoreLine> l;
@@ -409,6 +460,12 @@ std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases) {
                    share(hover, [](const ScoredCase& c) { return abstains(c.prediction); })));
   l.push_back(line("hover_next", "hover only: the proposed flight, flown, brings the truth to first place",
                    Bar::at_least, 0.60, 0.85, share(hover, next_brings_truth)));
+  Cases followed = singles;
+  std::erase_if(followed, [](const ScoredCase* c) { return !c->after_next; });
+  if (!followed.empty())
+    l.push_back(line("undecided_next", "undecided singles: the proposal, flown, brings the truth to first place",
+                     Bar::at_least, 0.75, 0.90, share(followed, next_brings_truth)));
+  add_foresight("plan", "plan", singles, l);
   return l;
 }
 
@@ -461,6 +518,7 @@ std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases) {
   ScoreLine pairs = pairs_line(of("changed_pairs"), 0.80);
   pairs.key = "contrast_pairs_f1", pairs.what = "contrast: pairs, F1 of names";
   l.push_back(std::move(pairs));
+  add_foresight("contrast_plan", "contrast, plan", changed, l);
   return l;
 }
 

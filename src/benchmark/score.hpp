@@ -62,6 +62,18 @@ struct Where {
   std::string channel, regime;
 };
 
+/// A hypothesis and its evidence, prior left out.
+struct Weighed {
+  std::vector<std::string> effects;  ///< empty: none, parameters, or an unknown cause
+  double nats = 0;
+};
+
+/// What a plan expected of a diagnosis, were the truth known.
+struct Foresight {
+  double nats = 0;         ///< expected evidence for the true effect over its best rival
+  double probability = 0;  ///< that the diagnosis gives the true effect
+};
+
 struct Answer {
   /// Kind of the verdict; "remainder": effects and a remainder; "crashed": the robot crashed in the flight to be
   /// diagnosed.
@@ -69,6 +81,7 @@ struct Answer {
   std::vector<std::string> effects;   ///< effects that the verdict names; for a group, its possible effects
   double probability = 0;             ///< probability of the verdict
   std::vector<FittedSet> sets;        ///< the most probable first
+  std::vector<Weighed> evidence;      ///< of all hypotheses
   std::vector<std::string> suspects;  ///< most probable effects given that one is missing
   double none = 0, parameters = 0, unknown = 0;
   std::optional<double> nominal, refit, floor;  ///< mean losses: vehicle file, parameters fitted, noise alone
@@ -90,6 +103,7 @@ struct ScoredCase {
   /// Change of the test flights by the effect, over what noise alone would give a matched filter
   /// (change_over_noise.hpp). None: not asked for.
   std::optional<double> change_over_noise;
+  std::optional<Foresight> foreseen;  ///< none: not planned, several effects, or one that changes no row
 };
 
 struct ScoreLine {
@@ -119,5 +133,9 @@ std::optional<double> closure(const ScoredCase& c);
 bool needs_true_fit(const ScoredCase& c);
 /// Whether change_over_noise is needed: one effect of the catalogue changed between the sessions, and was not named.
 bool needs_change_over_noise(const ScoredCase& c);
+
+/// Evidence of a diagnosis for the true effect, with or without a remainder, over its best rival, nats. None unless the
+/// robot has one effect and the diagnosis weighed it.
+std::optional<double> realised_nats(const ScoredCase& c);
 
 }  // namespace flappy::benchmark

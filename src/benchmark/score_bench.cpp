@@ -8,6 +8,7 @@
 #include "benchmark/black_box.hpp"
 #include "benchmark/change_over_noise.hpp"
 #include "benchmark/families.hpp"
+#include "benchmark/foresee_bench.hpp"
 #include "benchmark/proposal.hpp"
 #include "benchmark/records.hpp"
 #include "benchmark/work.hpp"
@@ -25,9 +26,6 @@ namespace fs = std::filesystem;
 [[noreturn]] void refuse(const fs::path& file, const std::string& what) {
   throw io::InputError(file.string() + ": " + what + "; accepted: what was sealed");
 }
-
-/// Made when the labels are opened; from then on, no prediction is accepted.
-fs::path true_fits(const fs::path& folder) { return folder / "true_fits"; }
 
 // ---- phase 1: predictions, which read nothing that is sealed
 
@@ -125,6 +123,9 @@ struct Bench {
     }
     for (const PublicCase& c : manifest.cases)
       cases.push_back({labels.at(c.number).truth(), answer_of(read_prediction(prediction_file(folder, c.number))), {}});
+    for (std::size_t i = 0; i < cases.size(); ++i)
+      if (cases[i].truth.effects.size() == 1)
+        cases[i].foreseen = read_foreseen(folder, manifest.cases[i].number, cases[i].truth.effects.front());
   }
 
   fs::path folder;
@@ -191,14 +192,18 @@ bool find_changes_over_noise(const ScoreCommand& command, Bench& bench) {
   return true;
 }
 
-/// Of part "hover", and diagnoses them with the earlier flights. False if interrupted.
+/// Of part "hover", and with --proposals of undecided singles; diagnoses them with the earlier flights. The maker does to
+/// the robot what an intervention says. False if interrupted.
 bool fly_proposals(const ScoreCommand& command, Bench& bench) {
   const auto file_of = [&](std::size_t i) {
     return bench.folder / "proposed" / (number_text(bench.manifest.cases[i].number) + ".json");
   };
   std::vector<std::size_t> proposed, open;
   for (std::size_t i = 0; i < bench.cases.size(); ++i) {
-    if (bench.cases[i].truth.part != "hover" || bench.cases[i].prediction.manoeuvre.empty()) continue;
+    const ScoredCase& c = bench.cases[i];
+    const bool asked =
+        c.truth.part == "hover" || (command.proposals && c.truth.part == "singles" && abstains(c.prediction));
+    if (!asked || c.prediction.manoeuvre.empty()) continue;
     proposed.push_back(i);
     if (!fs::exists(file_of(i))) open.push_back(i);
   }
@@ -218,6 +223,7 @@ bool fly_proposals(const ScoreCommand& command, Bench& bench) {
         const blind::ProposedFlight flight =
             proposed_flight(*manoeuvre, flightlog::read_flight_log(q.flights.front()).header);
         a.proposed = &flight;
+        a.changes = manoeuvre->config.changes;
         const blind::FamilyFlight flown = family_named(bench.manifest.family).fly(a, kProposedFlight);
         Prediction p;
         if (flown.crashed) {

@@ -19,8 +19,9 @@ struct ScoreCommand {
                         verdict;  ///< empty: configs/gap/verdict.toml, contrast_verdict.toml of a contrast
   std::filesystem::path sessions = io::config_path("gap/session_variation.toml");  ///< only for a contrast
   std::filesystem::path experiments = io::config_path("gap/experiments");          ///< manoeuvres that may be proposed
-  bool residual = false;  ///< corrected vehicles have what is left as a smooth load, for flappy-blind loop
-  int threads = 0;        ///< number of cases at a time; 0: one for each processor
+  bool proposals = false;  ///< also fly what undecided diagnoses of part "singles" propose
+  bool residual = false;   ///< corrected vehicles have what is left as a smooth load, for flappy-blind loop
+  int threads = 0;         ///< number of cases at a time; 0: one for each processor
   io::Ranks* ranks = nullptr;
   Predictor predictor = predict;
 };

@@ -98,4 +98,43 @@ ScoreValue calibration_score(const std::vector<Claim>& claims) {
   return score;
 }
 
+namespace {
+
+std::vector<double> ranks_of(const std::vector<double>& x) {
+  std::vector<double> ranks;
+  for (const double v : x) {
+    double below = 0, equal = 0;
+    for (const double other : x) below += other < v, equal += other == v;
+    ranks.push_back(below + (equal - 1) / 2);
+  }
+  return ranks;
+}
+
+}  // namespace
+
+std::optional<double> rank_correlation(const std::vector<double>& x, const std::vector<double>& y) {
+  const std::vector<double> a = ranks_of(x), b = ranks_of(y);
+  const double middle = (static_cast<double>(x.size()) - 1) / 2;
+  double ab = 0, aa = 0, bb = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    ab += (a[i] - middle) * (b[i] - middle);
+    aa += (a[i] - middle) * (a[i] - middle);
+    bb += (b[i] - middle) * (b[i] - middle);
+  }
+  if (!(aa > 0 && bb > 0)) return std::nullopt;
+  return ab / std::sqrt(aa * bb);
+}
+
+std::optional<double> area_under_curve(const std::vector<Claim>& claims) {
+  double sum = 0, pairs = 0;
+  for (const Claim& right : claims)
+    for (const Claim& wrong : claims) {
+      if (!right.right || wrong.right) continue;
+      sum += right.probability > wrong.probability ? 1 : right.probability == wrong.probability ? 0.5 : 0;
+      pairs += 1;
+    }
+  if (pairs == 0) return std::nullopt;
+  return sum / pairs;
+}
+
 }  // namespace flappy::benchmark

@@ -37,4 +37,12 @@ double calibration_error(const std::vector<Claim>& claims);
 /// sampling error twice.
 ScoreValue calibration_score(const std::vector<Claim>& claims);
 
+/// Spearman's rank correlation; equal values share their mean rank (Spearman 1904). None where one does not vary.
+std::optional<double> rank_correlation(const std::vector<double>& x, const std::vector<double>& y);
+
+/// Area under the curve of a probability as a sign of right claims: share of pairs of a right and a wrong claim in which
+/// the right one has the larger probability, equal ones by half (Hanley, McNeil, Radiology 143, 1982). None unless there
+/// are both.
+std::optional<double> area_under_curve(const std::vector<Claim>& claims);
+
 }  // namespace flappy::benchmark

@@ -2,6 +2,7 @@
 // physics, effect law, sensor model, convention or controller (tests/structure checks this).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <filesystem>
@@ -44,6 +45,14 @@ struct Assignment {
   bool conventions = false;           ///< draws declarations within the habits of laboratories; else they are exact
   bool power = false, wings = false;  ///< whether currents and wing angles are logged
   const ProposedFlight* proposed = nullptr;  ///< replaces hover and rich flights; null: none
+  model::Changes changes;                    ///< made to the robot on purpose before these flights; the log says them
+
+  /// Effects less those that `changes` took away.
+  std::vector<std::pair<std::string, double>> present_effects() const {
+    std::vector<std::pair<std::string, double>> present = effects;
+    std::erase_if(present, [&](const auto& e) { return std::ranges::count(changes.without, e.first) > 0; });
+    return present;
+  }
 };
 
 struct FamilyFlight {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "io/config.hpp"
+#include "io/text.hpp"
 #include "io/toml_writer.hpp"
 #include "model/effects/registry.hpp"
 
@@ -74,6 +75,18 @@ std::string changes_text(const Changes& c) {
   list.clear();
   for (const std::string& id : c.without) list += (list.empty() ? "" : ", ") + io::toml_string(id);
   if (!list.empty()) text += "without = [" + list + "]\n";
+  return text;
+}
+
+std::string in_words(const Changes& c) {
+  std::vector<std::string> done;
+  if (c.swapped_wings) done.emplace_back("swap the wings");
+  if (c.added_mass_kg > 0)
+    done.push_back(io::format("add %g g at (%g, %g, %g) mm", 1e3 * c.added_mass_kg, 1e3 * c.added_at_m[0],
+                              1e3 * c.added_at_m[1], 1e3 * c.added_at_m[2]));
+  if (!c.without.empty()) done.push_back("take off " + io::joined(c.without));
+  std::string text;
+  for (const std::string& d : done) text += (text.empty() ? "" : "; ") + d;
   return text;
 }
 

@@ -31,6 +31,9 @@ Changes read_changes(const io::Table& root);
 /// The same table as text; empty where nothing was done.
 std::string changes_text(const Changes& changes);
 
+/// For example "swap the wings; add 0.5 g at (20, 0, 0) mm; take off tether"; empty where nothing was done.
+std::string in_words(const Changes& changes);
+
 /// Makes the changes to a vehicle.
 void apply(const Changes& changes, Vehicle& vehicle);
 

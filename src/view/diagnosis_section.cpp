@@ -531,7 +531,12 @@ class DiagnosisSection {
       section_.say(format("Of the experiments that are ready, “%s” tells %s best apart: %.3g nats are expected of it.",
                           spoken(next.manoeuvre).c_str(), spoken_list(rivals).c_str(), next.expected_nats));
       add_courses(next, rivals);
-      section_.say("It is configs/gap/experiments/" + next.manoeuvre + ".toml. Diagnose old and new flights together.");
+      section_.say(next.change.empty()
+                       ? "It is configs/gap/experiments/" + next.manoeuvre +
+                             ".toml. Diagnose old and new flights together."
+                       : "Before it: " + next.change + ". It costs " + next.cost +
+                             ". Declare the change in flight.toml, as configs/gap/experiments/interventions.toml has "
+                             "it. Diagnose old and new flights together.");
     } else if (beat_averaged_) {
       // the ready-made experiments are flown in simulation, which cannot fly a beat-averaged vehicle
       section_.say(corrected

@@ -9,10 +9,12 @@
 
 #include "benchmark/calibrate.hpp"
 #include "benchmark/families.hpp"
+#include "benchmark/foresee_bench.hpp"
 #include "benchmark/make.hpp"
 #include "benchmark/records.hpp"
 #include "benchmark/score_bench.hpp"
 #include "full.hpp"
+#include "gap/diagnose/next_experiment.hpp"
 #include "gap/diagnose/verdict_rule.hpp"
 #include "io/files.hpp"
 #include "io/sha256.hpp"
@@ -500,18 +502,24 @@ TEST_F(Benchmark, FamiliesFlyWhatIsProposed) {
   }
 }
 
-// A diagnosis that abstains proposes a manoeuvre; the robot flies it, as near to the ceiling of its room as that is to its own, and all flights are
-// diagnosed.
+// A diagnosis that abstains proposes an intervention; its maker makes it, the robot flies the manoeuvre, as near to the ceiling of its room as that is
+// to its own, and all flights are diagnosed.
 TEST_F(Benchmark, FliesWhatADiagnosisProposes) {
   ASSERT_TRUE(make(1, "hover"));
   ScoreCommand c = command();
+  std::filesystem::copy(kConfigs, root_ / "configs", std::filesystem::copy_options::recursive);
+  c.experiments = root_ / "configs/gap/experiments";
+  io::write_atomically(c.experiments / gap::kInterventions,
+                       "schema = 1\n[[intervention]]\nname = \"swapped\"\nmanoeuvre = \"ceiling_steps\"\n"
+                       "cost = \"time\"\nchanges = { swapped_wings = true }\n");
   double highest_m = 0, lasts_s = 0;
   c.predictor = [&](const Question& q) {
     Prediction p;
     p.diagnosis.verdict = {gap::VerdictKind::parameters, {}, false, 0.4};
-    p.diagnosis.next = gap::NextExperiment{"ceiling_steps", {}, 0, 0, 0.1, {}};
+    p.diagnosis.next.emplace().manoeuvre = "swapped";
     if (q.flights.size() == 4) {
       const auto log = flightlog::read_flight_log(q.flights.back());
+      EXPECT_TRUE(log.header.changes.swapped_wings);
       highest_m = std::ranges::max(log.mocap.z_m);
       lasts_s = log.command.t_s.back();
       p.diagnosis.verdict.kind = gap::VerdictKind::effect;
@@ -524,6 +532,33 @@ TEST_F(Benchmark, FliesWhatADiagnosisProposes) {
   EXPECT_EQ(json.at("hover_next"), 1.0);
   EXPECT_NEAR(highest_m, 2 - 0.09, 0.08) << "in its own room the manoeuvre goes up to 0.71 m";
   EXPECT_NEAR(lasts_s, 5.5, 0.01);
+}
+
+TEST_F(Benchmark, PlansBeforeItScores) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
+  copy_two();
+  ForeseeCommand plan;
+  plan.folders = {root_ / "bench"};
+  plan.threads = 2;
+  ASSERT_TRUE(foresee_bench(plan));
+  const std::optional<Foresight> own = read_foreseen(root_ / "bench", 1, "tether");
+  ASSERT_TRUE(own);
+  EXPECT_GT(own->nats, 0);
+  EXPECT_GT(own->probability, 0);
+  EXPECT_FALSE(read_foreseen(root_ / "bench", 3, "tether")) << "there are two cases";
+  EXPECT_NE(io::read_text(root_ / "bench" / kForeseenFile).find("\n2,tether,"), std::string::npos);
+  ScoreCommand c = command();
+  c.predictor = [](const Question&) {
+    Prediction p;
+    gap::RankedHypothesis h;
+    h.effects = {"ground_effect"};
+    p.diagnosis.hypotheses.push_back(h);
+    p.diagnosis.hypotheses.emplace_back().kind = gap::HypothesisKind::parameters;
+    return p;
+  };
+  const nlohmann::ordered_json json = score_bench(c);
+  EXPECT_TRUE(json.contains("plan_rank"));
+  EXPECT_NE(test::refusal([&] { foresee_bench(plan); }).find("its labels were opened"), std::string::npos);
 }
 
 TEST_F(Benchmark, RefusesWhatThereIsNot) {

@@ -73,6 +73,52 @@ TEST(Resampled, IntervalOfAMeanIsThatOfTheNormalLaw) {
   EXPECT_NEAR(s.high, 0.5 + 1.96 * 0.025, 0.006);
 }
 
+TEST(RankCorrelation, SharesRanksOfEqualValues) {
+  EXPECT_DOUBLE_EQ(*rank_correlation({1, 2, 3}, {10, 20, 1000}), 1);
+  EXPECT_DOUBLE_EQ(*rank_correlation({1, 2, 3}, {3, 2, 1}), -1);
+  // ranks 0, 1.5, 1.5, 3 and 0, 1, 2, 3: 4.5 / sqrt(4.5 x 5)
+  EXPECT_NEAR(*rank_correlation({1, 2, 2, 3}, {1, 2, 3, 4}), 0.948683, 1e-6);
+  EXPECT_FALSE(rank_correlation({1, 1}, {1, 2}));
+}
+
+TEST(AreaUnderCurve, CountsPairsOfRightAndWrong) {
+  EXPECT_DOUBLE_EQ(*area_under_curve({{0.9, true}, {0.8, true}, {0.1, false}}), 1);
+  // of right .9, .3 and wrong .5, .3: above, above, below, equal
+  EXPECT_DOUBLE_EQ(*area_under_curve({{0.9, true}, {0.3, true}, {0.5, false}, {0.3, false}}), 2.5 / 4);
+  EXPECT_FALSE(area_under_curve({{0.9, true}}));
+}
+
+TEST(Score, ComparesPlansWithWhatBecameOfThem) {
+  std::vector<ScoredCase> cases;
+  for (int i = 0; i < 20; ++i) {
+    const bool right = i >= 10;
+    ScoredCase c = judged("changed", {"wind"}, "effect", {right ? "wind" : "tether"}, 0.9);
+    c.prediction.evidence = {{{"wind"}, 2.0 * i - 19}, {{"wind"}, -100}, {{"tether"}, 0}, {{}, -50}};
+    c.foreseen = Foresight{10.0 * (i + 1), 0.04 * i};
+    cases.push_back(c);
+  }
+  EXPECT_DOUBLE_EQ(*realised_nats(cases[15]), 11) << "the better of both hypotheses with wind, over tether";
+  EXPECT_DOUBLE_EQ(*main_score(cases, "contrast_plan_rank").value, 1);
+  EXPECT_DOUBLE_EQ(*main_score(cases, "contrast_plan_auc").value, 1);
+  EXPECT_EQ(main_score(cases, "contrast_plan_rank").count, 20u);
+  // medians of 105 and 0: nothing was brought; with ten nats more, 105 over 10
+  EXPECT_FALSE(main_score(cases, "contrast_plan_hope").value);
+  for (ScoredCase& c : cases) c.prediction.evidence[0].nats += 10;
+  EXPECT_DOUBLE_EQ(*main_score(cases, "contrast_plan_hope").value, 10.5);
+  cases[0].prediction.effects = {"wind"};
+  EXPECT_FALSE(main_score(cases, "contrast_plan_auc").value) << "fewer than ten are wrong";
+  for (ScoredCase& c : cases) c.foreseen.reset();
+  EXPECT_THROW(main_score(cases, "contrast_plan_rank"), std::out_of_range);
+}
+
+TEST(Score, FollowsUpWhatWasProposed) {
+  ScoredCase right = judged("singles", {"wind"}, "group", {"wind", "tether"}, 0.6), wrong = right;
+  right.after_next = judged("singles", {"wind"}, "effect", {"wind"}, 0.9).prediction;
+  wrong.after_next = judged("singles", {"wind"}, "effect", {"tether"}, 0.9).prediction;
+  EXPECT_DOUBLE_EQ(
+      *main_score({right, wrong, judged("singles", {"wind"}, "effect", {"wind"}, 0.9)}, "undecided_next").value, 0.5);
+}
+
 TEST(CalibrationError, TakesItsBiasAway) {
   // 20 claims, two in each bin, given in no order: all at 0.9 but the two lowest. Shares are 0 and 1, which have no variance:
   // lowest bin |0.4 - 0| x 2, nine bins |0.9 - 1| x 2: (0.8 + 1.8)/20

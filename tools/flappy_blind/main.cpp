@@ -6,6 +6,7 @@
 #include "benchmark/calibrate.hpp"
 #include "benchmark/detectability.hpp"
 #include "benchmark/families.hpp"
+#include "benchmark/foresee_bench.hpp"
 #include "benchmark/make.hpp"
 #include "benchmark/score_bench.hpp"
 #include "benchmark/true_values.hpp"
@@ -163,10 +164,21 @@ int main(int argc, char** argv) {
               "what models get wrong; of a family: configs/gap/discrepancy/without_FAMILY.toml")
       .shows_default();
   score.option("--sessions", scored.sessions, "what differs between sessions, for a contrast").shows_default();
+  score.flag("--proposals", scored.proposals,
+             "fly what undecided diagnoses of part singles propose, changes to the robot included");
   score.flag("--residual", scored.residual, "give corrected vehicles what is left, as a smooth load, for the loop");
   score.option("--verdict", scored.verdict,
                "constants of the verdict; none: configs/gap/verdict.toml, for a contrast contrast_verdict.toml");
   score.option("--threads", scored.threads, "cases at a time; 0: one for each processor").range(0, 1024);
+  io::Command plan = program.app().command("plan", "before scoring: what plans expect of the diagnoses of each case");
+  benchmark::ForeseeCommand foreseen;
+  plan.option("folders", foreseen.folders, "of flappy-blind make").required();
+  plan.option("--vehicle", foreseen.vehicle, "the robot as declared, where it is elsewhere now");
+  plan.option("--priors", foreseen.priors, "as for score").shows_default();
+  plan.option("--discrepancy", foreseen.discrepancy, "as for score").shows_default();
+  plan.option("--sessions", foreseen.sessions, "as for score").shows_default();
+  plan.option("--verdict", foreseen.verdict, "as for score");
+  plan.option("--threads", foreseen.threads, "cases at a time; 0: one for each processor").range(0, 1024);
   io::Command calibrate = program.app().command("calibrate", "learns from scored cases how much evidence counts");
   benchmark::CalibrateCommand calibrated;
   calibrate.option("folders", calibrated.folders, "of flappy-blind score").required();
@@ -200,6 +212,9 @@ int main(int argc, char** argv) {
         };
       made.ranks = program.ranks("work: make\n");
       if (!benchmark::make_bench(made)) std::printf("stopped; what has flown stays: the same command goes on\n");
+    } else if (plan.given()) {
+      if (!benchmark::foresee_bench(foreseen))
+        std::printf("stopped; what is planned stays: the same command goes on\n");
     } else if (score.given()) {
       scored.ranks = program.ranks("priors: " + io::sha256(io::read_text(scored.priors)) +
                                    ", discrepancy: " + io::sha256(io::read_text(scored.discrepancy)) + ", verdict: " +

@@ -172,12 +172,13 @@ int main(int argc, char** argv) {
   diagnose.option("--reference", command.settings.reference,
                   "flights of the same robot before what --flights are asked about; NAME=LOG begins another set, "
                   "which is asked about, too");
-  diagnose.option("--sessions", command.settings.sessions, "what differs between sessions [session_variation.toml]");
-  diagnose.option("--priors", command.settings.priors,
-                  "what is uncertain of the vehicle [configs/gap/priors.toml, as the next]");
-  diagnose.option("--discrepancy", command.settings.discrepancy,
-                  "what every model gets wrong [model_discrepancy.toml]");
-  diagnose.option("--verdict", command.settings.verdict, "constants of the verdict [verdict.toml]");
+  const auto takes_constants = [](io::Command& to, auto& settings) {
+    to.option("--sessions", settings.sessions, "what differs between sessions [session_variation.toml]");
+    to.option("--priors", settings.priors, "what is uncertain of the vehicle [configs/gap/priors.toml, as the next]");
+    to.option("--discrepancy", settings.discrepancy, "what every model gets wrong [model_discrepancy.toml]");
+    to.option("--verdict", settings.verdict, "constants of the verdict [verdict.toml]");
+  };
+  takes_constants(diagnose, command.settings);
   diagnose.option("--manoeuvre", command.settings.manoeuvre,
                   "what was flown, as a configuration of flappy-fly; else the recorded paths, under its hover's");
   diagnose.option("--channels", command.settings.channels, "of a beat-averaged vehicle: only these, as force_x");
@@ -196,6 +197,7 @@ int main(int argc, char** argv) {
   plan.option("--flights", planned.settings.flights, "number of flights").range(1, 100).shows_default();
   plan.option("--duration", planned.settings.duration_s, "of a flight at most, s").range(2.0, 600.0).shows_default();
   plan.flag("--reference", planned.settings.reference, "with as many reference flights of the same robot");
+  takes_constants(plan, planned.settings);
   plan.option("--magnitude", planned.magnitudes, "EFFECT=FACTOR on the typical magnitude");
   plan.option("--out", planned.out, "folder for plan.json and matrix.csv");
   plan.option("--threads", planned.settings.threads, "0: one for each processor").range(0, 1024);

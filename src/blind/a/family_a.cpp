@@ -242,7 +242,7 @@ class FamilyA final : public Family {
 Case case_of(const Assignment& a) {
   Case c = declared_case(a.vehicle_file);
   std::vector<BlindEffect> effects;
-  for (const auto& [id, magnitude] : a.effects) effects.push_back({id, magnitude});
+  for (const auto& [id, magnitude] : a.present_effects()) effects.push_back({id, magnitude});
   c.magnitudes = Magnitudes(effects);
   c.seed = a.seed;
   c.programme = a.hover ? Programme::hover : a.calm ? Programme::calm : Programme::rich;
@@ -252,6 +252,7 @@ Case case_of(const Assignment& a) {
   c.sensors = a.conventions ? drawn_sensors(a) : sensors_of(a.seed, a.power, a.wings);
   if (a.own_parameters) draw_parameters(c.vehicle, a.seed);
   begin_session(c, a.session);
+  change_on_purpose(c, a.changes);
   return c;
 }
 

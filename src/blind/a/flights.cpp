@@ -97,6 +97,7 @@ flightlog::FlightHeader header_of(const Case& c, const SensorSet& sensors, const
   h.imu = sensors.imu;
   h.power = sensors.power;
   h.wings = sensors.wings;
+  h.changes = c.changes;
   return h;
 }
 
@@ -105,7 +106,8 @@ flightlog::FlightHeader header_of(const Case& c, const SensorSet& sensors, const
 Room flight_room() { return {}; }
 
 Robot robot_of(const Case& c, std::size_t flight) {
-  Robot robot(c.vehicle, flight_room(), c.magnitudes, c.seed, flight_number(c.session, flight));
+  Robot robot(c.vehicle, flight_room(), c.magnitudes, c.seed, flight_number(c.session, flight), kRobotStep_s,
+              c.changes.swapped_wings);
   robot.charge(c.battery_V);
   return robot;
 }

@@ -23,6 +23,7 @@ struct Case {
   double battery_V = kBattery_V;             ///< when full
   std::optional<SensorSet> sensors;          ///< if absent, drawn from the seed (sensors_of)
   const ProposedFlight* proposed = nullptr;  ///< replaces the programme; null: none
+  model::Changes changes;                    ///< made by change_on_purpose(); declared in the log
 };
 
 /// Number of a flight in random streams: other numbers in each session. `flight` is below a million.

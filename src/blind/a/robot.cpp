@@ -22,7 +22,7 @@ constexpr double kStopFrequency_rad_s = 1.1e4;
 }  // namespace
 
 Robot::Robot(const model::Vehicle& v, const Room& room, const Magnitudes& magnitudes, std::uint64_t seed,
-             std::uint64_t flight, double step_s)
+             std::uint64_t flight, double step_s, bool swapped_wings)
     : room_(room),
       magnitudes_(magnitudes),
       step_s_(step_s),
@@ -56,11 +56,12 @@ Robot::Robot(const model::Vehicle& v, const Room& room, const Magnitudes& magnit
         i(a, b) += product, i(b, a) += product;
       }
   }
+  const bool left_damaged = (Random(seed, 13).uniform() < 0.5) != swapped_wings;
   for (const std::size_t s : {0u, 1u}) {
     const model::Side& from = s == 0 ? v.left : v.right;
     side_[s].leading_edge = body(from.leading_edge);
     side_[s].wing = body(from.wing);
-    build_side(from, s, seed);
+    build_side(from, s, left_damaged == (s == 0));
   }
   mass_kg_ = torso_.mass_kg;
   for (const Side& s : side_) mass_kg_ += s.leading_edge.mass_kg + s.wing.mass_kg;
@@ -74,7 +75,7 @@ Robot::Robot(const model::Vehicle& v, const Room& room, const Magnitudes& magnit
   field_ = (random.level() + Vector3d(0, 0, -1.5)).normalized();
 }
 
-void Robot::build_side(const model::Side& from, std::size_t s, std::uint64_t seed) {
+void Robot::build_side(const model::Side& from, std::size_t s, bool damaged) {
   Side& to = side_[s];
   to.sign = s == 0 ? 1 : -1;
   to.shoulder_m = vector(from.shoulder_m);
@@ -85,7 +86,7 @@ void Robot::build_side(const model::Side& from, std::size_t s, std::uint64_t see
   to.rotation = from.rotation;
   to.strips = cut_into_strips(from.planform);
   to.kept.fill(1);
-  if (s == (Random(seed, 13).uniform() < 0.5 ? 0u : 1u)) damage(to);
+  if (damaged) damage(to);
   if (const double magnitude = magnitudes_[Effect::wing_inertia]; magnitude > 0) {
     Matrix3d& i = to.wing.inertia_kg_m2;
     i(0, 0) *= 1 + 0.1 * magnitude;

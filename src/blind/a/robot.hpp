@@ -69,8 +69,9 @@ struct RobotState {
 class Robot {
  public:
   /// `seed` draws directions and signs of effects; with `flight`, what differs between flights: gusts, jitter.
+  /// `swapped_wings`: damage is on the other side, as `vehicle` has the wings swapped.
   Robot(const model::Vehicle& vehicle, const Room& room, const Magnitudes& magnitudes, std::uint64_t seed,
-        std::uint64_t flight = 0, double step_s = kRobotStep_s);
+        std::uint64_t flight = 0, double step_s = kRobotStep_s, bool swapped_wings = false);
 
   /// Advances one step. The arguments command the driver, in V at nominal battery voltage.
   void step(double left_V, double right_V);
@@ -143,7 +144,7 @@ class Robot {
     Vector3d turn, shift;
   };
 
-  void build_side(const model::Side& from, std::size_t side, std::uint64_t seed);
+  void build_side(const model::Side& from, std::size_t side, bool damaged);
   void damage(Side& side);
   void pose_sides();
   template <int joints>

@@ -58,4 +58,33 @@ void begin_session(Case& c, std::size_t session) {
   c.sensors->mocap_late_s = s.mocap_late_s;
 }
 
+void change_on_purpose(Case& c, const model::Changes& changes) {
+  c.changes = changes;
+  model::Vehicle& v = c.vehicle;
+  if (changes.swapped_wings) {
+    for (const auto part : {&model::Side::leading_edge, &model::Side::wing}) {
+      std::swap(v.left.*part, v.right.*part);
+      for (model::RigidBody* body : {&(v.left.*part), &(v.right.*part)})  // y points outwards on the left alone
+        for (double* odd : {&body->com_m.y, &body->inertia_kg_m2.xy, &body->inertia_kg_m2.yz}) *odd *= -1;
+    }
+    std::swap(v.left.rotation, v.right.rotation);
+    std::swap(v.left.planform, v.right.planform);
+  }
+  if (changes.added_mass_kg > 0) {
+    // parallel axes: both masses about their common centre
+    model::RigidBody& torso = v.torso;
+    const auto& at = changes.added_at_m;
+    const double whole_kg = torso.mass_kg + changes.added_mass_kg;
+    const Vector3d apart(at[0] - torso.com_m.x, at[1] - torso.com_m.y, at[2] - torso.com_m.z),
+        shift = changes.added_mass_kg / whole_kg * apart;
+    const Matrix3d more = torso.mass_kg * changes.added_mass_kg / whole_kg *
+                          (apart.squaredNorm() * Matrix3d::Identity() - apart * apart.transpose());
+    model::InertiaTensor& i = torso.inertia_kg_m2;
+    i.xx += more(0, 0), i.yy += more(1, 1), i.zz += more(2, 2);
+    i.xy += more(0, 1), i.yz += more(1, 2), i.xz += more(0, 2);
+    torso.com_m.x += shift.x(), torso.com_m.y += shift.y(), torso.com_m.z += shift.z();
+    torso.mass_kg = whole_kg;
+  }
+}
+
 }  // namespace flappy::blind

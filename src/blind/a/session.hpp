@@ -28,4 +28,7 @@ SessionChange session_change(std::uint64_t seed, std::size_t session);
 /// Takes a case of session 0 to another session. What the log declares stays.
 void begin_session(Case& c, std::size_t session);
 
+/// Swaps the wings and adds the weight. Effects taken away are left to the caller.
+void change_on_purpose(Case& c, const model::Changes& changes);
+
 }  // namespace flappy::blind

@@ -10,7 +10,7 @@ namespace flappy::blind::b {
 
 Case make_case(const Assignment& a) {
   Case c;
-  c.effect_magnitudes = effect_magnitudes_of(a.effects, a.seed);
+  c.effect_magnitudes = effect_magnitudes_of(a.present_effects(), a.seed);
   c.parameters = read_parameters(a.vehicle_file);
   c.header.vehicle = c.parameters.file;
   c.header.vehicle_sha256 = c.parameters.sha256;
@@ -20,6 +20,12 @@ Case make_case(const Assignment& a) {
   c.sensors = draw_sensors(a, c.parameters.side[0].motor.voltage_limit_V, c.header);
   if (a.own_parameters) draw_parameters(a.seed, c.parameters);
   if (a.session > 0) change(draw_session(a.seed, a.session), c.parameters, c.sensors);
+  if (a.changes.swapped_wings) swap_wings(c.parameters, c.effect_magnitudes);
+  if (a.changes.added_mass_kg > 0) {
+    const auto& at = a.changes.added_at_m;
+    add_weight(a.changes.added_mass_kg, {at[0], at[1], at[2]}, c.parameters.torso);
+  }
+  c.header.changes = a.changes;
   return c;
 }
 

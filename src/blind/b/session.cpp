@@ -60,4 +60,29 @@ void change(const SessionChange& by, RobotParameters& robot, SensorTruth& sensor
   sensors.imu_late_s += by.imu_late_s;
 }
 
+void swap_wings(RobotParameters& robot, EffectMagnitudes& effects) {
+  std::array<Side, 2>& side = robot.side;
+  const auto swap = [&](const auto... member) { (std::swap(side[0].*member, side[1].*member), ...); };
+  swap(&Side::edge, &Side::wing, &Side::rotation);
+  swap(&Side::wing_length_m, &Side::mean_chord_m, &Side::lift, &Side::drag, &Side::turning_drag);
+  const Matrix3d mirror = Vector3d(1, -1, 1).asDiagonal();
+  for (Side& s : side)
+    for (Link* link : {&s.edge, &s.wing}) {
+      link->com_m = mirror * link->com_m;
+      link->inertia_kg_m2 = mirror * link->inertia_kg_m2 * mirror;
+    }
+  effects.damaged_side = 1 - effects.damaged_side;
+  std::swap(effects.wing_inertia[0], effects.wing_inertia[1]);
+  std::swap(effects.creep_sign[0], effects.creep_sign[1]);
+}
+
+void add_weight(double mass_kg, const Vector3d& at, Link& link) {
+  const Matrix3d I = Matrix3d::Identity();
+  const auto point = [&](double m, const Vector3d& d) { return Matrix3d(m * (d.dot(d) * I - d * d.transpose())); };
+  const Vector3d before = link.com_m, com = (link.mass_kg * before + mass_kg * at) / (link.mass_kg + mass_kg);
+  link.inertia_kg_m2 += point(link.mass_kg, before - com) + point(mass_kg, at - com);
+  link.com_m = com;
+  link.mass_kg += mass_kg;
+}
+
 }  // namespace flappy::blind::b

@@ -30,4 +30,10 @@ SessionChange draw_session(std::uint64_t seed, std::size_t session);
 
 void change(const SessionChange& by, RobotParameters& robot, SensorTruth& sensors);
 
+/// Each wing with its edge, rotation hinge and faults goes to the other side; motors, springs and shoulders stay.
+void swap_wings(RobotParameters& robot, EffectMagnitudes& effects);
+
+/// Fixes a point mass to a link, at a point of the link's frame.
+void add_weight(double mass_kg, const Vector3d& at_m, Link& link);
+
 }  // namespace flappy::blind::b

@@ -59,11 +59,28 @@ RobotParameters faulty(RobotParameters f, const Magnitudes& magnitudes, std::uin
   return f;
 }
 
-Build build_of(const Magnitudes& magnitudes, std::uint64_t seed) {
+/// Wings, leading edges and rotation hinges; what moves them stays on its side.
+void swap_wings(RobotParameters& f) {
+  auto& [left, right] = f.sides;
+  std::swap(left.leading_edge, right.leading_edge);
+  std::swap(left.wing, right.wing);
+  std::swap(left.rotation, right.rotation);
+  std::swap(left.planform, right.planform);
+  std::swap(left.fluid, right.fluid);
+  for (Side& side : f.sides)
+    for (RigidBody* body : {&side.leading_edge, &side.wing}) {  // seen in a mirror in the plane y = 0
+      body->com_m.y() *= -1;
+      body->inertia_kg_m2.row(1) *= -1;
+      body->inertia_kg_m2.col(1) *= -1;
+    }
+}
+
+Build build_of(const Magnitudes& magnitudes, std::uint64_t seed, bool swapped_wings) {
   Random random(seed, "build");
   Build build;
   build.damage = 0.05 * magnitudes[Effect::kWingDamage];
   build.damaged = random.below(2);
+  if (swapped_wings) build.damaged = 1 - build.damaged;
   build.backlash_rad = kDegree * magnitudes[Effect::kGearBacklash];
   const double half_weight_Nm = 0.0611 * 0.0507;  // half the weight of 12.4 g at the planform's centre of pressure
   if (magnitudes[Effect::kSparBending] > 0)
@@ -79,13 +96,17 @@ Build build_of(const Magnitudes& magnitudes, std::uint64_t seed) {
 }  // namespace
 
 Robot::Robot(const Assignment& a, std::size_t flight)
-    : magnitudes_(a.effects), parameters_(read_parameters(a.vehicle_file)) {
+    : magnitudes_(a.present_effects()), parameters_(read_parameters(a.vehicle_file)) {
   if (a.own_parameters) parameters_ = drawn_parameters(parameters_, a.seed);
   if (a.session > 0) parameters_ = changed(std::move(parameters_), session_change(a));
   parameters_ = faulty(std::move(parameters_), magnitudes_, a.seed);
+  if (a.changes.swapped_wings) swap_wings(parameters_);
+  if (a.changes.added_mass_kg > 0)
+    add_mass(parameters_.torso, a.changes.added_mass_kg, Eigen::Vector3d::Map(a.changes.added_at_m.data()));
   steps_ = static_cast<std::size_t>(std::max(1.0, std::ceil(parameters_.hold_s / Mechanism::kStep_s - 1e-6)));
   step_s_ = parameters_.hold_s / static_cast<double>(steps_);
-  mechanism_ = std::make_unique<Mechanism>(parameters_, build_of(magnitudes_, a.seed), step_s_);
+  mechanism_ =
+      std::make_unique<Mechanism>(parameters_, build_of(magnitudes_, a.seed, a.changes.swapped_wings), step_s_);
   drive_ = std::make_unique<Drive>(parameters_, magnitudes_, a.seed, stream_of(a, flight));
   air_ = std::make_unique<Air>(parameters_, magnitudes_, a.seed, stream_of(a, flight));
   for (std::size_t side = 0; side < 2; ++side) {

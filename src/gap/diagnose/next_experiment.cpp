@@ -5,6 +5,7 @@
 
 #include "gap/diagnose/verdict.hpp"
 #include "gap/replay/reset_prediction.hpp"
+#include "io/config.hpp"
 #include "io/parallel.hpp"
 #include "rollout/simulated_flight.hpp"
 
@@ -245,7 +246,7 @@ std::optional<NextExperiment> expected_information(const Manoeuvre& m, const std
     const double p = rivals[a].probability / all;
     return -p * std::log(p + (1 - p) * tempered(std::max(0.0, brought), options.rule));
   };
-  NextExperiment result{m.name, {}, 0, 0, kCourseStep_s, {}};
+  NextExperiment result{m.name, in_words(m.config.changes), m.cost, {}, 0, 0, kCourseStep_s, {}};
   std::size_t other = 1;
   double most = -1;
   for (std::size_t a = 1; a < rivals.size(); ++a) {
@@ -264,17 +265,38 @@ std::optional<NextExperiment> expected_information(const Manoeuvre& m, const std
   return result;
 }
 
+void add_interventions(const fs::path& file, std::vector<Manoeuvre>& list) {
+  const io::Config config = io::Config::load(file);
+  config.root().schema(1);
+  std::vector<Manoeuvre> added;
+  for (const io::Table& t : config.root().tables("intervention")) {
+    const std::string name = t.string("name"), flown = t.string("manoeuvre");
+    const auto base = std::ranges::find(list, flown, &Manoeuvre::name);
+    if (base == list.end()) {
+      std::vector<std::string> names;
+      for (const Manoeuvre& m : list) names.push_back(m.name);
+      t.fail("manoeuvre", "no manoeuvre \"" + flown + "\"", io::joined(names) + io::did_you_mean(flown, names));
+    }
+    added.push_back({name, base->config, t.string("cost")});
+    added.back().config.changes = model::read_changes(t);
+    if (!added.back().config.changes.any()) t.fail("name", "changes nothing", "a table changes, as of flight.toml");
+  }
+  config.root().finish();
+  std::ranges::move(added, std::back_inserter(list));
+}
+
 }  // namespace
 
 std::vector<Manoeuvre> read_manoeuvres(const fs::path& folder, const std::vector<std::string>& overrides) {
   std::vector<Manoeuvre> list;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error))
-    if (entry.path().extension() == ".toml")
+    if (entry.path().extension() == ".toml" && entry.path().filename() != kInterventions)
       list.push_back({entry.path().stem().string(), rollout::read_fly_config(entry.path(), overrides)});
   if (list.empty())
     throw io::InputError(folder.string() + ": holds no manoeuvre; accepted: a folder of configurations of flappy-fly");
   std::ranges::sort(list, {}, &Manoeuvre::name);
+  if (fs::exists(folder / kInterventions, error)) add_interventions(folder / kInterventions, list);
   return list;
 }
 

@@ -23,13 +23,19 @@
 
 namespace flappy::gap {
 
-/// A safe flight. Its log begins at settle_s of the configuration.
+/// A safe flight, or an intervention: a flight before which something is done to the robot (`changes` of the
+/// configuration). Its log begins at settle_s of the configuration.
 struct Manoeuvre {
   std::string name;
   rollout::FlyConfig config;
+  std::string cost;  ///< of an intervention, in words
 };
 
-/// The configurations (*.toml) of a folder by name. io::InputError if there is none or a faulty one.
+/// File of interventions in a folder of manoeuvres.
+inline constexpr const char* kInterventions = "interventions.toml";
+
+/// The configurations (*.toml) of a folder by name, then its interventions. io::InputError if there is none or a faulty
+/// one.
 std::vector<Manoeuvre> read_manoeuvres(const std::filesystem::path& folder,
                                        const std::vector<std::string>& overrides = {});
 

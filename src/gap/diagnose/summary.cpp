@@ -59,6 +59,15 @@ std::string verdict_line(const Verdict& c, bool contrast) {
   return "";
 }
 
+std::string proposal_line(const NextExperiment& n) {
+  const std::string flight =
+      "configs/gap/experiments/" + (n.change.empty() ? n.manoeuvre + ".toml" : std::string("interventions.toml"));
+  const std::string what =
+      n.change.empty() ? "fly " + flight : n.change + ", then fly " + n.manoeuvre + " of " + flight;
+  return io::format("to tell %s from %s, %s (%.3g nats expected)", n.separates.front().c_str(),
+                    n.separates.back().c_str(), what.c_str(), n.expected_nats);
+}
+
 std::string next_line(const Diagnosis& r, const std::string& out) {
   const Verdict& c = r.verdict;
   const std::string vehicle =
@@ -249,10 +258,7 @@ std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::strin
         io::format("in closed loop, %s: %s recorded %.3g, by the vehicle's file %.3g, by the corrected one %.3g",
                    std::filesystem::path(c->flight).filename().c_str(), c->quantity.c_str(), c->recorded, c->nominal,
                    c->corrected));
-  if (diagnosis.next)
-    lines.push_back(io::format("%s and %s differ most in configs/gap/experiments/%s.toml (%.3g nats expected)",
-                               diagnosis.next->separates.front().c_str(), diagnosis.next->separates.back().c_str(),
-                               diagnosis.next->manoeuvre.c_str(), diagnosis.next->expected_nats));
+  if (diagnosis.next) lines.push_back(proposal_line(*diagnosis.next));
   lines.push_back(diagnosis.complete ? next_line(diagnosis, out) : "next: the same command again, to its end");
   return lines;
 }

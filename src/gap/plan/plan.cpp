@@ -33,7 +33,7 @@ struct Session {
   const Manoeuvre* manoeuvre = nullptr;  ///< null: flights of PlanSettings::like
   std::size_t flights = 3;
   bool reference = false, power = false, wings = false;
-  model::Changes changes;  ///< made before as many further flights; none: no further flights
+  const Manoeuvre* further = nullptr;  ///< intervention before as many further flights; null: no further flights
 };
 
 class Planner {
@@ -42,7 +42,9 @@ class Planner {
       : settings_(settings),
         threads_(io::thread_count(settings.threads)),
         vehicle_(read_vehicle(settings.vehicle)),
-        uncertain_(sim::read_randomisation(vehicle_, io::Config::load(io::config_path("gap/priors.toml")).root())) {
+        uncertain_(
+            sim::read_randomisation(vehicle_, io::Config::load(file(settings.priors, "gap/priors.toml")).root())),
+        discrepancy_(read_model_discrepancy(file(settings.discrepancy, "gap/model_discrepancy.toml"))) {
     const fs::path folder =
         settings.experiments.empty() ? fs::path(io::config_path("gap/experiments")) : fs::path(settings.experiments);
     const std::vector<std::string> overrides =
@@ -72,7 +74,7 @@ class Planner {
       throw io::InputError("--manoeuvre " + settings_.manoeuvre + ": " + vehicle_.name +
                            " cannot fly it; accepted: a manoeuvre that the vehicle flies, as hover");
     Plan plan = described(*s);
-    for (const Session& other : choices(asked)) {
+    for (const Session& other : settings_.choices ? choices(asked) : std::vector<Session>()) {
       if (io::interrupted()) break;
       plan.choices.push_back(weighed(other, plan));
     }
@@ -113,22 +115,18 @@ class Planner {
         [](Session& s) { s.reference = !s.reference; });
     add("currents", "battery voltage and motor currents logged, too", [](Session& s) { s.power = true; });
     add("filmed_wings", "the wings' angles filmed, too", [](Session& s) { s.wings = true; });
-    const std::string further = ", before " + std::to_string(asked.flights) + " further flights";
-    add("swapped_wings", "the wings swapped" + further, [](Session& s) { s.changes.swapped_wings = true; });
-    add("added_weight", "a weight of 0.5 g 20 mm ahead of the origin" + further, [](Session& s) {
-      s.changes.added_mass_kg = 0.5e-3, s.changes.added_at_m = {0.02, 0, 0};
-    });
-    add("cable_off", "cables and markers taken off and put on anew" + further, [](Session& s) {
-      s.changes.without = {"tether", "marker_offset"};
-    });
     for (const std::size_t n : {kFew, kMany})
       if (n != asked.flights)
         add(std::to_string(n) + (n == 1 ? "_flight" : "_flights"),
             std::to_string(n) + (n == 1 ? " flight" : " flights") + " in place of " + std::to_string(asked.flights),
             [n](Session& s) { s.flights = n; });
-    for (const Manoeuvre& m : manoeuvres_)
-      if (&m != asked.manoeuvre)
-        add(m.name, "this manoeuvre in place of " + asked.manoeuvre->name, [&m](Session& s) { s.manoeuvre = &m; });
+    for (const Manoeuvre& m : manoeuvres_) {
+      if (&m == asked.manoeuvre) continue;
+      if (m.config.changes.any())
+        add(m.name, in_words(m.config.changes) + ", before " + std::to_string(asked.flights) + " further flights",
+            [&m](Session& s) { s.further = &m; });
+      else add(m.name, "this manoeuvre in place of " + asked.manoeuvre->name, [&m](Session& s) { s.manoeuvre = &m; });
+    }
     return all;
   }
 
@@ -136,21 +134,28 @@ class Planner {
   Flights fly(const Session& session) const {
     Flights flights;
     if (session.manoeuvre == nullptr) {
-      for (const std::string& folder : settings_.like)
-        flights.push_back(
-            std::make_shared<ResetPrediction>(Recording(folder, flightlog::read_flight_log(folder), vehicle_)));
+      const auto add = [&](const std::vector<std::string>& folders, bool reference) {
+        for (const std::string& folder : folders) {
+          const auto flight =
+              std::make_shared<ResetPrediction>(Recording(folder, flightlog::read_flight_log(folder), vehicle_));
+          if (reference) flight->set_reference();
+          flights.push_back(flight);
+        }
+      };
+      if (session.reference) add(settings_.like_reference.empty() ? settings_.like : settings_.like_reference, true);
+      add(settings_.like, false);
       return flights;
     }
-    rollout::FlyConfig config = session.manoeuvre->config;
-    if (session.power)
-      config.log.power = flightlog::PowerHeader{kBattery_V, kLog_Hz, 0, kVoltageNoise_V, kCurrentNoise_A};
-    if (session.wings) config.log.wings = flightlog::WingsHeader{kLog_Hz, kWingNoise_rad};
-    const std::size_t before = session.flights * (session.reference ? 2 : 1);
-    std::vector<rollout::SimulatedFlight> flown = simulate(config, vehicle_, before, config.settle_s);
-    if (session.changes.any()) {
-      config.changes = session.changes;
-      std::ranges::move(simulate(config, vehicle_, session.flights, config.settle_s), std::back_inserter(flown));
-    }
+    const auto fly = [&](rollout::FlyConfig config, std::size_t count) {
+      if (session.power)
+        config.log.power = flightlog::PowerHeader{kBattery_V, kLog_Hz, 0, kVoltageNoise_V, kCurrentNoise_A};
+      if (session.wings) config.log.wings = flightlog::WingsHeader{kLog_Hz, kWingNoise_rad};
+      return simulate(config, vehicle_, count, config.settle_s);
+    };
+    std::vector<rollout::SimulatedFlight> flown =
+        fly(session.manoeuvre->config, session.flights * (session.reference ? 2 : 1));
+    if (session.further != nullptr)
+      std::ranges::move(fly(session.further->config, session.flights), std::back_inserter(flown));
     for (std::size_t i = 0; i < flown.size(); ++i) {
       if (flown[i].lost || !flown[i].log) return {};
       const auto flight =
@@ -161,15 +166,21 @@ class Planner {
     return flights;
   }
 
-  static VerdictRule rule_of(const Session& session) {
-    return read_verdict_rule(io::config_path(session.reference ? "gap/contrast_verdict.toml" : "gap/verdict.toml"));
+  static fs::path file(const std::string& given, const char* standard) {
+    return given.empty() ? fs::path(io::config_path(standard)) : fs::path(given);
+  }
+
+  VerdictRule rule_of(const Session& session) const {
+    return read_verdict_rule(
+        file(settings_.verdict, session.reference ? "gap/contrast_verdict.toml" : "gap/verdict.toml"));
   }
 
   std::optional<Separation> separation(const Session& session, bool sure) const {
     const Flights flights = fly(session);
     if (flights.empty()) return {};
     ModelDiscrepancy discrepancy = discrepancy_;
-    if (session.reference) discrepancy.session = read_session_variation();
+    if (session.reference)
+      discrepancy.session = read_session_variation(file(settings_.sessions, "gap/session_variation.toml"));
     const VerdictRule rule = rule_of(session);
     const RobotFit robot = RobotFit::planned(flights, uncertain_, discrepancy, threads_);
     return separation_of(flights, robot, asked_, rule, threads_, sure);
@@ -254,7 +265,7 @@ class Planner {
   sim::Randomisation uncertain_;
   std::vector<Manoeuvre> manoeuvres_;
   std::map<std::string, double> asked_;  ///< [effect] magnitude over the typical one
-  ModelDiscrepancy discrepancy_ = read_model_discrepancy();
+  ModelDiscrepancy discrepancy_;
 };
 
 }  // namespace

@@ -11,14 +11,18 @@
 namespace flappy::gap {
 
 struct PlanSettings {
-  std::string vehicle;                       ///< the vehicle file
-  std::string sensors;                       ///< empty: as the manoeuvres have them
-  std::string experiments;                   ///< folder of manoeuvres; empty: configs/gap/experiments
-  std::string manoeuvre = "tour";            ///< name of a configuration in `experiments`
-  std::vector<std::string> like;             ///< folders of flights in place of a manoeuvre
-  int flights = 3;                           ///< number of flights, and of reference flights
-  double duration_s = 10;                    ///< a flight ends after this time, or with the manoeuvre
-  bool reference = false;                    ///< with as many reference flights
+  std::string vehicle;             ///< the vehicle file
+  std::string sensors;             ///< empty: as the manoeuvres have them
+  std::string experiments;         ///< folder of manoeuvres; empty: configs/gap/experiments
+  std::string manoeuvre = "tour";  ///< name of a configuration in `experiments`
+  /// Folders of flights in place of a manoeuvre, and of reference flights; the latter empty: `like`.
+  std::vector<std::string> like, like_reference;
+  int flights = 3;         ///< number of flights, and of reference flights
+  double duration_s = 10;  ///< a flight ends after this time, or with the manoeuvre
+  bool reference = false;  ///< with as many reference flights
+  bool choices = true;     ///< also weigh other flights in place of these
+  /// Empty: the files of configs/gap that a diagnosis reads.
+  std::string priors, discrepancy, verdict, sessions;
   std::map<std::string, double> magnitudes;  ///< [effect] the magnitude asked about over the typical one
   int threads = 0;                           ///< 0: one for each processor
 };

@@ -104,7 +104,9 @@ struct Course {
 };
 
 struct NextExperiment {
-  std::string manoeuvre;  ///< name of a configuration in configs/gap/experiments
+  std::string manoeuvre;  ///< name of a configuration in configs/gap/experiments, or of one of its interventions
+  std::string change;     ///< what is done to the robot before, in words; empty: nothing
+  std::string cost;       ///< of the change, in words
   /// The most probable hypothesis without an unknown cause, and its best separated rival: effects by +, or a kind.
   std::vector<std::string> separates;
   double expected_nats = 0;  ///< expected evidence between these two

@@ -175,13 +175,19 @@ Json to_json(const NextExperiment& n) {
   Json courses = Json::array();
   for (const Course& c : n.courses)
     courses.push_back({{"quantity", c.quantity}, {"first", c.first}, {"second", c.second}});
-  return {{"manoeuvre", n.manoeuvre},     {"separates", n.separates},         {"expected_nats", n.expected_nats},
-          {"information", n.information}, {"course_step_s", n.course_step_s}, {"courses", courses}};
+  return {{"manoeuvre", n.manoeuvre},
+          {"change", n.change},
+          {"cost", n.cost},
+          {"separates", n.separates},
+          {"expected_nats", n.expected_nats},
+          {"information", n.information},
+          {"course_step_s", n.course_step_s},
+          {"courses", courses}};
 }
 
 NextExperiment next_of(const Json& json) {
-  NextExperiment n{json.at("manoeuvre"),   json.at("separates"),     json.at("expected_nats"),
-                   json.at("information"), json.at("course_step_s"), {}};
+  NextExperiment n{json.at("manoeuvre"),     json.value("change", ""), json.value("cost", ""),   json.at("separates"),
+                   json.at("expected_nats"), json.at("information"),   json.at("course_step_s"), {}};
   for (const Json& c : json.at("courses")) n.courses.push_back({c.at("quantity"), c.at("first"), c.at("second")});
   return n;
 }

@@ -270,6 +270,60 @@ TEST(FamilyASessions, ChangeTheRobotAndItsSensors) {
 }
 
 /// Equal noise in both sessions leaves what the session did.
+/// Mean moment (N m) of the air about the torso's x axis, over four beats of a robot that is held.
+double roll(const Assignment& a) {
+  Robot robot = robot_of(case_of(a), 0);
+  robot.hold_torso(true);
+  double sum = 0;
+  const auto steps = static_cast<int>(4 / 34.0 / kRobotStep_s);
+  for (int n = 0; n < steps; ++n) {
+    const double volts = 10 * std::cos(2 * kPi * 34 * n * kRobotStep_s);
+    robot.step(volts, volts);
+    sum += robot.air().moment_Nm.x() / steps;
+  }
+  return sum;
+}
+
+TEST(FamilyAChanges, SwapTheWingsWithTheirFaults) {
+  Assignment a = assignment();
+  a.effects = {{"wing_damage", 2}};
+  const double before = roll(a);
+  EXPECT_GT(std::abs(before), 1e-5);
+  a.changes.swapped_wings = true;
+  EXPECT_NEAR(roll(a), -before, 1e-9);
+  a.own_parameters = true;
+  const model::Vehicle swapped = case_of(a).vehicle;
+  a.changes = {};
+  const model::Vehicle own = case_of(a).vehicle;
+  EXPECT_EQ(swapped.left.wing.mass_kg, own.right.wing.mass_kg);
+  EXPECT_EQ(swapped.left.wing.com_m.y, -own.right.wing.com_m.y);
+  EXPECT_EQ(swapped.right.leading_edge.inertia_kg_m2.xy, -own.left.leading_edge.inertia_kg_m2.xy);
+  EXPECT_EQ(swapped.left.rotation.lower_rad, own.right.rotation.lower_rad);
+  EXPECT_EQ(swapped.left.planform.mean_chord_m, own.right.planform.mean_chord_m);
+  EXPECT_EQ(swapped.left.motor.resistance_ohm, own.left.motor.resistance_ohm) << "motors stay";
+}
+
+TEST(FamilyAChanges, AddAWeightAndTakeEffectsAway) {
+  Assignment a = assignment();
+  a.effects = {{"tether", 1}, {"wind", 1}};
+  const model::RigidBody before = case_of(a).vehicle.torso;
+  a.changes.added_mass_kg = 0.5e-3;
+  a.changes.added_at_m = {0.02, 0, -0.01};
+  a.changes.without = {"tether"};
+  const Case c = case_of(a);
+  const model::RigidBody after = c.vehicle.torso;
+  EXPECT_NEAR(after.mass_kg, before.mass_kg + 0.5e-3, 1e-15);
+  EXPECT_NEAR(after.mass_kg * after.com_m.x, before.mass_kg * before.com_m.x + 0.5e-3 * 0.02, 1e-15);
+  // about the origin, inertias add
+  const auto about_y = [](const model::RigidBody& b) {
+    return b.inertia_kg_m2.yy + b.mass_kg * (b.com_m.x * b.com_m.x + b.com_m.z * b.com_m.z);
+  };
+  EXPECT_NEAR(about_y(after), about_y(before) + 0.5e-3 * (4e-4 + 1e-4), 1e-15);
+  EXPECT_EQ(c.magnitudes[Effect::tether], 0);
+  EXPECT_EQ(c.magnitudes[Effect::wind], 1);
+  EXPECT_EQ(short_flight(a, 1).log.header.changes, a.changes);
+}
+
 TEST(FamilyASessions, ShowInMotionCapture) {
   Assignment a = assignment();
   const auto seen = [&](std::size_t session) {

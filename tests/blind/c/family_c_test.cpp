@@ -316,6 +316,47 @@ TEST(FamilyC, SensorsErrAsTheirEffectsSay) {
   EXPECT_EQ(short_log(with("vibration_rectification", 1)).imu.gyro_x_rad_s, log.imu.gyro_x_rad_s);
 }
 
+TEST(FamilyC, SwapsTheWingsWithTheirFaults) {
+  const auto wing = [](const Robot& robot, const char* side) {
+    const mjModel& m = robot.mechanism().model();
+    const int id = mj_name2id(&m, mjOBJ_BODY, (side + std::string("_wing")).c_str());
+    return std::array<double, 2>{m.body_mass[id], m.body_ipos[3 * id + 1]};
+  };
+  Assignment a = with("wing_damage", 2);
+  for (const bool own : {false, true}) {
+    a.own_parameters = own;
+    a.changes = {};
+    const Robot before(a, 0);
+    a.changes.swapped_wings = true;
+    const Robot after(a, 0);
+    const auto left = wing(before, "left"), right = wing(before, "right"), swapped = wing(after, "left");
+    EXPECT_NE(left[0], right[0]) << "one is damaged";
+    EXPECT_NEAR(swapped[0], right[0], 1e-15);
+    EXPECT_NEAR(swapped[1], -right[1], 1e-15);
+    EXPECT_NEAR(wing(after, "right")[0], left[0], 1e-15);
+    const auto &was = before.parameters().sides, &is = after.parameters().sides;
+    EXPECT_EQ(is[0].leading_edge.inertia_kg_m2(0, 1), -was[1].leading_edge.inertia_kg_m2(0, 1));
+    EXPECT_EQ(is[0].leading_edge.inertia_kg_m2(1, 1), was[1].leading_edge.inertia_kg_m2(1, 1));
+    EXPECT_EQ(is[1].fluid, was[0].fluid);
+    EXPECT_EQ(is[0].rotation.lower_rad, was[1].rotation.lower_rad);
+    EXPECT_EQ(is[0].motor.resistance_ohm, was[0].motor.resistance_ohm) << "motors stay";
+  }
+}
+
+TEST(FamilyC, CarriesAWeightAndLosesWhatIsTakenAway) {
+  Assignment a = with("tether", 1);
+  const RigidBody before = Robot(a, 0).parameters().torso;
+  a.changes.added_mass_kg = 0.5e-3;
+  a.changes.added_at_m = {0.02, 0, -0.01};
+  a.changes.without = {"tether"};
+  const Robot robot(a, 0);
+  const RigidBody& after = robot.parameters().torso;
+  EXPECT_NEAR(after.mass_kg, before.mass_kg + 0.5e-3, 1e-15);
+  EXPECT_NEAR(after.mass_kg * after.com_m.x(), before.mass_kg * before.com_m.x() + 0.5e-3 * 0.02, 1e-15);
+  EXPECT_EQ(robot.magnitudes()[Effect::kTether], 0);
+  EXPECT_EQ(short_log(a).header.changes, a.changes);
+}
+
 TEST(FamilyC, ContrastIsWhatTheEffectDoes) {
   const Length length = {0.12, 0.2};
   const auto mean = [&](const std::string& effect, double magnitude) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "rollout/fly_fixture.hpp"
 
@@ -144,6 +145,33 @@ TEST(NextExperiment, ProposesNothingWithoutRivalsOrWhereOneIsLost) {
       diagnosis(prior, {hypothesis(prior, {"ground_effect"}, {1}, 0.6), hypothesis(prior, {}, {}, 0.4)});
   choice[0].config.fleet.task.path.back().coefficients[0][0] = 2;  // metres, at once
   EXPECT_TRUE(rank_experiments(d, prior, choice).empty());
+}
+
+// Without the cable, a robot with it and one without it fly alike.
+TEST(NextExperiment, ForeseesWhatAnInterventionChanges) {
+  const sim::Randomisation prior = uncertain();
+  const auto ranked =
+      rank_experiments(diagnosis(prior, {hypothesis(prior, {"tether"}, {1}, 0.6), hypothesis(prior, {}, {}, 0.4)}),
+                       prior, library({"tour", "cable_off", "added_weight"}));
+  ASSERT_EQ(ranked.size(), 3u);
+  EXPECT_EQ(ranked.back().manoeuvre, "cable_off");
+  EXPECT_EQ(ranked.back().change, "take off tether, marker_offset");
+  EXPECT_FALSE(ranked.back().cost.empty());
+  EXPECT_NEAR(ranked.back().expected_nats, 0, 1e-6);
+  for (const NextExperiment& n : {ranked[0], ranked[1]}) EXPECT_GT(n.expected_nats, 1) << n.manoeuvre;
+}
+
+TEST(NextExperiment, RefusesInterventionsThatAreNone) {
+  const flight::Folder folder;
+  std::filesystem::copy(source_path("configs"), folder / "configs", std::filesystem::copy_options::recursive);
+  const std::filesystem::path library = folder / "configs/gap/experiments", file = library / kInterventions;
+  const auto refused = [&](const std::string& lines) {
+    io::write_atomically(file, "schema = 1\n[[intervention]]\nname = \"x\"\ncost = \"nothing\"\n" + lines);
+    return flight::message([&] { read_manoeuvres(library); });
+  };
+  EXPECT_NE(refused("manoeuvre = \"tuor\"\n").find(".toml:5"), std::string::npos);
+  EXPECT_NE(refused("manoeuvre = \"tuor\"\n").find("did you mean \"tour\"?"), std::string::npos);
+  EXPECT_NE(refused("manoeuvre = \"tour\"\n").find("changes nothing"), std::string::npos);
 }
 
 TEST(NextExperiment, ALibraryWithoutManoeuvresIsRefused) {

@@ -42,7 +42,7 @@ TEST(Summary, SaysWhatToDoInThirtyLines) {
                {"imu_mounting.y_rad", -0.02, -0.03, -0.01, "rad"}};
   for (int i = 0; i < 9; ++i) r.background.push_back({"spring_hardening.per_rad2", -0.02, -0.03, -0.01, "1/rad^2"});
   r.closed_loop = {{"flight", "mean_bias_V", 1, 0, 0.9}};
-  r.next = NextExperiment{"dash", {"wind", "tether"}, 3, 0, 0.1, {}};
+  r.next = NextExperiment{"dash", "", "", {"wind", "tether"}, 3, 0, 0.1, {}};
   r.closure = Closure{0.9, 0.8, 0.95};
   const auto all = [&] {
     std::string text;
@@ -72,7 +72,12 @@ TEST(Summary, SaysWhatToDoInThirtyLines) {
   r.verdict = {VerdictKind::effect, {"wind"}, false, 0.3};
   EXPECT_NE(all().find("(probability 0.30, no more than a guess)"), std::string::npos);
   EXPECT_NE(all().find("--set vehicle=/out/vehicle_corrected.toml"), std::string::npos);
-  EXPECT_NE(all().find("wind and tether differ most in configs/gap/experiments/dash.toml"), std::string::npos);
+  EXPECT_NE(all().find("to tell wind from tether, fly configs/gap/experiments/dash.toml ("), std::string::npos);
+  r.next->manoeuvre = "swapped_wings";
+  r.next->change = "swap the wings";
+  EXPECT_NE(all().find("to tell wind from tether, swap the wings, then fly swapped_wings of "
+                       "configs/gap/experiments/interventions.toml ("),
+            std::string::npos);
   EXPECT_NE(all().find("mean_bias_V recorded 1, by the vehicle's file 0, by the corrected one 0.9"), std::string::npos);
   for (const auto& [kind, begin] : {std::pair{VerdictKind::none, "No gap beyond noise"},
                                     {VerdictKind::parameters, "Nothing is missing"},

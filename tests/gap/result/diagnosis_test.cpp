@@ -92,7 +92,7 @@ Diagnosis whole() {
                             {{"wind", "force_x", 0.2, 0.01}},
                             {{"wind.x_m_s", {0.2, 0.4}, {0.1, 0.1}, 0.3}}};
   d.closed_loop = {{"a", "mean_bias_V", 1, NAN, 0.9}};
-  d.next = NextExperiment{"dash", {"wind", "tether"}, 3, 0.2, 0.1, {{"x_m", {0, 1}, {0, 2}}}};
+  d.next = NextExperiment{"dash", "swap the wings", "time", {"wind", "tether"}, 3, 0.2, 0.1, {{"x_m", {0, 1}, {0, 2}}}};
   return d;
 }
 
