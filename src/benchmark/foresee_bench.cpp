@@ -29,10 +29,12 @@ fs::path file_of(const fs::path& folder, std::size_t number) {
 /// A row for each case and effect.
 void write_table(const fs::path& folder, const Manifest& manifest) {
   std::string text = "case,effect,rival,nats,probability\n";
-  for (const PublicCase& c : manifest.cases)
-    for (const auto& [effect, f] : read_json(file_of(folder, c.number)).items())
+  for (const PublicCase& c : manifest.cases) {
+    const Json foreseen = read_json(file_of(folder, c.number));
+    for (const auto& [effect, f] : foreseen.items())
       text += std::to_string(c.number) + "," + effect + "," + f.at("rival").get<std::string>() + "," +
               io::shortest_digits(f.at("nats")) + "," + io::shortest_digits(f.at("probability")) + "\n";
+  }
   io::write_atomically(folder / kForeseenFile, text);
   std::printf("written: %s\n", (folder / kForeseenFile).c_str());
 }

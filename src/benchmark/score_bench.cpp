@@ -12,6 +12,7 @@
 #include "benchmark/proposal.hpp"
 #include "benchmark/records.hpp"
 #include "benchmark/work.hpp"
+#include "flappy/vehicle_file.hpp"
 #include "io/append_file.hpp"
 #include "io/files.hpp"
 #include "io/program.hpp"
@@ -149,7 +150,7 @@ bool fit_truths(const ScoreCommand& command, Bench& bench) {
       work_through("fitting true effects", open.size(), command.threads, command.ranks, [&](std::size_t k) {
         const PublicCase& c = bench.manifest.cases[open[k]];
         std::vector<std::string> others;
-        for (const model::CatalogueEffect& e : model::effects())
+        for (const model::CatalogueEffect& e : model::causes_of(model::read_vehicle(bench.predictions.vehicle())))
           if (std::ranges::count(bench.cases[open[k]].truth.effects, std::string(e.info.id)) == 0)
             others.emplace_back(e.info.id);
         Question q = bench.predictions.question(c, others);

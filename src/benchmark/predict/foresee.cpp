@@ -15,7 +15,7 @@ std::vector<Foreseen> foresee(const Question& q, const std::map<std::string, dou
   settings.verdict = q.verdict;
   settings.sessions = q.sessions;
   settings.magnitudes = magnitudes;
-  settings.choices = false;
+  settings.matrix_only = true;
   settings.threads = 1;
   const gap::Plan plan = make_plan(settings);
   std::vector<Foreseen> all;

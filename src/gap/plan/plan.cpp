@@ -69,12 +69,12 @@ class Planner {
 
   Plan run() {
     const Session asked = asked_session();
-    const std::optional<Separation> s = separation(asked, true);
+    const std::optional<Separation> s = separation(asked, !settings_.matrix_only);
     if (!s)
       throw io::InputError("--manoeuvre " + settings_.manoeuvre + ": " + vehicle_.name +
                            " cannot fly it; accepted: a manoeuvre that the vehicle flies, as hover");
     Plan plan = described(*s);
-    for (const Session& other : settings_.choices ? choices(asked) : std::vector<Session>()) {
+    for (const Session& other : settings_.matrix_only ? std::vector<Session>() : choices(asked)) {
       if (io::interrupted()) break;
       plan.choices.push_back(weighed(other, plan));
     }

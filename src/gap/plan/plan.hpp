@@ -17,10 +17,10 @@ struct PlanSettings {
   std::string manoeuvre = "tour";  ///< name of a configuration in `experiments`
   /// Folders of flights in place of a manoeuvre, and of reference flights; the latter empty: `like`.
   std::vector<std::string> like, like_reference;
-  int flights = 3;         ///< number of flights, and of reference flights
-  double duration_s = 10;  ///< a flight ends after this time, or with the manoeuvre
-  bool reference = false;  ///< with as many reference flights
-  bool choices = true;     ///< also weigh other flights in place of these
+  int flights = 3;           ///< number of flights, and of reference flights
+  double duration_s = 10;    ///< a flight ends after this time, or with the manoeuvre
+  bool reference = false;    ///< with as many reference flights
+  bool matrix_only = false;  ///< neither other flights nor from which magnitude on an effect is sure
   /// Empty: the files of configs/gap that a diagnosis reads.
   std::string priors, discrepancy, verdict, sessions;
   std::map<std::string, double> magnitudes;  ///< [effect] the magnitude asked about over the typical one
