@@ -75,7 +75,7 @@ def what_is_left(tools, project, work, outside):
         vehicle = project / "configs/vehicles/hummingbird_nominal.toml"
         run(work, tools / "flappy-gap", "diagnose", "--vehicle", vehicle, "--reference", *reference, "--flights", *flights, "--residual", "--out", out)
         residual = json.loads((work / out / "diagnosis.json").read_text())["residual"]
-        if "[effects.residual]" not in (work / out / "vehicle_corrected.toml").read_text():
+        if "effects.residual." not in (work / out / "vehicle_corrected.toml").read_text():
             found.append(f"{out}: no residual load in the corrected vehicle")
         if not residual["loss"] < residual["loss_without"]:
             found.append(f"{out}: loss {residual['loss']} with the load, {residual['loss_without']} without")
