@@ -328,7 +328,7 @@ std::optional<double> realised_nats(const ScoredCase& c) {
   if (c.truth.effects.size() != 1) return std::nullopt;
   std::optional<double> own, rival;
   for (const Weighed& w : c.prediction.evidence) {
-    std::optional<double>& best = same(w.effects, c.truth.effects) ? own : rival;
+    std::optional<double>& best = std::ranges::count(w.effects, c.truth.effects.front()) > 0 ? own : rival;
     best = std::max(best.value_or(w.nats), w.nats);
   }
   if (!own || !rival) return std::nullopt;

@@ -134,8 +134,8 @@ bool needs_true_fit(const ScoredCase& c);
 /// Whether change_over_noise is needed: one effect of the catalogue changed between the sessions, and was not named.
 bool needs_change_over_noise(const ScoredCase& c);
 
-/// Evidence of a diagnosis for the true effect, with or without a remainder, over its best rival, nats. None unless the
-/// robot has one effect and the diagnosis weighed it.
+/// Evidence of a diagnosis for the true effect over its best rival, nats: of hypotheses with it, alone or beside others,
+/// over those without. None unless the robot has one effect and the diagnosis weighed it.
 std::optional<double> realised_nats(const ScoredCase& c);
 
 }  // namespace flappy::benchmark

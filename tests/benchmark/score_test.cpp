@@ -93,17 +93,17 @@ TEST(Score, ComparesPlansWithWhatBecameOfThem) {
   for (int i = 0; i < 20; ++i) {
     const bool right = i >= 10;
     ScoredCase c = judged("changed", {"wind"}, "effect", {right ? "wind" : "tether"}, 0.9);
-    c.prediction.evidence = {{{"wind"}, 2.0 * i - 19}, {{"wind"}, -100}, {{"tether"}, 0}, {{}, -50}};
+    c.prediction.evidence = {{{"wind"}, 2.0 * i - 25}, {{"tether", "wind"}, 2.0 * i - 19}, {{"tether"}, 0}, {{}, -50}};
     c.foreseen = Foresight{10.0 * (i + 1), 0.04 * i};
     cases.push_back(c);
   }
-  EXPECT_DOUBLE_EQ(*realised_nats(cases[15]), 11) << "the better of both hypotheses with wind, over tether";
+  EXPECT_DOUBLE_EQ(*realised_nats(cases[15]), 11) << "the better of both hypotheses with wind, over tether alone";
   EXPECT_DOUBLE_EQ(*main_score(cases, "contrast_plan_rank").value, 1);
   EXPECT_DOUBLE_EQ(*main_score(cases, "contrast_plan_auc").value, 1);
   EXPECT_EQ(main_score(cases, "contrast_plan_rank").count, 20u);
   // medians of 105 and 0: nothing was brought; with ten nats more, 105 over 10
   EXPECT_FALSE(main_score(cases, "contrast_plan_hope").value);
-  for (ScoredCase& c : cases) c.prediction.evidence[0].nats += 10;
+  for (ScoredCase& c : cases) c.prediction.evidence[1].nats += 10;
   EXPECT_DOUBLE_EQ(*main_score(cases, "contrast_plan_hope").value, 10.5);
   cases[0].prediction.effects = {"wind"};
   EXPECT_FALSE(main_score(cases, "contrast_plan_auc").value) << "fewer than ten are wrong";
