@@ -134,7 +134,7 @@ bool needs_true_fit(const ScoredCase& c);
 /// Whether change_over_noise is needed: one effect of the catalogue changed between the sessions, and was not named.
 bool needs_change_over_noise(const ScoredCase& c);
 
-/// Evidence of a diagnosis for the true effect over its best rival, nats: of hypotheses with it, alone or beside others,
+/// Evidence of a diagnosis for the true effect over its best rival, nats: of hypotheses with it, alone or with others,
 /// over those without. None unless the robot has one effect and the diagnosis weighed it.
 std::optional<double> realised_nats(const ScoredCase& c);
 
