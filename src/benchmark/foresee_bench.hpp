@@ -1,5 +1,5 @@
-// What plans expect of the diagnoses of a blind benchmark, written before its labels are opened, and how it compares
-// with what the diagnoses found.
+// Plans of the cases of a blind benchmark, written before its labels are opened. score_bench compares them with the
+// diagnoses.
 #pragma once
 
 #include <filesystem>
@@ -29,7 +29,8 @@ inline constexpr const char* kForeseenFile = "foreseen.csv";
 /// (plan_cases). Resumes an interrupted run; false if interrupted again. InputError if labels were opened.
 bool foresee_bench(const ForeseeCommand& command);
 
-/// What was expected of a case if its robot has this effect; none: nothing was written, or the effect changes no row.
+/// The plan's expectation for a case if its robot has this effect. None: no plan was written, or the effect changes no
+/// row.
 std::optional<Foresight> read_foreseen(const std::filesystem::path& folder, std::size_t number,
                                        const std::string& effect);
 

@@ -68,7 +68,7 @@ struct Weighed {
   double nats = 0;
 };
 
-/// What a plan expected of a diagnosis, were the truth known.
+/// A plan's expectation for a case, given its true effect.
 struct Foresight {
   double nats = 0;         ///< expected evidence for the true effect over its best rival
   double probability = 0;  ///< that the diagnosis gives the true effect
@@ -81,7 +81,7 @@ struct Answer {
   std::vector<std::string> effects;   ///< effects that the verdict names; for a group, its possible effects
   double probability = 0;             ///< probability of the verdict
   std::vector<FittedSet> sets;        ///< the most probable first
-  std::vector<Weighed> evidence;      ///< of all hypotheses
+  std::vector<Weighed> evidence;      ///< evidence of every hypothesis
   std::vector<std::string> suspects;  ///< most probable effects given that one is missing
   double none = 0, parameters = 0, unknown = 0;
   std::optional<double> nominal, refit, floor;  ///< mean losses: vehicle file, parameters fitted, noise alone

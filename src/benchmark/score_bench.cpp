@@ -193,8 +193,8 @@ bool find_changes_over_noise(const ScoreCommand& command, Bench& bench) {
   return true;
 }
 
-/// Of part "hover", and with --proposals of undecided singles; diagnoses them with the earlier flights. The maker does to
-/// the robot what an intervention says. False if interrupted.
+/// Flies the proposals of part "hover", and with --proposals those of undecided singles. The family makes an
+/// intervention's changes to its robot. Old and new flights are diagnosed together. False if interrupted.
 bool fly_proposals(const ScoreCommand& command, Bench& bench) {
   const auto file_of = [&](std::size_t i) {
     return bench.folder / "proposed" / (number_text(bench.manifest.cases[i].number) + ".json");

@@ -8,7 +8,7 @@
 
 namespace flappy::benchmark {
 
-/// What the plan of a case's flights expects of their diagnosis, if the robot has this effect.
+/// A plan's expectation for the diagnosis of a case, if the robot has this effect.
 struct Foreseen {
   std::string effect;
   std::string rival;       ///< the best one, by expected evidence
