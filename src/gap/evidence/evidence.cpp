@@ -13,6 +13,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+/// Eigen sums products in blocks that fit the processor's caches. Fixed sizes, bytes, so that the last digits of a
+/// diagnosis, to which a fit may be sensitive, do not depend on the processor.
+[[maybe_unused]] const bool kBlocksAreFixed = [] {
+  Eigen::setCpuCacheSizes(32 << 10, 512 << 10, 8 << 20);
+  return true;
+}();
+
 /// Degrees of freedom of the noise's Student t.
 constexpr double kNoiseFreedom = 4;
 /// Ridge of least squares on the whole basis.
