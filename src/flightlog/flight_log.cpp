@@ -140,6 +140,7 @@ FlightHeader parse_header(const io::Table& root) {
   h.mocap = {mocap.number("rate_hz", rate), mocap.number("latency_s", latency),
              mocap.number("position_noise_m", non_negative(1)), mocap.number("attitude_noise_rad", non_negative(1))};
   const bool declared = !h.inputs.empty();
+  h.mocap.source = read_pose_source(mocap, declared);
   if (!declared || root.has("imu")) h.imu = parse_imu_header(root.table("imu"), declared);
   if (const auto power = root.optional_table("power")) h.power = parse_power_header(*power, declared);
   if (const auto wings = root.optional_table("wings"))
@@ -196,6 +197,8 @@ std::string header_text(const FlightHeader& h) {
   number("latency_s", h.mocap.latency_s);
   number("position_noise_m", h.mocap.position_noise_m);
   number("attitude_noise_rad", h.mocap.attitude_noise_rad);
+  if (h.mocap.source != PoseSource::motion_capture)
+    line("source", io::toml_string(kPoseSources[static_cast<std::size_t>(h.mocap.source)]));
 
   if (h.imu.rate_hz > 0) {
     text += "\n[imu]\n";
@@ -518,6 +521,14 @@ std::vector<std::string> read_inputs(const io::Table& command) {
 
 double read_flapping(const io::Table& root, const std::vector<std::string>& inputs) {
   return inputs.empty() || root.has("flapping_Hz") ? root.number("flapping_Hz", positive(1e3)) : 0;
+}
+
+PoseSource read_pose_source(const io::Table& mocap, bool declared_inputs) {
+  const std::string source = mocap.choice_or("source", kPoseSources.front(), kPoseSources);
+  if (source != kPoseSources.front() && !declared_inputs)
+    mocap.fail("source", "\"" + source + "\" is too coarse for motion within a wing beat",
+               "\"" + kPoseSources.front() + "\", or declared inputs (command.inputs)");
+  return static_cast<PoseSource>(std::ranges::find(kPoseSources, source) - kPoseSources.begin());
 }
 
 bool read_gyro(const io::Table& imu, bool declared_inputs) { return has_part(imu, "gyro", declared_inputs); }

@@ -57,9 +57,15 @@ struct LogAmbient {
   bool operator==(const LogAmbient&) const = default;
 };
 
+/// What measured the pose in mocap.csv. An estimate is the robot's own, from an estimator on board; where it has no
+/// pitch, the pitch was derived from the specific force, which then has no part along x of B.
+enum class PoseSource { motion_capture, estimate, estimate_without_pitch };
+inline const std::vector<std::string> kPoseSources = {"motion_capture", "estimate", "estimate_without_pitch"};
+
 /// In all headers: noise is the sd of one sample, latency the mean time from the measured instant to t_s.
 struct MocapHeader {
   double rate_hz = 0, latency_s = 0, position_noise_m = 0, attitude_noise_rad = 0;
+  PoseSource source = PoseSource::motion_capture;
   bool operator==(const MocapHeader&) const = default;
 };
 
@@ -205,9 +211,10 @@ inline const std::vector<std::string> kMotionNames = {"t_s",
 
 LogAmbient read_ambient(const io::Table& ambient);
 
-/// Keys of flight.toml and of mappings: [command] inputs, flapping_Hz, [imu] gyro, [power] currents.
+/// Keys of flight.toml and of mappings: [command] inputs, flapping_Hz, [mocap] source, [imu] gyro, [power] currents.
 std::vector<std::string> read_inputs(const io::Table& command);
 double read_flapping(const io::Table& root, const std::vector<std::string>& inputs);
+PoseSource read_pose_source(const io::Table& mocap, bool declared_inputs);
 bool read_gyro(const io::Table& imu, bool declared_inputs);
 bool read_currents(const io::Table& power, bool declared_inputs);
 

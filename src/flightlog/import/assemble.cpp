@@ -252,6 +252,20 @@ double farthest(const Column& values) {
   return most;
 }
 
+/// Replaces the columns of the acceleration by the pitch with which the specific force has no part along x of B: with
+/// u the specific force, turned back by the yaw, tan(pitch) = u_x / u_z.
+void derive_pitch(Stream& s, double gravity_m_s2) {
+  const auto ax = s.columns.extract("acceleration_x_m_s2"), ay = s.columns.extract("acceleration_y_m_s2"),
+             az = s.columns.extract("acceleration_z_m_s2");
+  if (ax.empty()) return;
+  const Column& yaw = s.columns["yaw_rad"];
+  Column pitch;
+  for (std::size_t i = 0; i < yaw.size(); ++i)
+    pitch.push_back(std::atan2(std::cos(yaw[i]) * ax.mapped()[i] + std::sin(yaw[i]) * ay.mapped()[i],
+                               az.mapped()[i] + gravity_m_s2));
+  s.columns["pitch_rad"] = std::move(pitch);
+}
+
 /// Replaces the columns of angles by those of the quaternion.
 void turn_angles(Stream& s) {
   if (!s.columns.contains("roll_rad")) return;
@@ -435,7 +449,7 @@ std::string usable(const StreamReport& report) {
 }
 
 Stream read_stream(const Channels& channels, const StreamMapping& mapping, const Clocks& clocks, const Span& span,
-                   bool shared) {
+                   bool shared, double gravity_m_s2) {
   const Channel& channel = channel_of(channels, mapping, mapping.channel, "channel");
   if (all_missing(raw_times(channel, mapping)) && !channel.received_ns().empty())
     mapping.table.fail("time",
@@ -462,6 +476,7 @@ Stream read_stream(const Channels& channels, const StreamMapping& mapping, const
     s.columns[c.column] = std::move(column);
   }
   if (mapping.time != TimeOf::received) count_delays(s, channel, clocks.quickest(mapping));
+  derive_pitch(s, gravity_m_s2);
   turn_angles(s);
   const std::string& counted = mapping.sequence;
   tidy(s, counted.empty() ? nullptr : &field_of(channel, mapping.table, "sequence", counted), span, shared);
@@ -521,7 +536,7 @@ Imported assemble(const Channels& channels, const Mapping& mapping) {
     std::string why;
     if (!left_out(channels, s)) {
       const bool shared = std::ranges::count(mapping.streams, s.channel, &StreamMapping::channel) > 1;
-      Stream stream = read_stream(channels, s, clocks, span, shared);
+      Stream stream = read_stream(channels, s, clocks, span, shared, mapping.header.gravity_m_s2);
       if (stream.t_ns.size() >= 2) {
         if (stream.report.unusable > 0)
           out.report.warnings.push_back(s.name + ": " + std::to_string(stream.report.unusable) +

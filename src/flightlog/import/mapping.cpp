@@ -49,6 +49,8 @@ const std::vector<StreamKeys> kStreams = {
     {"attitude", {"qw", "qx", "qy", "qz"}, {}, {"latency_s", "noise_rad"}, true, true},
 };
 const Names kAngles = {"roll_rad", "pitch_rad", "yaw_rad"};
+/// In place of the pitch: acceleration in W, without gravity.
+const Names kAcceleration = {"acceleration_x_m_s2", "acceleration_y_m_s2", "acceleration_z_m_s2"};
 
 /// A stream's keys, reduced or replaced as its table says: declared inputs, no gyro, no currents, angles.
 StreamKeys narrowed(StreamKeys keys, const io::Table& table, bool declared_inputs) {
@@ -60,6 +62,12 @@ StreamKeys narrowed(StreamKeys keys, const io::Table& table, bool declared_input
   if (keys.name == "power" && !read_currents(table, declared_inputs))
     drop(keys.columns, "current"), drop(keys.declared, "current");
   if (!keys.has_world) return keys;
+  if (keys.name == "mocap" && read_pose_source(table, declared_inputs) == PoseSource::estimate_without_pitch) {
+    keys.columns = {"x_m", "y_m", "z_m", "roll_rad", "yaw_rad"};
+    keys.columns.insert(keys.columns.end(), kAcceleration.begin(), kAcceleration.end());
+    keys.has_frame = keys.has_world = false;
+    return keys;
+  }
   const auto columns = table.optional_table("columns");
   if (columns && std::ranges::any_of(kAngles, [&](const std::string& name) { return columns->has(name); })) {
     std::erase_if(keys.columns, [](const std::string& name) { return name.starts_with('q'); });
@@ -107,6 +115,7 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
   if (keys.has_world) accepted.emplace_back("world");
   if (keys.name != "command") accepted.emplace_back("rate_hz");
   else accepted.insert(accepted.end(), {"inputs", "flown"});
+  if (keys.name == "mocap") accepted.emplace_back("source");
   if (keys.name == "imu") accepted.emplace_back("gyro");
   if (keys.name == "power") accepted.emplace_back("currents");
   table.accept(accepted);
@@ -146,7 +155,7 @@ void read_declared(const io::Table& root, FlightHeader& h) {
   const bool declared = !h.inputs.empty();
   const io::Table mocap = root.table("mocap");
   h.mocap = {rate_of(mocap), mocap.number("latency_s", latency), mocap.number("position_noise_m", non_negative(1)),
-             mocap.number("attitude_noise_rad", non_negative(1))};
+             mocap.number("attitude_noise_rad", non_negative(1)), read_pose_source(mocap, declared)};
   if (!declared || root.has("imu")) {
     const io::Table imu = root.table("imu");
     h.imu.rate_hz = rate_of(imu);

@@ -46,6 +46,9 @@
 //   latency_s = 0.0                          # time used less measured instant; 0 if the stamp is that instant
 //   position_noise_m = 1e-4
 //   attitude_noise_rad = 2e-3
+//   source = "motion_capture"                # default; or, with declared inputs, "estimate": the robot's own. Or
+//                                            # "estimate_without_pitch": columns x_m, y_m, z_m, roll_rad, yaw_rad and
+//                                            # acceleration_x_m_s2, ..., in W without gravity, which give the pitch
 //
 //   [imu]                                    # frame as above; columns are specific force and rate
 //   latency_s, bandwidth_hz, position_m, gyro_noise_rad_s, gyro_bias_sd_rad_s, accel_noise_m_s2

@@ -11,6 +11,7 @@
 #include "flightlog/import/message_rows.hpp"
 #include "flightlog/import/table.hpp"
 #include "flightlog/import/ulog.hpp"
+#include "flightlog/import/usdlog.hpp"
 #include "flightlog/ros/bag.hpp"
 #include "io/files.hpp"
 #include "io/mapped_file.hpp"
@@ -105,7 +106,7 @@ const OtherKind kOtherKinds[] = {
 
 /// InputError for files that are no text, recognised by their first bytes or by the ending of their names.
 void require_text(const fs::path& file, const std::string& ending, std::string_view bytes) {
-  constexpr std::string_view kAccepted = "a bag, a ULog or a CSV";
+  constexpr std::string_view kAccepted = "a bag, a ULog, a usdlog or a CSV";
   for (const OtherKind& kind : kOtherKinds)
     if (bytes.substr(std::min(kind.at, bytes.size())).starts_with(kind.begins))
       throw io::InputError(file.string() + ": is " + std::string(kind.what) + "; accepted: " + std::string(kAccepted) +
@@ -120,10 +121,11 @@ void require_text(const fs::path& file, const std::string& ending, std::string_v
     throw io::InputError(file.string() + ": holds bytes that are no text; accepted: " + std::string(kAccepted));
 }
 
-/// Reads a file that is no bag as a ULog or a table; `plain` is its name without ".gz".
+/// Reads a file that is no bag as a ULog, a usdlog or a table; `plain` is its name without ".gz".
 void read_bytes(const fs::path& file, const fs::path& plain, std::string_view bytes, Channels& channels,
                 std::vector<std::string>& warnings) {
   if (is_ulog(bytes)) return read_ulog(bytes, file.string(), channels, warnings);
+  if (is_usdlog(bytes)) return read_usdlog(bytes, file.string(), channels, warnings);
   require_text(file, plain.extension().string(), bytes);
   const std::string channel = plain.stem().string();
   if (channels.wants(channel)) read_table(bytes, file.string(), channel, channels, warnings);

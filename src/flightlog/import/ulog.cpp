@@ -4,11 +4,11 @@
 #include <array>
 #include <cctype>
 #include <charconv>
-#include <cstring>
 #include <map>
 #include <optional>
 #include <set>
 
+#include "flightlog/import/bytes.hpp"
 #include "io/files.hpp"
 #include "io/text.hpp"
 
@@ -29,13 +29,6 @@ struct Basic {
   std::size_t size;
   double (*read)(const char*);
 };
-
-template <class T>
-double read_as(const char* bytes) {
-  T value;
-  std::memcpy(&value, bytes, sizeof(T));
-  return static_cast<double>(value);
-}
 
 constexpr std::array<Basic, 12> kBasics = {{{"int8_t", 1, read_as<std::int8_t>},
                                             {"uint8_t", 1, read_as<std::uint8_t>},
@@ -241,9 +234,7 @@ class UlogReader {
 
   template <class T>
   static T number(std::string_view bytes) {
-    T value;
-    std::memcpy(&value, bytes.data(), sizeof(T));
-    return value;
+    return number_at<T>(bytes.data());
   }
 
   void take(const Message& message) {

@@ -106,5 +106,21 @@ TEST(CheckInputs, FindADeadColumn) {
   EXPECT_EQ(of_input(reports[0], "servo").verdict, Verdict::ok);
 }
 
+// With the robot's own estimate nothing is compared, and check says so.
+TEST(CheckInputs, AnEstimateIsNoSecondOpinion) {
+  FlightLog log = inputs_log();
+  log.header.mocap.source = PoseSource::estimate;
+  const auto findings_of = [&] {
+    std::vector<std::string> names;
+    for (const Finding& f : check_flight(log).findings) names.push_back(f.check);
+    return names;
+  };
+  EXPECT_EQ(std::ranges::count(findings_of(), "estimate"), 1);
+  EXPECT_EQ(std::ranges::count(findings_of(), "axes"), 0);
+  log.header.mocap.source = PoseSource::motion_capture;
+  EXPECT_EQ(std::ranges::count(findings_of(), "estimate"), 0);
+  EXPECT_EQ(std::ranges::count(findings_of(), "axes"), 1);
+}
+
 }  // namespace
 }  // namespace flappy::flightlog

@@ -701,6 +701,60 @@ TEST(Import, MakesALogOfInputs) {
             "\"flight\"?");
 }
 
+/// A log of the microSD card: it flies from 0.10 s to 0.30 s, leaning forwards by 0.1 rad at a yaw of 90 degrees.
+std::string card_log() {
+  const auto bytes = [](auto value) { return test::UlogText::bytes(value); };
+  std::string text = "\xBC" + bytes(std::uint16_t{2}) + bytes(std::uint16_t{1}) + bytes(std::uint16_t{0}) +
+                     "fixedFrequency" + '\0' + bytes(std::uint16_t{13});
+  for (const char* name :
+       {"motor.m1(I)", "motor.m2(I)", "motor.m3(I)", "motor.m4(I)", "pm.vbatMV(H)", "stateEstimate.x(f)",
+        "stateEstimate.y(f)", "stateEstimate.z(f)", "stateEstimate.ax(f)", "stateEstimate.ay(f)", "stateEstimate.az(f)",
+        "stateEstimate.roll(f)", "stateEstimate.yaw(f)"})
+    text += name + std::string(1, '\0');
+  for (int i = 0; i < 40; ++i) {
+    const bool flies = i >= 10 && i <= 30;
+    text += bytes(std::uint16_t{0}) + bytes(static_cast<std::uint64_t>(5'000'000 + 10'000 * i));
+    for (int m = 0; m < 4; ++m) text += bytes(std::uint32_t{flies ? 65535u / (m + 1) : 0u});
+    text += bytes(std::uint16_t{3700});
+    // at a yaw of 90 degrees the force along y is forwards
+    for (const float x : {0.5f, 0.0f, 1.0f, 0.0f, std::tan(0.1f), 0.0f, 0.0f, 90.0f}) text += bytes(x);
+  }
+  return text;
+}
+
+TEST(Import, DerivesThePitchThatACardLogLacks) {
+  const io::TemporaryFolder folder;
+  std::ofstream(folder / "log00") << card_log();
+  const auto imported = [&](const Lines& overrides) {
+    const Mapping mapping = mapping_of("crazyflie_sd.toml", overrides);
+    Channels channels(mapping.wanted());
+    Lines warnings;
+    read_source(folder / "log00", channels, warnings);
+    return assemble(channels, mapping).log;
+  };
+  const FlightLog log = imported({});
+  EXPECT_EQ(log.header.mocap.source, PoseSource::estimate_without_pitch);
+  ASSERT_EQ(log.mocap.t_s.size(), 21u);
+  EXPECT_DOUBLE_EQ(log.command.declared[1][5], 32767 * 1.5259021896696422e-05);
+  EXPECT_DOUBLE_EQ(log.power->battery_V[5], 3.7);
+  // turned by the yaw, then by 0.1 rad about y
+  const double half = std::numbers::sqrt2 / 2;
+  EXPECT_NEAR(log.mocap.qw[3], half * std::cos(0.05), 1e-6);
+  EXPECT_NEAR(log.mocap.qx[3], -half * std::sin(0.05), 1e-6);
+  EXPECT_NEAR(log.mocap.qy[3], half * std::sin(0.05), 1e-6);
+  EXPECT_NEAR(log.mocap.qz[3], half * std::cos(0.05), 1e-6);
+  EXPECT_EQ(parse_flight_log(flight_log_files(log), "log"), log);
+  EXPECT_NE(test::refusal([&] { imported({"mocap.source=guess"}); }).find("accepted: "), std::string::npos);
+  EXPECT_NE(test::refusal([&] { imported({"mocap.source=estimate"}); }).find("mocap.columns"), std::string::npos);
+}
+
+TEST(Import, AnEstimateIsTooCoarseForVoltages) {
+  EXPECT_NE(test::refusal([&] {
+              mapping_of("ros2.toml", {"mocap.source=estimate"});
+            }).find("is too coarse for motion within a wing beat; accepted: \"motion_capture\""),
+            std::string::npos);
+}
+
 /// Yaw, then pitch about the new y, then roll about the new x, worked out by hand for yaw 90, roll 90: x goes to y, y to z, z to x.
 TEST(Import, TurnsAnglesInTheirOrder) {
   const io::TemporaryFolder folder;

@@ -1,5 +1,5 @@
-// Any bytes must be read as a recording as far as they go, or refused: MCAP, messages in CDR with their definitions, ULog. The first
-// byte says which. Built with libFuzzer (FLAPPY_LIBFUZZER) this searches for bytes that break it; otherwise it replays the files
+// Any bytes must be read as a recording as far as they go, or refused: MCAP, messages in CDR with their definitions, ULog, usdlog. The
+// first byte says which. Built with libFuzzer (FLAPPY_LIBFUZZER) this searches for bytes that break it; otherwise it replays the files
 // and folders it is given.
 #include <cstdint>
 #include <cstdio>
@@ -8,6 +8,7 @@
 
 #include "flightlog/import/message_rows.hpp"
 #include "flightlog/import/ulog.hpp"
+#include "flightlog/import/usdlog.hpp"
 #include "flightlog/ros/bag.hpp"
 #include "flightlog/ros/cdr.hpp"
 #include "flightlog/ros/mcap.hpp"
@@ -52,10 +53,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     if (data[0] == 'm') read_mcap(bytes);
     if (data[0] == 'c') read_message(bytes);
-    if (data[0] == 'u') {
+    if (data[0] == 'u' || (data[0] == 'd' && is_usdlog(bytes))) {
       Channels channels;
       std::vector<std::string> warnings;
-      read_ulog(bytes, "fuzz", channels, warnings);
+      (data[0] == 'u' ? read_ulog : read_usdlog)(bytes, "fuzz", channels, warnings);
     }
   } catch (const ros::MessageError&) {
   } catch (const io::InputError& error) {
