@@ -115,7 +115,10 @@ struct BeatAveraged {
   double nominal_Hz = 0;         ///< approximate beat frequency
   double bandwidth_Hz = 0;       ///< up to which forces and motion are compared, well below the beat frequency
   bool compares_moments = true;  ///< whether a diagnosis compares moments with flights; it always compares forces
-  struct Input {                 ///< a column of command.csv
+  /// Moments are compared as means over seconds: an autopilot counteracts what disturbs the robot, so that from moment
+  /// to moment inputs follow disturbances, and on the mean they say which actuator works harder.
+  bool trims = false;
+  struct Input {  ///< a column of command.csv
     std::string name;
     double low = 0, high = 0;
     double neutral = 0;              ///< value while no controller is connected
@@ -126,6 +129,7 @@ struct BeatAveraged {
     std::string name, input;
     Role role = Role::other;
     double gain = 1, offset = 0, lag_s = 0;
+    double load_share = 1;  ///< factor on its loads; no part of a file (model/effects/actuator_loss.hpp)
   };
   struct Wrench {  ///< in B, at a point: force_x_N to moment_z_Nm as expressions, "" for zero
     std::string name;

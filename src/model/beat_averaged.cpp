@@ -169,11 +169,14 @@ BeatAveragedWrench::BeatAveragedWrench(const BeatAveraged& vehicle) {
         throw std::invalid_argument(fault.what);
       }
       for (const Monomial& m : sum) {
-        products_.push_back({k, m.factor, m.variables});
+        double factor = m.factor;
+        for (std::size_t i = 0; i < vehicle.actuators.size(); ++i)
+          if (std::ranges::count(m.variables, i) > 0) factor *= vehicle.actuators[i].load_share;
+        products_.push_back({k, factor, m.variables});
         if (k >= 3) continue;
         const std::size_t next = (k + 1) % 3, last = (k + 2) % 3;
-        if (at[last] != 0) products_.push_back({3 + next, m.factor * at[last], m.variables});
-        if (at[next] != 0) products_.push_back({3 + last, -m.factor * at[next], m.variables});
+        if (at[last] != 0) products_.push_back({3 + next, factor * at[last], m.variables});
+        if (at[next] != 0) products_.push_back({3 + last, -factor * at[next], m.variables});
       }
     }
   }
@@ -210,6 +213,7 @@ BeatAveraged read_beat_averaged(const io::Table& root, bool predicted) {
   v.nominal_Hz = beat.number("nominal_Hz", {1e-3, 1e4});
   v.bandwidth_Hz = beat.number("bandwidth_Hz", {1e-3, v.nominal_Hz / 2});
   v.compares_moments = beat.boolean_or("compares_moments", true);
+  v.trims = beat.boolean_or("trims", false);
   const io::Range any{-kLargest, kLargest};
   const auto each = [&](const char* key, const auto& read) {
     if (predicted && !root.has(key)) return;
@@ -281,6 +285,7 @@ std::string beat_averaged_text(const BeatAveraged& v) {
   number("beat.nominal_Hz", v.nominal_Hz);
   number("beat.bandwidth_Hz", v.bandwidth_Hz);
   if (!v.compares_moments) line("beat.compares_moments", "false");
+  if (v.trims) line("beat.trims", "true");
   for (const BeatAveraged::Input& i : v.inputs) text += input_text(i);
   for (const BeatAveraged::Actuator& a : v.actuators) {
     line("actuator." + a.name + ".input", io::toml_string(a.input));

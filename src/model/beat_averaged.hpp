@@ -3,7 +3,7 @@
 //
 //   model = "beat_averaged"
 //   [beat]                     # nominal_Hz, bandwidth_Hz; compares_moments = false: moments are not compared,
-//                              #   because the autopilot counteracts them in flights
+//                              #   because the autopilot counteracts them in flights; trims = true: their means are
 //   [torso]                    # the whole robot: mass_kg, com_m, inertia_kg_m2
 //   [input.left_flap]          # a column of command.csv: low, high; in flight it is, within low and high,
 //                              #   neutral + amplitude A + difference D + bias B + split_cycle S

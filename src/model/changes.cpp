@@ -6,6 +6,7 @@
 #include "io/config.hpp"
 #include "io/text.hpp"
 #include "io/toml_writer.hpp"
+#include "model/effects/add_mass.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::model {
@@ -28,21 +29,6 @@ void swap_effects(Vehicle& v) {
       if (name.starts_with("left_"))
         if (const auto right = values.find("right_" + name.substr(5)); right != values.end())
           std::swap(value, right->second);
-}
-
-void add_mass(double mass_kg, const std::array<double, 3>& at, RigidBody& torso) {
-  const double all = torso.mass_kg + mass_kg, reduced = torso.mass_kg * mass_kg / all;
-  const double d[3] = {at[0] - torso.com_m.x, at[1] - torso.com_m.y, at[2] - torso.com_m.z};
-  InertiaTensor& i = torso.inertia_kg_m2;
-  i.xx += reduced * (d[1] * d[1] + d[2] * d[2]);
-  i.yy += reduced * (d[0] * d[0] + d[2] * d[2]);
-  i.zz += reduced * (d[0] * d[0] + d[1] * d[1]);
-  i.xy -= reduced * d[0] * d[1];
-  i.yz -= reduced * d[1] * d[2];
-  i.xz -= reduced * d[0] * d[2];
-  const double share = mass_kg / all;
-  torso.com_m = {torso.com_m.x + share * d[0], torso.com_m.y + share * d[1], torso.com_m.z + share * d[2]};
-  torso.mass_kg = all;
 }
 
 }  // namespace
@@ -98,7 +84,10 @@ void apply(const Changes& c, Vehicle& v) {
     std::swap(v.left.planform, v.right.planform);
     swap_effects(v);
   }
-  if (c.added_mass_kg > 0) add_mass(c.added_mass_kg, c.added_at_m, v.torso);
+  if (c.added_mass_kg > 0) {
+    const double at[] = {c.added_at_m[0], c.added_at_m[1], c.added_at_m[2]};
+    add_mass(c.added_mass_kg, at, v.torso);
+  }
   for (const std::string& id : c.without) v.effects.erase(id);
 }
 

@@ -38,6 +38,9 @@ struct BeatAveragedBody {
   T late_steps;  // delay of the inputs, in steps
 };
 
+/// Numbers that a weight on a line remembers.
+inline constexpr std::size_t kHanging = static_cast<std::size_t>(model::kRows<model::Hanging>);
+
 inline constexpr int kBeatAveragedEffects = std::tuple_size_v<model::BeatAveragedEffects>;
 template <int I>
 using BeatAveragedEffectAt = std::tuple_element_t<static_cast<std::size_t>(I), model::BeatAveragedEffects>;
@@ -50,6 +53,13 @@ constexpr int beat_averaged_rows_before() {
     return beat_averaged_rows_before<I - 1>() +
            static_cast<int>(model::beat_averaged_parameters<BeatAveragedEffectAt<I - 1>>().size());
 }
+
+template <class Effect, int I = 0>
+constexpr int beat_averaged_index() {
+  if constexpr (std::is_same_v<BeatAveragedEffectAt<I>, Effect>) return I;
+  else return beat_averaged_index<Effect, I + 1>();
+}
+inline constexpr int kSlungLoad = beat_averaged_index<model::SlungLoad>();
 
 }  // namespace FLAPPY_ISA
 
@@ -81,11 +91,15 @@ struct BeatAveragedProgram {
   std::size_t product_row() const { return actuator_row() + actuators.size() * model::kRows<BeatAveragedActuator>; }
   std::size_t body_row() const { return product_row() + products.size(); }
   std::size_t effect_row() const { return body_row() + model::kRows<BeatAveragedBody>; }
+  /// Numbers of the memory before the inputs.
+  std::size_t memory_before_inputs() const { return 1 + kHanging + actuators.size(); }
+  /// Mass of a weight on a line.
+  std::size_t hanging_row() const { return effect_row() + beat_averaged_rows_before<kSlungLoad>(); }
   std::size_t rows() const { return effect_row() + beat_averaged_rows_before<kBeatAveragedEffects>(); }
 };
 
 /// Pointers to the data of one block, plain, because kernels must not share code. Order of the memory: whether the
-/// robot has flown, the actuators, then the inputs of the last `slots` steps.
+/// robot has flown, a weight on a line, the actuators, then the inputs of the last `slots` steps.
 template <class T>
 struct BeatAveragedRows {
   const T* rows = nullptr;

@@ -151,7 +151,7 @@ template <class T>
 void Batch<T>::Storage::put_beat_averaged(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory) {
   if (!beat_averaged) return;
   if (memory.size() > beat_averaged->memory_rows())
-    keep_inputs((memory.size() - 1 - beat_averaged->program.actuators.size()) / beat_averaged->program.inputs);
+    keep_inputs((memory.size() - beat_averaged->program.memory_before_inputs()) / beat_averaged->program.inputs);
   T* row = beat_averaged->row_of(i);
   for (std::size_t k = 0; k < rows.size(); ++k) row[k * kLanes<T>] = rows[k];
   std::size_t k = 0;

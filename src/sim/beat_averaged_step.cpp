@@ -35,7 +35,8 @@ class BeatAveragedLanes {
         first_(first),
         body_(load_rows<BeatAveragedBody<L>>(rows(beat_averaged.body_row), first)),
         parameters_(view_rows<Parameters<L>>(block.parameters, first)) {
-    for (std::size_t k = 0; k < rows_of_.actuator_count; ++k) end_[k] = memory(1 + k);
+    weight_ = {memory(1), memory(2), memory(3), memory(4)};
+    for (std::size_t k = 0; k < rows_of_.actuator_count; ++k) end_[k] = memory(kActuatorRow + k);
   }
 
   const BeatAveragedBody<L>& body() const { return body_; }
@@ -76,24 +77,32 @@ class BeatAveragedLanes {
     if (flapping > 0) beat_share_ = L(1 / (flapping * rows_of_.nominal_Hz)) * beat_share_;
   }
 
+  /// For a robot that has not flown: a weight on a line hangs at rest.
+  void hang(const Body<L>& x) {
+    const auto fresh = memory(0) == L(0);
+    if (!any(fresh)) return;
+    const BeatAveragedState<L> s = state_of(x);
+    for_effects([&]<class Effect>(const auto& q) {
+      if constexpr (requires { Effect::beat_averaged_hang(q, s, weight_); }) {
+        Hanging<L> rest = weight_;
+        Effect::beat_averaged_hang(q, s, rest);
+        weight_ = {where(fresh, rest.x_m, weight_.x_m), where(fresh, rest.y_m, weight_.y_m),
+                   where(fresh, rest.velocity_x_m_s, weight_.velocity_x_m_s),
+                   where(fresh, rest.velocity_y_m_s, weight_.velocity_y_m_s)};
+      }
+    });
+  }
+
+  void swing(const Body<L>& x) {
+    for_effects([&]<class Effect>(const auto& q) {
+      if constexpr (requires { Effect::beat_averaged_hang(q, state_of(x), weight_); })
+        Effect::beat_averaged_swing(q, state_of(x), L(plan_.step_s), weight_);
+    });
+  }
+
   Acceleration<L> accelerate(const Body<L>& x) const {
-    const L zero(0);
-    const Matrix3<L> R = rotation_matrix(x.attitude);
-    BeatAveragedState<L> s{R,
-                           x.com_m - R * body_.com_m,
-                           transpose_times(R, x.velocity_m_s) - cross(x.rate_rad_s, body_.com_m),
-                           x.rate_rad_s,
-                           {zero, zero, zero},
-                           body_.com_m,
-                           body_.mass_kg,
-                           L(plan_.gravity_m_s2),
-                           parameters_.air_density_kg_m3,
-                           L(plan_.ground_z_m),
-                           beat_share_,
-                           stroke_plane_,
-                           stroke_plane_1_s_,
-                           {zero, zero, zero},
-                           zero};
+    BeatAveragedState<L> s = state_of(x);
+    const Matrix3<L>& R = s.attitude;
     for_effects([&]<class Effect>(const auto& q) {
       if constexpr (requires { Effect::beat_averaged_wind(q, s, s.wind_B_m_s); })
         Effect::beat_averaged_wind(q, s, s.wind_B_m_s);
@@ -115,11 +124,36 @@ class BeatAveragedLanes {
 
   void store(typename L::Mask moves) const {
     where(moves, L(1), memory(0)).store(memory_at(0));
+    const L weight[] = {weight_.x_m, weight_.y_m, weight_.velocity_x_m_s, weight_.velocity_y_m_s};
+    for (std::size_t k = 0; k < kHanging; ++k) where(moves, weight[k], memory(1 + k)).store(memory_at(1 + k));
     for (std::size_t k = 0; k < rows_of_.actuator_count; ++k)
-      where(moves, end_[k], memory(1 + k)).store(memory_at(1 + k));
+      where(moves, end_[k], memory(kActuatorRow + k)).store(memory_at(kActuatorRow + k));
   }
 
  private:
+  static constexpr std::size_t kActuatorRow = 1 + kHanging;
+
+  BeatAveragedState<L> state_of(const Body<L>& x) const {
+    const L zero(0);
+    const Matrix3<L> R = rotation_matrix(x.attitude);
+    return {R,
+            x.com_m - R * body_.com_m,
+            transpose_times(R, x.velocity_m_s) - cross(x.rate_rad_s, body_.com_m),
+            x.rate_rad_s,
+            {zero, zero, zero},
+            body_.com_m,
+            body_.mass_kg,
+            L(plan_.gravity_m_s2),
+            parameters_.air_density_kg_m3,
+            L(plan_.ground_z_m),
+            beat_share_,
+            stroke_plane_,
+            stroke_plane_1_s_,
+            {zero, zero, zero},
+            zero,
+            weight_};
+  }
+
   const T (*rows(std::size_t row) const)[kLanes<T>] {
     return reinterpret_cast<const T(*)[kLanes<T>]>(rows_of_.rows) + row;
   }
@@ -144,7 +178,7 @@ class BeatAveragedLanes {
   }
 
   std::size_t row_of(std::size_t slot, std::size_t input) const {
-    return 1 + rows_of_.actuator_count + slot * rows_of_.inputs + input;
+    return kActuatorRow + rows_of_.actuator_count + slot * rows_of_.inputs + input;
   }
 
   /// Stores the inputs of a step, and replaces them by the inputs that arrive now, after the delay.
@@ -204,6 +238,7 @@ class BeatAveragedLanes {
   const Parameters<L> parameters_;
   L input_[kMaxInputs], value_[kMaxActuators], end_[kMaxActuators];  // in mid-step; at the end of the step
   L stroke_plane_{0.0}, stroke_plane_1_s_{0.0}, beat_share_{0.0};
+  Hanging<L> weight_;
 };
 
 template <class L>
@@ -241,6 +276,7 @@ void step_mean_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& 
     const Vec3<L> from_origin_m = lanes.body().com_m;
     Body<L> body{x.position_m + rotation_matrix(x.attitude) * from_origin_m, x.com_velocity_m_s, x.attitude,
                  x.body_rate_rad_s};
+    lanes.hang(body);
     for (int i = 0; i < steps; ++i) {
       lanes.drive(first_step + i);
       const Body<L> before = body;
@@ -250,6 +286,7 @@ void step_mean_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& 
       middle.velocity_m_s = add_scaled(body.velocity_m_s, half, now.linear_m_s2);
       middle.rate_rad_s = add_scaled(body.rate_rad_s, half, now.angular_rad_s2);
       const Acceleration<L> a = lanes.accelerate(middle);
+      lanes.swing(middle);
       body.velocity_m_s = add_scaled(body.velocity_m_s, step, a.linear_m_s2);
       body.rate_rad_s = add_scaled(body.rate_rad_s, step, a.angular_rad_s2);
       drift(body, half);

@@ -46,7 +46,7 @@ struct BeatAveragedStorage {
   std::size_t slots = 0;        // number of steps whose inputs are remembered
   std::uint64_t effects = 0;    // bits of BeatAveragedEffects that any robot has
 
-  std::size_t memory_rows() const { return 1 + program.actuators.size() + slots * program.inputs; }
+  std::size_t memory_rows() const { return program.memory_before_inputs() + slots * program.inputs; }
   /// First number of a robot; the next ones follow kLanes apart.
   T* row_of(std::size_t i) { return &rows[i / kLanes<T> * program.rows() * kLanes<T> + i % kLanes<T>]; }
   T* memory_of(std::size_t i) { return &memory[i / kLanes<T> * memory_rows() * kLanes<T> + i % kLanes<T>]; }
@@ -54,7 +54,7 @@ struct BeatAveragedStorage {
   /// which determines the slots.
   void for_memory_by_age(std::size_t i, std::int64_t steps, const auto& use) {
     T* const own = memory_of(i);
-    const std::size_t before = 1 + program.actuators.size();
+    const std::size_t before = program.memory_before_inputs();
     for (std::size_t k = 0; k < before; ++k) use(own[k * kLanes<T>]);
     for (std::size_t age = 0; age < slots; ++age) {
       const std::size_t slot = (static_cast<std::size_t>(steps) % slots + slots - 1 - age) % slots;
@@ -79,11 +79,14 @@ struct BeatAveragedStorage {
             p.body_row(),
             p.effect_row()};
   }
-  /// Calls `use(number)` for each number that influences motion: past inputs only if the robot has a delay.
+  /// Calls `use(number)` for each number that influences motion: past inputs only if the robot has a delay, a hanging
+  /// weight only if it has one.
   void for_memory(std::size_t i, const auto& use) {
     const bool late = row_of(i)[(program.effect_row() - 1) * kLanes<T>] > 0;  // BeatAveragedBody::late_steps
-    const std::size_t used = late ? memory_rows() : 1 + program.actuators.size();
-    for (std::size_t k = 0; k < used; ++k) use(memory_of(i)[k * kLanes<T>]);
+    const bool hangs = row_of(i)[program.hanging_row() * kLanes<T>] > 0;
+    const std::size_t used = late ? memory_rows() : program.memory_before_inputs();
+    for (std::size_t k = 0; k < used; ++k)
+      if (hangs || k == 0 || k > kHanging) use(memory_of(i)[k * kLanes<T>]);
   }
 };
 

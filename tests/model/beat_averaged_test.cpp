@@ -68,7 +68,7 @@ TEST(BeatAveraged, NamesWhatIsNoExpression) {
 }
 
 TEST(BeatAveraged, ShippedVehiclesReadBackAsTheyWere) {
-  for (const char* name : {"flapper_nimble", "crazyflie"}) {
+  for (const char* name : {"flapper_nimble", "crazyflie", "crazyflie_sd"}) {
     SCOPED_TRACE(name);
     Vehicle v = read_any_vehicle(test::source_path("configs/vehicles/" + std::string(name) + ".toml"));
     v.effects["flapping_counter_force"] = {{"x_per_s", 1.5}, {"y_per_s", 0}, {"z_per_s", 0.25}};
@@ -234,6 +234,51 @@ TEST(BeatAveragedEffects, FollowTheirEquations) {
   // d = (0.1, 0, 0): w x (w x d) = -4 d, a x d = (0, 3, 0) x d = (0, 0, -0.3)
   expect_near(seen_of("marker_offset", {0.1, 0, 0}), {-0.4, 0, -0.3});
   expect_near(seen_of("mocap_tilt", {0.01, 0.02}), {0.02 * 9.81, -0.01 * 9.81, 0});
+}
+
+// 20 g on a line of 0.5 m that is 0.1 m ahead of its hook: weight 0.1962 N, a fifth of it forwards.
+TEST(BeatAveragedEffects, ASlungLoadPullsAtItsHook) {
+  BeatAveragedState<double> s = state();
+  s.weight = {0.05 + 0.1, 0, 0, 0};
+  BeatAveragedLoads<double> load{};
+  const std::vector<double> q = {0.02, 0.02 * 0.05, 0, 0.5, -0.01};
+  find_effect(known_by_the_beat(), "slung_load")->averaged.load(q.data(), s, load);
+  EXPECT_NEAR(load.force_N.x, 0.03924, 1e-12);
+  EXPECT_NEAR(load.force_N.z, -0.1962, 1e-12);
+  EXPECT_NEAR(load.moment_Nm.x, 0, 1e-12);
+  EXPECT_NEAR(load.moment_Nm.y, -0.01 * 0.03924 + 0.05 * 0.1962, 1e-12);
+  EXPECT_NEAR(load.moment_Nm.z, 0, 1e-12);
+}
+
+// 50 g, 3 cm ahead of the middle of a robot of 100 g: the centre of mass is 1 cm ahead, and a reduced mass of 33.3 g at 3 cm turns with it.
+TEST(BeatAveragedEffects, APayloadMovesTheCentreOfMass) {
+  Vehicle v = known_by_the_beat();
+  v.torso.mass_kg = 0.1;
+  v.torso.inertia_kg_m2 = {1e-4, 2e-4, 3e-4, 0, 0, 0};
+  const std::vector<double> q = {0.05, 0.05 * 0.03, 0, 0};
+  find_effect(v, "payload")->change(q.data(), v);
+  EXPECT_NEAR(v.torso.mass_kg, 0.15, 1e-15);
+  EXPECT_NEAR(v.torso.com_m.x, 0.01, 1e-15);
+  EXPECT_NEAR(v.torso.inertia_kg_m2.xx, 1e-4, 1e-15);
+  EXPECT_NEAR(v.torso.inertia_kg_m2.yy, 2.3e-4, 1e-15);
+  EXPECT_NEAR(v.torso.inertia_kg_m2.zz, 3.3e-4, 1e-15);
+}
+
+// A tenth of the left wing's thrust, its moment and its damping are lost; what the right wing and the body do stays.
+TEST(BeatAveragedEffects, ALostActuatorTakesItsLoadsAlong) {
+  Vehicle v = known_by_the_beat();
+  BeatAveraged& b = *v.beat_averaged;
+  b.actuators.push_back({"right_Hz", "left", BeatAveraged::Role::flapping, 25, 0, 0});
+  b.wrenches = {{"left", {0, 0.2, 0}, {"", "", "left_Hz^2", "", "", ""}},
+                {"right", {0, -0.2, 0}, {"", "", "right_Hz^2", "", "", ""}},
+                {"both", {}, {"0.5", "", "", "", "", "-left_Hz * w_z - right_Hz * w_z"}}};
+  const std::vector<double> q = {0.1, 0, 0, 0};
+  find_effect(v, "actuator_loss")->change(q.data(), v);
+  const BeatAveragedLoad load = BeatAveragedWrench(b).at(std::vector<double>{3, 3, 0, 0, 0, 0, 0, 0, 2, 1});
+  EXPECT_DOUBLE_EQ(load.force_N[0], 0.5);
+  EXPECT_DOUBLE_EQ(load.force_N[2], 0.9 * 9 + 9);
+  EXPECT_NEAR(load.moment_Nm[0], 0.2 * (0.9 * 9 - 9), 1e-12);
+  EXPECT_DOUBLE_EQ(load.moment_Nm[2], -2 * (0.9 * 3 + 3));
 }
 
 TEST(BeatAveragedEffects, AreNoneWithoutSizes) {

@@ -188,6 +188,44 @@ TEST(BeatAveragedStep, EffectsActByTheirMeans) {
   EXPECT_NEAR(after_a_second(v, 9.81, 0).position_m[2], -9.81 / 2, 1e-9);
 }
 
+// A flying robot takes a weight along, which hung at rest: two masses and a line, against an integration of its own.
+TEST(BeatAveragedStep, ASlungLoadSwings) {
+  Vehicle v = flapper();
+  v.torso.com_m = {};
+  const double mass = 0.03, length = 0.3, gravity = 9.81, damping = 2 * 0.05 * std::sqrt(gravity / length);
+  v.effects["slung_load"] = {
+      {"mass_kg", mass}, {"length_m", length}, {"moment_x_kg_m", 0}, {"moment_y_kg_m", 0}, {"z_m", 0}};
+  double x = 0, speed = 2, at = 0, swings = 0;
+  constexpr double kStep_s = 1e-6;
+  for (int i = 0; i < 1'000'000; ++i) {
+    swings += kStep_s * (gravity / length * (x - at) - damping * swings);
+    speed += kStep_s * mass * gravity / length / v.torso.mass_kg * (at - x);
+    at += kStep_s * swings;
+    x += kStep_s * speed;
+  }
+  const FlapperState s = after_a_second(v, gravity, 2);
+  EXPECT_NEAR(s.velocity_m_s[0], speed, 2e-3);
+  EXPECT_NEAR(s.position_m[0], x, 1e-3);
+  EXPECT_LT(speed, 1.9);
+  EXPECT_NEAR(s.velocity_m_s[2], -gravity * (1 + mass / v.torso.mass_kg), 1e-6);
+}
+
+// Robots of one batch share their expressions: one with a torn wing sinks, the other hovers.
+TEST(BeatAveragedStep, ALostActuatorIsARobotsOwn) {
+  Vehicle v = flapper(), torn = v;
+  // in the order of names: dihedral, left_Hz, right_Hz, yaw_throw
+  torn.effects["actuator_loss"] = {{"loss_1", 0}, {"loss_2", 0.1}, {"loss_3", 0.1}};
+  Batch<double> batch(2, v, options(1e-3));
+  batch.set_vehicle(1, torn);
+  for (int i = 0; i < 2; ++i) {
+    batch.reset(i, {}, Start::flying);
+    batch.set_input(i, {0.588, 0, 0, 0});
+  }
+  batch.step(100);
+  EXPECT_NEAR(batch.state(1).velocity_m_s[2] - batch.state(0).velocity_m_s[2],
+              -0.1 * 0.0344 * 25 * 0.588 * 2 / v.torso.mass_kg * 0.1, 1e-6);
+}
+
 /// When an input that begins after 50 ms has shown: the thrust from its change of speed, step by step.
 std::vector<double> thrust_of(const Vehicle& v) {
   BatchOptions o = options(1e-3);

@@ -4,6 +4,8 @@
 //   beat_averaged_wind(parameters, state, Vec3&)                 velocity of the air, in B
 //   beat_averaged_load(parameters, state, BeatAveragedLoads&)    force and moment in addition to those of the file
 //   beat_averaged_seen(parameters, state, Vec3&)                 specific force as motion capture shows it
+//   beat_averaged_hang(parameters, state, Hanging&)              where a weight on a line hangs at rest
+//   beat_averaged_swing(parameters, state, step_s, Hanging&)     how it swings in a step
 // and `vehicle` of effect.hpp. If these stages need other parameters, the effect has kBeatAveragedParameters, of which
 // the first kBeatAveragedMagnitudes are magnitudes.
 #pragma once
@@ -20,6 +22,12 @@ struct BeatAveragedDrive {
   T battery_gain{0};  ///< flapping actuators are multiplied by 1 + gain (battery / nominal - 1)
 };
 
+/// A weight on a line: its horizontal place and velocity in W.
+template <class T>
+struct Hanging {
+  T x_m, y_m, velocity_x_m_s, velocity_y_m_s;
+};
+
 template <class T>
 struct BeatAveragedState {
   Matrix3<T> attitude;     ///< R_WB
@@ -32,6 +40,7 @@ struct BeatAveragedState {
   T stroke_plane, stroke_plane_1_s;  ///< sum of the actuators that tilt the stroke plane, and its rate
   Vec3<T> wind_B_m_s;                ///< known from beat_averaged_load() on, like thrust_N
   T thrust_N;                        ///< force of the vehicle's expressions along z of B
+  Hanging<T> weight;                 ///< known from beat_averaged_load() on
 };
 
 /// Force and moment about the centre of mass, in B.
@@ -60,6 +69,8 @@ struct BeatAveragedStages {
   void (*wind)(const double*, const BeatAveragedState<double>&, Vec3<double>&) = nullptr;
   void (*load)(const double*, const BeatAveragedState<double>&, BeatAveragedLoads<double>&) = nullptr;
   void (*seen)(const double*, const BeatAveragedState<double>&, Vec3<double>&) = nullptr;
+  void (*hang)(const double*, const BeatAveragedState<double>&, Hanging<double>&) = nullptr;
+  void (*swing)(const double*, const BeatAveragedState<double>&, const double&, Hanging<double>&) = nullptr;
 };
 
 }  // namespace flappy::model

@@ -51,6 +51,12 @@ CatalogueEffect averaged_effect() {
   if constexpr (requires { Effect::template beat_averaged_seen<double>; })
     e.averaged.seen =
         staged<Effect::template beat_averaged_seen<double>, kCount, const BeatAveragedState<double>&, Vec3<double>&>;
+  if constexpr (requires { Effect::template beat_averaged_swing<double>; }) {
+    e.averaged.hang =
+        staged<Effect::template beat_averaged_hang<double>, kCount, const BeatAveragedState<double>&, Hanging<double>&>;
+    e.averaged.swing = staged<Effect::template beat_averaged_swing<double>, kCount, const BeatAveragedState<double>&,
+                              const double&, Hanging<double>&>;
+  }
   return e;
 }
 
@@ -162,6 +168,8 @@ const CatalogueEffect& effect_within_beat(const std::string& id) {
 }
 
 bool is_effect(const std::string& id) { return effect_named(id) != nullptr; }
+
+Stage stage_of(const std::string& id) { return effect_named(id)->info.stage; }
 
 std::string group_of(const std::string& id) {
   const CatalogueEffect* entry = effect_named(id);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "model/effects/accelerometer_misalignment.hpp"
+#include "model/effects/actuator_loss.hpp"
 #include "model/effects/added_mass.hpp"
 #include "model/effects/battery_sag.hpp"
 #include "model/effects/battery_thrust.hpp"
@@ -28,8 +29,10 @@
 #include "model/effects/marker_offset.hpp"
 #include "model/effects/mocap_delay.hpp"
 #include "model/effects/mocap_tilt.hpp"
+#include "model/effects/payload.hpp"
 #include "model/effects/residual.hpp"
 #include "model/effects/rotational_lift.hpp"
+#include "model/effects/slung_load.hpp"
 #include "model/effects/spring_hardening.hpp"
 #include "model/effects/stop_compliance.hpp"
 #include "model/effects/stroke_plane_actuation.hpp"
@@ -57,9 +60,10 @@ using Effects =
                WallEffect, BodyDrag, Tether, GyroBias, AccelerometerMisalignment, VibrationRectification, MocapTilt,
                MarkerOffset, MocapDelay, Residual>;
 
-using BeatAveragedEffects = std::tuple<ComOffset, InertiaProducts, CommandDelay, DriverBandwidth, BatteryThrust, Wind,
-                                       GroundEffect, BodyDrag, Tether, FlappingCounterForce, TranslationalLift,
-                                       StrokePlaneActuation, ThrustAxisTilt, MocapTilt, MarkerOffset>;
+using BeatAveragedEffects =
+    std::tuple<ComOffset, InertiaProducts, Payload, ActuatorLoss, CommandDelay, DriverBandwidth, BatteryThrust, Wind,
+               GroundEffect, BodyDrag, Tether, SlungLoad, FlappingCounterForce, TranslationalLift, StrokePlaneActuation,
+               ThrustAxisTilt, MocapTilt, MarkerOffset>;
 
 inline constexpr int kEffects = std::tuple_size_v<Effects>;
 static_assert(kEffects <= 64, "a set of effects is a word");
@@ -121,6 +125,8 @@ int effect_index(const char* id);
 /// The entry of effects() with this id, which has to exist.
 const CatalogueEffect& effect_within_beat(const std::string& id);
 bool is_effect(const std::string& id);
+/// Of an effect of any catalogue, which has to exist.
+Stage stage_of(const std::string& id);
 /// The group of an effect (EffectInfo::group), or its own id if it has no group.
 std::string group_of(const std::string& id);
 std::vector<std::string> whole_group(const std::vector<CatalogueEffect>& catalogue, const std::string& id);
