@@ -8,8 +8,7 @@
 #include "gap/diagnose/contrast_warnings.hpp"
 #include "gap/diagnose/corrected_vehicle.hpp"
 #include "gap/diagnose/result.hpp"
-#include "gap/replay/beat_averaged_prediction.hpp"
-#include "gap/replay/reset_prediction.hpp"
+#include "gap/replay/prediction.hpp"
 #include "io/config.hpp"
 #include "model/effects/registry.hpp"
 
@@ -122,11 +121,14 @@ DiagnosisRequest read_request(const DiagnosisSettings& settings) {
   options.residual = s.residual;
   if (s.residual && beat_averaged)
     throw io::InputError("--residual: is not for a beat-averaged vehicle; accepted: a vehicle with wings");
-  options.discrepancy = read_model_discrepancy(file(s.discrepancy, "model_discrepancy.toml"));
-  const bool contrast = !s.reference.empty() && !beat_averaged;
-  options.rule = read_verdict_rule(file(s.verdict, contrast ? "contrast_verdict.toml" : "verdict.toml"));
-  if (!s.reference.empty())
-    options.discrepancy.session = s.sessions.empty() ? read_session_variation() : read_session_variation(s.sessions);
+  const bool contrast = !s.reference.empty();
+  // what a beat-averaged model gets wrong counts as noise, but in a contrast it cancels
+  options.discrepancy = read_model_discrepancy(
+      file(s.discrepancy, contrast && beat_averaged ? "contrast_discrepancy.toml" : "model_discrepancy.toml"));
+  options.rule =
+      read_verdict_rule(contrast && s.verdict.empty() ? fs::path(io::config_path("gap/contrast_verdict.toml"))
+                                                      : file(s.verdict, "verdict.toml"));
+  if (contrast) options.discrepancy.session = read_session_variation(file(s.sessions, "session_variation.toml"));
   return {s,
           std::move(sets),
           std::move(vehicle),
@@ -145,13 +147,6 @@ struct Reference {
   std::unique_ptr<const RobotFit> fit;
 };
 
-std::shared_ptr<PredictedFlight> predicted(const DiagnosisRequest& request, const std::string& folder,
-                                           flightlog::FlightLog log) {
-  if (request.vehicle.beat_averaged)
-    return std::make_shared<BeatAveragedPrediction>(folder, std::move(log), request.vehicle, request.channels);
-  return std::make_shared<ResetPrediction>(Recording(folder, std::move(log), request.vehicle));
-}
-
 Diagnosed diagnose_flights(const DiagnosisRequest& request, const std::vector<std::string>& tests, Reference& reference,
                            const std::function<bool(double share, const std::string& what)>& progress) {
   const std::size_t references = request.settings.reference.size();
@@ -169,13 +164,13 @@ Diagnosed diagnose_flights(const DiagnosisRequest& request, const std::vector<st
   }
   while (reference.flights.size() < references) {
     const std::size_t f = reference.flights.size();
-    const auto flight = predicted(request, folders[f], std::move(logs[f]));
+    const auto flight = prediction_of(request.vehicle, folders[f], std::move(logs[f]), request.channels);
     flight->set_reference();
     reference.flights.push_back(flight);
   }
   d.flights = reference.flights;
   for (std::size_t f = references; f < logs.size(); ++f)
-    d.flights.push_back(predicted(request, folders[f], std::move(logs[f])));
+    d.flights.push_back(prediction_of(request.vehicle, folders[f], std::move(logs[f]), request.channels));
   InferenceOptions options = request.options;
   options.progress = progress;
   if (references > 0 && !reference.fit) {
@@ -215,10 +210,11 @@ void fly_closed_loop(const DiagnosisRequest& request, Diagnosed& d) {
 }
 
 void propose_experiment(const DiagnosisRequest& request, Diagnosed& d) {
-  if (!d.corrected || request.vehicle.beat_averaged || !request.settings.reference.empty()) return;
+  if (!d.corrected || request.vehicle.beat_averaged) return;
   if (d.inference.hypotheses.size() < 2 || d.inference.hypotheses[1].probability < kMinRival) return;
   NextOptions options;
   options.threads = request.settings.threads;
+  options.references = references_of(d.flights);
   options.discrepancy = request.options.discrepancy;
   options.rule = request.options.rule;
   const std::vector<NextExperiment> ranked = rank_experiments(d.inference, *d.uncertain, request.manoeuvres, options);

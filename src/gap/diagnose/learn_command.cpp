@@ -6,7 +6,8 @@
 #include "flappy/vehicle_file.hpp"
 #include "flightlog/check/data_faults.hpp"
 #include "gap/evidence/learn_discrepancy.hpp"
-#include "gap/replay/reset_prediction.hpp"
+#include "gap/replay/prediction.hpp"
+#include "gap/replay/recording.hpp"
 #include "io/config.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
@@ -36,7 +37,7 @@ void read_flights(const std::string& from, const model::Vehicle& vehicle, bool r
     if (const auto faults = data_faults(log, folder); !faults.empty())
       throw io::InputError(faults.front().file + ":" + std::to_string(faults.front().line) + ": " +
                            faults.front().what + "; accepted: flights that flappy-gap check finds no fault in");
-    const auto flight = std::make_shared<ResetPrediction>(Recording(folder, std::move(log), vehicle));
+    const auto flight = prediction_of(vehicle, folder, std::move(log));
     if (reference) flight->set_reference();
     to.push_back(flight);
   }
@@ -50,7 +51,8 @@ std::string learnt_from(std::size_t count, const char* of) {
 
 void run_learn_discrepancy(const LearnCommand& command) {
   io::check_output(command.out);
-  const model::Vehicle vehicle = model::read_vehicle_for_steps(command.vehicle, kHoldStep_s);
+  model::Vehicle vehicle = model::read_any_vehicle(command.vehicle);
+  if (!vehicle.beat_averaged) vehicle = model::read_vehicle_for_steps(command.vehicle, kHoldStep_s);
   const sim::Randomisation uncertain = sim::read_randomisation(vehicle, io::Config::load(command.priors).root());
   ModelDiscrepancy start = read_model_discrepancy(command.discrepancy);
   if (command.robots.empty() == command.pairs.empty())

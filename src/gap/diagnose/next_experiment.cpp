@@ -50,21 +50,28 @@ VectorXd open_place(const Hypothesis& h, const Fit& fit, const VectorXd& paramet
   return at;
 }
 
-std::vector<Rival> rivals_of(const Inference& d, const sim::Randomisation& uncertain, double least) {
+std::vector<Rival> rivals_of(const Inference& d, const sim::Randomisation& uncertain, const NextOptions& options) {
+  const bool contrast = !options.references.empty();
   std::vector<Rival> rivals;
   for (const ScoredHypothesis& a : d.hypotheses) {
-    if (a.probability < least) break;
+    if (a.probability < options.least_probability) break;
     if (a.kind == HypothesisKind::unknown || a.has_remainder()) continue;
     const Hypothesis h(uncertain, a.effects);
-    if (a.kind == HypothesisKind::none) {
-      rivals.push_back(
-          {name_of(a), a.probability, h, h.start(), {MatrixXd(h.size(), 0), VectorXd(0)}, MatrixXd(0, 0), false});
+    if (a.kind == HypothesisKind::none || (contrast && a.kind == HypothesisKind::parameters)) {
+      const VectorXd at = contrast ? d.parameters.at : h.start();
+      rivals.push_back({name_of(a), a.probability, h, at, {MatrixXd(h.size(), 0), VectorXd(0)}, MatrixXd(0, 0), false});
       continue;
     }
     const Fit& fit = a.kind == HypothesisKind::parameters ? d.parameters : a.fit;
     const bool open = a.kind == HypothesisKind::effect && !a.fitted();
-    const VectorXd at = open ? open_place(h, fit, d.parameters.mean()) : fit.mean();
-    rivals.push_back({name_of(a), a.probability, h, h.bounded(at), fit.directions, fit.posterior.covariance, open});
+    VectorXd at = open ? open_place(h, fit, d.parameters.mean()) : fit.mean();
+    MatrixXd covariance = fit.posterior.covariance;
+    if (contrast) {
+      at.head(h.shared()) = d.parameters.at;
+      covariance.topRows(h.shared()).setZero();
+      covariance.leftCols(h.shared()).setZero();
+    }
+    rivals.push_back({name_of(a), a.probability, h, h.bounded(at), fit.directions, std::move(covariance), open});
   }
   return rivals;
 }
@@ -98,7 +105,9 @@ std::vector<BasisCoefficients> turned(const Fit& l, const Directions& directions
 std::optional<Expected> expect(const Rival& rival, const Fitter& fitter, std::optional<Fit>& first) {
   const bool with_parameters = rival.directions.reach.size() > 0;
   std::vector<BasisCoefficients> known;
-  if (with_parameters && first) known = turned(*first, rival.directions, rival.hypothesis.shared());
+  if (with_parameters && fitter.evidence().contrasts())
+    known.resize(static_cast<std::size_t>(rival.hypothesis.shared()));  // the parameters are certain: no columns
+  else if (with_parameters && first) known = turned(*first, rival.directions, rival.hypothesis.shared());
   const Fit l = fitter.linearise(rival.hypothesis, rival.at, rival.directions, known);
   if (l.residual.empty()) return {};
   if (with_parameters && !first) first = l;
@@ -107,12 +116,13 @@ std::optional<Expected> expect(const Rival& rival, const Fitter& fitter, std::op
   if (k == 0) return e;  // the vehicle file as it is: nothing is uncertain
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(rival.covariance);
   for (Index i = 0; i < k; ++i) {
+    if (!(eigen.eigenvalues()[i] > 0)) continue;
     BasisCoefficients sum = BasisCoefficients::Zero(e.law_sd.rows(), e.law_sd.cols());
     for (Index d = 0; d < k; ++d) {
       const BasisCoefficients& column = l.columns[static_cast<std::size_t>(d)];
       if (column.size() > 0) sum += eigen.eigenvectors()(d, i) * column;
     }
-    e.uncertain.emplace_back(std::sqrt(std::max(0.0, eigen.eigenvalues()[i])) * sum);
+    e.uncertain.emplace_back(std::sqrt(eigen.eigenvalues()[i]) * sum);
   }
   return e;
 }
@@ -130,7 +140,8 @@ double nats(const Evidence& evidence, const Expected& a, const Expected& b) {
   }
   const BasisCoefficients sd =
       (evidence.discrepancy_sd({}).array().square() + a.law_sd.array().square() + b.law_sd.array().square()).sqrt();
-  Reduced reduced = evidence.reduce(difference, columns, {1}, sd);
+  const std::vector<char> all(difference.sums.size(), 1);
+  Reduced reduced = evidence.reduce(difference, columns, all, sd);
   const VectorXd prior_mean = VectorXd::Zero(static_cast<Index>(columns.size()));
   const double with = Evidence::posterior(reduced, chosen, prior_mean).log_evidence;
   reduced.sums.rightCols(1).setZero();
@@ -140,7 +151,7 @@ double nats(const Evidence& evidence, const Expected& a, const Expected& b) {
 
 /// Predictions of rivals left open: the residual of the most probable rival plus the change by their magnitudes. They
 /// differ from one vehicle by magnitudes alone, so each change is smooth and costs one simulation.
-void add_open(const std::vector<Rival>& rivals, const Flights& flight, const Evidence& evidence,
+void add_open(const std::vector<Rival>& rivals, const Flights& flights, const Evidence& evidence,
               std::vector<std::optional<Expected>>& expected) {
   std::vector<std::size_t> open;
   std::vector<VehicleHypothesis> vehicles;
@@ -156,7 +167,7 @@ void add_open(const std::vector<Rival>& rivals, const Flights& flight, const Evi
     open.push_back(i);
   }
   if (open.empty()) return;
-  std::vector<Residuals> left = residuals(flight, vehicles, 1);
+  std::vector<Residuals> left = residuals(flights, vehicles, 1);
   if (left[0].empty()) return;
   const SufficientStatistics without = evidence.statistics(left[0]);
   for (std::size_t k = 0; k < open.size(); ++k) {
@@ -229,16 +240,17 @@ std::optional<NextExperiment> expected_information(const Manoeuvre& m, const std
     flown.push_back(fly(rivals[i]));
     if (flown.back().lost || !flown.back().log) return {};
   }
-  const Flights flight = {
-      std::make_shared<ResetPrediction>(Recording(m.name, *flown.front().log, rivals.front().vehicle().vehicle))};
-  const Fitter fitter(flight, std::make_shared<const Evidence>(flight, options.discrepancy, 1), 1);
+  Flights flights = options.references;
+  flights.push_back(
+      std::make_shared<ResetPrediction>(Recording(m.name, *flown.front().log, rivals.front().vehicle().vehicle)));
+  const Fitter fitter(flights, std::make_shared<const Evidence>(flights, options.discrepancy, 1), 1);
   const Evidence& evidence = fitter.evidence();
   std::vector<std::optional<Expected>> expected(rivals.size());
   std::optional<Fit> first;
   for (std::size_t i = 0; i < rivals.size(); ++i)
     if (i < 2 || !rivals[i].open) expected[i] = expect(rivals[i], fitter, first);
   if (!expected[0] || !expected[1]) return {};
-  add_open(rivals, flight, evidence, expected);
+  add_open(rivals, flights, evidence, expected);
   double all = 0;
   for (std::size_t i = 0; i < rivals.size(); ++i)
     if (expected[i]) all += rivals[i].probability;
@@ -302,7 +314,7 @@ std::vector<Manoeuvre> read_manoeuvres(const fs::path& folder, const std::vector
 
 std::vector<NextExperiment> rank_experiments(const Inference& inference, const sim::Randomisation& uncertain,
                                              const std::vector<Manoeuvre>& manoeuvres, const NextOptions& options) {
-  const std::vector<Rival> rivals = rivals_of(inference, uncertain, options.least_probability);
+  const std::vector<Rival> rivals = rivals_of(inference, uncertain, options);
   if (rivals.size() < 2) return {};
   std::vector<std::optional<NextExperiment>> found(manoeuvres.size());
   io::parallel_for(manoeuvres.size(), options.threads,

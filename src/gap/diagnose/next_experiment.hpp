@@ -12,6 +12,10 @@
 // information,
 //   I = - sum over A of p_A log(p_A + (1 - p_A) D(N_A)),
 // is at most the entropy now: separating many rivals a little beats separating one well.
+//
+// In a contrast the new flight is a further test flight. All rivals have the parameters of the reference, so they
+// differ by their effects alone. The references stay among the flights: in the regimes that they visit, the model
+// discrepancy cancels, and K has the differences between sessions.
 #pragma once
 
 #include <filesystem>
@@ -42,6 +46,7 @@ std::vector<Manoeuvre> read_manoeuvres(const std::filesystem::path& folder,
 struct NextOptions {
   int threads = 0;
   double least_probability = 0.01;  ///< least probability of a rival
+  Flights references;               ///< of a contrast
   ModelDiscrepancy discrepancy = read_model_discrepancy();
   VerdictRule rule = read_verdict_rule();
 };

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "gap/diagnose/held_out.hpp"
+#include "gap/localise/closure.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::gap {
@@ -31,6 +32,32 @@ void refute(const Evidence& evidence, const Flights& flights, double min_share, 
     const double share = a.fitted() ? (refit - mean_square(evidence, flights, a.held_out)) / explainable : 0;
     if (share < min_share) a.log_evidence = kRefuted;
   }
+}
+
+/// Whether flights held out are predicted better with a further effect than without it.
+bool predicts_better(const RowContext& context, const Residuals& with, const Residuals& without) {
+  const std::optional<double> better = losses_of(context, with).mean(), before = losses_of(context, without).mean();
+  return !better || !before || *better < *before;
+}
+
+/// Refutes hypotheses with an effect that does not help to predict flights held out.
+void refute_idle_effects(const Flights& flights, Inference& d) {
+  const RowContext context = row_context_of(flights, d.noise_sd);
+  std::vector<const ScoredHypothesis*> idle;
+  for (const ScoredHypothesis& a : d.hypotheses) {
+    if (!a.fitted()) continue;
+    const auto is_part = [&](const ScoredHypothesis& b) {
+      return b.fitted() && b.has_remainder() == a.has_remainder() && b.effects.size() + 1 == a.effects.size() &&
+             std::ranges::all_of(b.effects, [&](const std::string& e) { return std::ranges::count(a.effects, e) > 0; });
+    };
+    const bool alone = a.effects.size() == 1 && !predicts_better(context, a.held_out, d.refit);
+    if (alone || std::ranges::any_of(d.hypotheses, [&](const ScoredHypothesis& b) {
+          return is_part(b) && !predicts_better(context, a.held_out, b.held_out);
+        }))
+      idle.push_back(&a);
+  }
+  for (ScoredHypothesis& a : d.hypotheses)
+    if (std::ranges::count(idle, &a) > 0) a.log_evidence = kRefuted;
 }
 
 /// A background magnitude acts linearly, while a simulated effect may explain more. So that this is no evidence for the
@@ -210,6 +237,7 @@ void decide(const RobotFit& robot, const Fitter& fitter, const Flights& flights,
   if (rule.refutation.min_share > 0) refute(robot.evidence(), flights, rule.refutation.min_share, d);
   if (policy.discrepancy_scales && !robot.evidence().contrasts())
     share_backgrounds(robot, fitter.scales(), rule.unknown.penalty_nats, d.hypotheses);
+  if (!robot.evidence().contrasts()) refute_idle_effects(flights, d);
   set_probabilities(d.hypotheses, rule);
   conclude(rule, d, robot.evidence().contrasts());
   if (policy.discrepancy_scales) predict_with_the_likeliest(d);

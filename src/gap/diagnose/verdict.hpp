@@ -35,7 +35,8 @@ void conclude(const VerdictRule& rule, Inference& d, bool contrast = false);
 /// effects may be due to chance, so they are not named; yet a vehicle with them predicts better.
 void predict_with_the_likeliest(Inference& d);
 
-/// Refutes hypotheses that explain too little of held-out flights, gives hypotheses without an effect its background
+/// Refutes hypotheses that explain too little of held-out flights, and those with an effect without which these are
+/// predicted as well, gives hypotheses without an effect its background
 /// magnitude, sets the probabilities and concludes. `fitter`: with the scales of the parameters alone.
 void decide(const RobotFit& robot, const Fitter& fitter, const Flights& flights, const VerdictRule& rule, Inference& d);
 

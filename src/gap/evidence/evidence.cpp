@@ -150,6 +150,24 @@ void Evidence::for_rows(std::size_t flight, int channel, const Use& use) const {
   }
 }
 
+/// Coefficients of the constants that give a group its mean over the references, and over the tests.
+VectorXd Evidence::session_means(const Residuals& residual, int group) const {
+  VectorXd delta = VectorXd::Zero(basis().size());
+  const auto mean_of = [&](bool references) {
+    double sum = 0, n = 0;
+    for (std::size_t f = 0; f < flights_->size(); ++f)
+      for_rows(f, group / kCoefficients, [&](std::size_t j, bool) {
+        if (flight(f).is_reference() == references) sum += residual[f][row_of(j, group)], n += 1;
+      });
+    return n > 0 ? sum / n : 0;
+  };
+  const bool contrast = contrasts();
+  delta[0] = mean_of(contrast || flight(0).is_reference());
+  for (int i = 0; contrast && i < basis().size(); ++i)
+    if (basis().of_tests(i) && basis().kind(i) == BasisFunction::constant) delta[i] = mean_of(false) - delta[0];
+  return delta;
+}
+
 void Evidence::learn(const Residuals& residual, Learn what) {
   const Index q = basis().size();
   io::parallel_for(static_cast<std::size_t>(kGroups), threads_, [&](std::size_t k) {
@@ -164,8 +182,9 @@ void Evidence::learn(const Residuals& residual, Learn what) {
         n += 1;
       });
     if (n == 0) return;
-    const VectorXd delta = what == Learn::remainder ? VectorXd(VectorXd::Zero(q))
-                                                    : VectorXd(inverse_[static_cast<std::size_t>(channel)] * right);
+    VectorXd delta = VectorXd::Zero(q);
+    if (flight(0).disturbed(channel)) delta = session_means(residual, g);
+    else if (what != Learn::remainder) delta = inverse_[static_cast<std::size_t>(channel)] * right;
     const auto left = [&](std::size_t f, std::size_t j) {
       return residual[f][row_of(j, g)] - basis().values(f).row(static_cast<Index>(j)).dot(delta);
     };

@@ -197,6 +197,7 @@ class Evidence {
   std::pair<Eigen::MatrixXd, Eigen::VectorXd> sums_of(const SufficientStatistics& residual,
                                                       const std::vector<char>& use, int group) const;
   void learn(const Residuals& residual, Learn what);
+  Eigen::VectorXd session_means(const Residuals& residual, int group) const;
   template <class Use>
   void for_rows(std::size_t flight, int channel, const Use& use) const;
   template <class Use>

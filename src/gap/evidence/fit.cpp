@@ -93,6 +93,7 @@ std::vector<VectorXd> Fitter::around(const Hypothesis& hypothesis, const VectorX
       const int sign = __builtin_popcount(static_cast<unsigned>((d % (kAround - 1) + 1) & i)) % 2 ? -1 : 1;
       shift[d] = kAroundReach * sign * directions.reach[d];
     }
+    if (shift.isZero()) return {};
     const VectorXd there = hypothesis.bounded(at + directions.axes.leftCols(k) * shift);
     shifts.push_back(directions.axes.leftCols(k).transpose() * (there - at));
     vehicles.push_back(hypothesis.vehicle(there));

@@ -10,6 +10,7 @@
 #include "io/progress.hpp"
 #include "io/statistics.hpp"
 #include "io/text.hpp"
+#include "model/effects/registry.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -235,7 +236,7 @@ void take(const LawErrors& errors, SessionVariation& to) {
   std::array<Moment, model::kStages> stages;
   stages.fill({kShrinkLaws * all, kShrinkLaws});
   for (const auto& [effect, error] : errors) {
-    Moment& m = stages[stage_of(effect)];
+    Moment& m = stages[static_cast<std::size_t>(model::stage_of(effect))];
     m.sum += std::log(error);
     m.count += 1;
   }

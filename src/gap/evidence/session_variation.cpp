@@ -41,11 +41,9 @@ double SessionVariation::parameter_sd(const std::string& name) const {
   return at == parameters.end() ? 0 : at->second;
 }
 
-std::size_t stage_of(const std::string& effect) {
-  return static_cast<std::size_t>(model::effect_within_beat(effect).info.stage);
+double SessionVariation::law_error_of(const std::string& effect) const {
+  return law_error[static_cast<std::size_t>(model::stage_of(effect))];
 }
-
-double SessionVariation::law_error_of(const std::string& effect) const { return law_error[stage_of(effect)]; }
 
 double SessionVariation::background_sd(const std::string& effect) const {
   const auto at = background.find(effect);

@@ -15,9 +15,6 @@
 
 namespace flappy::gap {
 
-/// Index of the model::Stage of an effect within the beat.
-std::size_t stage_of(const std::string& effect);
-
 struct SessionVariation {
   /// How far a pair of sessions differs more or less than others: log scale ~ N(0, scale_sd^2).
   double scale_sd = 0.5;

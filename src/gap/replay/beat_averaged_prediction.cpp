@@ -16,11 +16,22 @@ using Vec = model::Vec3<double>;
 /// Rows in a period of the bandwidth: a little more than the two that the sampling theorem asks for.
 constexpr double kRowsPerPeriod = 2.2;
 constexpr std::size_t kMinRows = 30;
+/// Moments are compared as means over this time, in which an autopilot has counteracted most of what disturbs it.
+constexpr double kTrim_s = 3;
+/// Least thrust that moments are divided by, as a share of the weight.
+constexpr double kMinThrust = 0.1;
 
 Vec vec(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 Vector3d eigen(const Vec& v) { return {v.x, v.y, v.z}; }
 model::Matrix3<double> matrix(const Eigen::Matrix3d& m) {
   return {vec(m.row(0).transpose()), vec(m.row(1).transpose()), vec(m.row(2).transpose())};
+}
+
+Eigen::Matrix3d inertia_of(const model::Vehicle& v) {
+  const model::InertiaTensor& i = v.torso.inertia_kg_m2;
+  Eigen::Matrix3d inertia;
+  inertia << i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz;
+  return inertia;
 }
 
 std::size_t row(std::size_t beat, int channel) {
@@ -82,7 +93,8 @@ BeatAveragedPrediction::BeatAveragedPrediction(const std::filesystem::path& fold
   for (int channel = 0; channel <= kForceZ; ++channel)
     shown_[static_cast<std::size_t>(channel)] =
         (channel >= kForceX || moments) &&
-        (channels.empty() ? channel >= kForceX || b.compares_moments : std::ranges::count(channels, channel) > 0);
+        (channels.empty() ? channel >= kForceX || b.compares_moments : std::ranges::count(channels, channel) > 0) &&
+        (channel != kForceX || log_.header.mocap.source != flightlog::PoseSource::estimate_without_pitch);
   for (const model::BeatAveraged::Input& i : b.inputs) {
     const auto at = std::ranges::find(log_.header.inputs, i.name);
     if (at == log_.header.inputs.end())
@@ -120,7 +132,63 @@ BeatAveragedPrediction::BeatAveragedPrediction(const std::filesystem::path& fold
   for (const std::vector<double> smooth = flightlog::low_pass(battery_, b.bandwidth_Hz * motion_.step_s);
        const std::size_t i : rows_)
     battery_rows_.push_back(smooth[i]);
-  measured_ = rows_of(motion_);
+  if (b.trims) find_trims();
+  measured_ = signal_ = rows_of(motion_);
+  if (!b.trims) return;
+  const std::vector<Vector3d> single = turned_by_single_loads();
+  for (std::size_t j = 0; j < rows_.size(); ++j)
+    for (int k = 0; k < 3; ++k) signal_[row(j, kTorqueX + k)] = single[j][k];
+  take_means(signal_);
+}
+
+void BeatAveragedPrediction::find_trims() {
+  const double row_s = motion_.step_s * static_cast<double>(stride_);
+  const auto size = std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(kTrim_s / row_s)));
+  is_trim_.assign(rows_.size(), 0);
+  for (std::size_t first = 0; first + size <= rows_.size(); first += size) {
+    std::vector<std::size_t> seen;
+    for (std::size_t j = first; j < first + size; ++j)
+      if (motion_.seen[rows_[j]]) seen.push_back(j);
+    if (2 * seen.size() < size) continue;
+    trims_.push_back({seen[seen.size() / 2], first, first + size});
+    is_trim_[trims_.back().row] = 1;
+  }
+}
+
+void BeatAveragedPrediction::take_means(Rows& rows) const {
+  const Rows own = rows;
+  for (std::size_t j = 0; j < rows_.size(); ++j)
+    for (int k = 0; k < 3; ++k) rows[row(j, kTorqueX + k)] = 0;
+  for (const Trim& t : trims_) {
+    double n = 0;
+    for (std::size_t j = t.first; j < t.end; ++j) n += motion_.seen[rows_[j]] != 0;
+    for (std::size_t j = t.first; j < t.end; ++j)
+      for (int k = 0; k < 3 && motion_.seen[rows_[j]]; ++k)
+        rows[row(t.row, kTorqueX + k)] += own[row(j, kTorqueX + k)] / n;
+  }
+}
+
+std::vector<Vector3d> BeatAveragedPrediction::turned_by_single_loads() const {
+  const model::BeatAveraged& b = *nominal_.beat_averaged;
+  const model::BeatAveragedWrench wrench = wrench_of(b);
+  const Eigen::Matrix3d per_inertia = inertia_of(nominal_).inverse();
+  std::vector<Vector3d> all(rows_.size(), Vector3d::Zero());
+  std::vector<double> variables(b.actuators.size() + model::kMotionVariables + predicted_.size(), 0.0);
+  for (std::size_t j = 0; j < rows_.size(); ++j) {
+    for (std::size_t k = 0; k < b.actuators.size(); ++k) {
+      const auto input = std::ranges::find(b.inputs, b.actuators[k].input, &model::BeatAveraged::Input::name);
+      const auto column = static_cast<std::size_t>(input - b.inputs.begin());
+      variables[k] = b.actuators[k].gain * driven(column, 0, 0).input[j] + b.actuators[k].offset;
+    }
+    for (const model::BeatAveragedWrench::Product& p : wrench.products()) {
+      if (p.component < 3) continue;
+      double moment = p.factor;
+      for (const std::size_t v : p.variables) moment *= variables[v];
+      all[j] += (moment * per_inertia.col(static_cast<Eigen::Index>(p.component - 3))).cwiseAbs2();
+    }
+    all[j] = all[j].cwiseSqrt();
+  }
+  return all;
 }
 
 Rows BeatAveragedPrediction::rows_of(const flightlog::BeatAveragedMotion& motion) const {
@@ -130,6 +198,7 @@ Rows BeatAveragedPrediction::rows_of(const flightlog::BeatAveragedMotion& motion
       rows[row(j, kForceX + k)] = motion.force_m_s2[rows_[j]][k];
       rows[row(j, kTorqueX + k)] = motion.turning_rad_s2[rows_[j]][k];
     }
+  if (nominal_.beat_averaged->trims) take_means(rows);
   return rows;
 }
 
@@ -206,11 +275,28 @@ Rows BeatAveragedPrediction::predict(const VehicleHypothesis& hypothesis) const 
   for (std::size_t k = 0; k < predicted_.size(); ++k)
     loads.push_back(&driven(b.inputs.size() + k, -hypothesis.lag_s, 0));
   const Vec com{v.torso.com_m.x, v.torso.com_m.y, v.torso.com_m.z};
-  const model::InertiaTensor& i = v.torso.inertia_kg_m2;
-  Eigen::Matrix3d inertia;
-  inertia << i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz;
+  const double nominal_N = nominal_.torso.mass_kg * log_.header.gravity_m_s2;
+  const Eigen::Matrix3d nominal_turning = nominal_N * inertia_of(nominal_).inverse();
+  const Eigen::Matrix3d inertia = inertia_of(v);
   const Eigen::Matrix3d per_inertia = inertia.inverse();
   const flightlog::LogAmbient& ambient = log_.header.ambient;
+
+  const auto at_rest = [&](std::size_t k) {
+    model::BeatAveragedState<double> s{};
+    s.attitude = matrix(motion_.attitude[k]);
+    s.position_m = vec(motion_.position_m[k]);
+    s.gravity_m_s2 = log_.header.gravity_m_s2;
+    return s;
+  };
+  std::vector<model::Hanging<double>> weights(motion_.size());
+  for (const Acting& a : acting) {
+    if (a.effect->averaged.swing == nullptr) continue;
+    a.effect->averaged.hang(a.values.data(), at_rest(0), weights[0]);
+    for (std::size_t k = 1; k < weights.size(); ++k) {
+      weights[k] = weights[k - 1];
+      a.effect->averaged.swing(a.values.data(), at_rest(k), motion_.step_s, weights[k]);
+    }
+  }
 
   Rows rows(rows_.size() * kRowsPerBeat, 0);
   std::vector<double> variables(b.actuators.size() + model::kMotionVariables + loads.size());
@@ -228,6 +314,7 @@ Rows BeatAveragedPrediction::predict(const VehicleHypothesis& hypothesis) const 
     s.gravity_m_s2 = log_.header.gravity_m_s2;
     s.air_density_kg_m3 = ambient.air_density_kg_m3;
     s.ground_z_m = ambient.ground_z_m;
+    s.weight = weights[at];
     double flapping = 0;
     for (std::size_t k = 0; k < b.actuators.size(); ++k) {
       const model::BeatAveraged::Actuator& a = b.actuators[k];
@@ -264,12 +351,18 @@ Rows BeatAveragedPrediction::predict(const VehicleHypothesis& hypothesis) const 
     Vec force = (1 / s.mass_kg) * load.force_N +
                 (model::cross(s.turning_rad_s2, d) + model::cross(s.rate_rad_s, model::cross(s.rate_rad_s, d)));
     for (const Acting& a : acting)
-      if (a.effect->averaged.seen != nullptr) a.effect->averaged.seen(a.values.data(), s, force);
+      if (a.effect->averaged.seen != nullptr && log_.header.mocap.source == flightlog::PoseSource::motion_capture)
+        a.effect->averaged.seen(a.values.data(), s, force);
     const Vector3d f = eigen(force), w = motion_.rate_rad_s[at];
     for (int k = 0; k < 3; ++k) rows[row(j, kForceX + k)] = f[k];
-    const Vector3d turning = per_inertia * (eigen(load.moment_Nm) - w.cross(inertia * w));
+    Vector3d turning = per_inertia * (eigen(load.moment_Nm) - w.cross(inertia * w));
+    // a trim is where the thrust acts: relative to the thrust, so that no fit makes the moments small to explain their
+    // scatter
+    if (b.trims)
+      turning = nominal_turning * (eigen(load.moment_Nm) / std::max(load.force_N.z, kMinThrust * nominal_N));
     for (int k = 0; k < 3; ++k) rows[row(j, kTorqueX + k)] = turning[k];
   }
+  if (b.trims) take_means(rows);
   return rows;
 }
 

@@ -33,20 +33,23 @@ class BeatAveragedPrediction final : public PredictedFlight {
   std::size_t beats() const override { return rows_.size(); }
   double beats_Hz() const override { return 1 / (motion_.step_s * static_cast<double>(stride_)); }
   bool covers(std::size_t beat, int channel) const override {
-    return has_rows(channel, 0) && motion_.seen[rows_[beat]] != 0;
+    return has_rows(channel, 0) && motion_.seen[rows_[beat]] != 0 && (!disturbed(channel) || is_trim_[beat] != 0);
   }
+  bool disturbed(int channel) const override { return nominal_.beat_averaged->trims && channel <= kTorqueZ; }
   bool has_rows(int channel, int coefficient) const override {
     return coefficient == 0 && channel <= kForceZ && shown_[static_cast<std::size_t>(channel)];
   }
   const Rows& measured() const override { return measured_; }
-  const Rows& signal() const override { return measured_; }
+  const Rows& signal() const override { return signal_; }
   std::vector<Rows> predict(const std::vector<const VehicleHypothesis*>& vehicles) const override;
   Rows declared_noise(std::uint64_t seed) const override;
   std::vector<RegimeFunction> functions() const override;
   std::vector<std::pair<std::string, std::string>> products() const override { return {}; }
   std::vector<RegimeQuantity> regimes() const override;
   std::vector<RegimeQuantity> inputs() const override;
-  const DiagnosisPolicy& policy() const override { return kBeatAveragedPolicy; }
+  const DiagnosisPolicy& policy() const override {
+    return is_reference() ? kBeatAveragedContrastPolicy : kBeatAveragedPolicy;
+  }
 
  private:
   /// [row] An input or column of predicted.csv after delay, lag and low-pass, its rate, and both for its product with
@@ -59,6 +62,11 @@ class BeatAveragedPrediction final : public PredictedFlight {
   model::BeatAveragedWrench wrench_of(const model::BeatAveraged& vehicle) const;
   Rows rows_of(const flightlog::BeatAveragedMotion& motion) const;
   Rows predict(const VehicleHypothesis& hypothesis) const;
+  void find_trims();
+  /// Replaces moments by their means over trims, at the row of each trim.
+  void take_means(Rows& rows) const;
+  /// [row][axis] Root of the sum of squares of the angular accelerations by single products of the expressions.
+  std::vector<Eigen::Vector3d> turned_by_single_loads() const;
   template <class Value>
   std::vector<double> each(const Value& value) const;
 
@@ -73,7 +81,12 @@ class BeatAveragedPrediction final : public PredictedFlight {
   std::vector<std::vector<double>> inputs_;  ///< on the grid: inputs of the vehicle, then columns of predicted.csv
   std::vector<double> battery_;              ///< voltage over the nominal voltage, on the grid; 1 if it is not logged
   std::vector<double> battery_rows_;         ///< [row] the same, low-passed
-  Rows measured_;
+  struct Trim {
+    std::size_t row, first, end;  ///< its row, and the rows of which it is the mean
+  };
+  std::vector<Trim> trims_;
+  std::vector<char> is_trim_;  ///< [row]
+  Rows measured_, signal_;
   mutable std::mutex mutex_;
   mutable std::map<std::tuple<std::size_t, double, double>, Driven> driven_;
 };

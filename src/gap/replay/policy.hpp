@@ -1,5 +1,5 @@
 // How a diagnosis treats a kind of vehicle. With wings and motors, each harmonic is predicted, and no wing model is
-// exact. Beat-averaged: only means are predicted; what no effect explains counts as noise.
+// exact. Beat-averaged: only means are predicted; what no effect explains counts as noise, but in a contrast.
 #pragma once
 
 namespace flappy::gap {
@@ -22,5 +22,7 @@ struct DiagnosisPolicy {
 inline constexpr DiagnosisPolicy kWingPolicy{true, true, true, true, true, false, 0.5, 2};
 /// Beat-averaged vehicles: a step of a fit costs almost nothing.
 inline constexpr DiagnosisPolicy kBeatAveragedPolicy{false, false, false, false, false, true, 0.05, 1};
+/// The same in a contrast: what a model gets wrong in both sessions cancels, and is no noise.
+inline constexpr DiagnosisPolicy kBeatAveragedContrastPolicy{true, true, true, true, false, false, 0.05, 2};
 
 }  // namespace flappy::gap

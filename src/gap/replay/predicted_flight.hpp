@@ -99,10 +99,14 @@ class PredictedFlight {
   virtual double beats_Hz() const = 0;
   virtual bool covers(std::size_t beat, int channel) const = 0;
   virtual bool has_rows(int channel, int coefficient) const = 0;
+  /// Whether what no model explains in a channel counts as noise, but its mean over a session: moments that an autopilot
+  /// counteracts.
+  virtual bool disturbed(int /*channel*/) const { return false; }
   virtual const Rows& measured() const = 0;
   /// The signal of each channel, which the model discrepancy is a share of: the measured rows. Exceptions for vehicles
   /// with wings and motors: for torque the recorded angular acceleration, as the rows are already differences from it;
-  /// for the battery its voltage less the full voltage; for path and turn constants.
+  /// for the battery its voltage less the full voltage; for path and turn constants. For moments that an autopilot
+  /// counteracts, which add up to nothing: the root of the sum of their squares.
   virtual const Rows& signal() const = 0;
   /// Rows that the sensors of each vehicle would have measured, [vehicle]; empty if its simulation diverges.
   virtual std::vector<Rows> predict(const std::vector<const VehicleHypothesis*>& vehicles) const = 0;
@@ -115,6 +119,7 @@ class PredictedFlight {
   virtual std::vector<std::pair<std::string, std::string>> products() const = 0;
   virtual std::vector<RegimeQuantity> regimes() const = 0;
   virtual std::vector<RegimeQuantity> inputs() const = 0;
+  /// Of a diagnosis whose first flight this is.
   virtual const DiagnosisPolicy& policy() const = 0;
   /// Null for beat-averaged vehicles.
   virtual const Recording* recording() const { return nullptr; }

@@ -7,7 +7,9 @@
 #include <cmath>
 #include <filesystem>
 
+#include "gap/replay/reset_prediction.hpp"
 #include "rollout/fly_fixture.hpp"
+#include "rollout/simulated_flight.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -35,6 +37,13 @@ ScoredHypothesis hypothesis(const sim::Randomisation& prior, const std::vector<s
   a.fit.residual.resize(1);
   a.fit.posterior.mean = Eigen::VectorXd::Zero(h.size());
   a.fit.posterior.covariance = sd * sd * Eigen::MatrixXd::Identity(h.size(), h.size());
+  return a;
+}
+
+ScoredHypothesis unchanged(double probability) {
+  ScoredHypothesis a;
+  a.kind = HypothesisKind::none;
+  a.probability = probability;
   return a;
 }
 
@@ -145,6 +154,33 @@ TEST(NextExperiment, ProposesNothingWithoutRivalsOrWhereOneIsLost) {
       diagnosis(prior, {hypothesis(prior, {"ground_effect"}, {1}, 0.6), hypothesis(prior, {}, {}, 0.4)});
   choice[0].config.fleet.task.path.back().coefficients[0][0] = 2;  // metres, at once
   EXPECT_TRUE(rank_experiments(d, prior, choice).empty());
+}
+
+/// What a dash is expected to tell of a little drag, given reference flights of a manoeuvre.
+double expected_with_reference(const sim::Randomisation& prior, const char* manoeuvre) {
+  const model::Vehicle& vehicle = prior.nominal();
+  const rollout::FlyConfig flown = library({manoeuvre})[0].config;
+  const auto reference = std::make_shared<ResetPrediction>(
+      Recording(manoeuvre, std::move(*simulate(flown, vehicle, 1, flown.settle_s)[0].log), vehicle));
+  reference->set_reference();
+  NextOptions options;
+  options.references = {reference};
+  return rank_experiments(diagnosis(prior, {hypothesis(prior, {"body_drag"}, {0.05}, 0.5, 0.01),
+                                            hypothesis(prior, {}, {}, 0.4, 0.01), unchanged(0.1)}),
+                          prior, library({"dash"}), options)[0]
+      .expected_nats;
+}
+
+TEST(NextExperiment, ReferencesOfTheSameRegimesCancelWhatModelsGetWrong) {
+  const sim::Randomisation prior = uncertain();
+  const double alone =
+      rank_experiments(
+          diagnosis(prior, {hypothesis(prior, {"body_drag"}, {0.05}, 0.5, 0.01), hypothesis(prior, {}, {}, 0.4, 0.01)}),
+          prior, library({"dash"}))[0]
+          .expected_nats;
+  const double after_dash = expected_with_reference(prior, "dash");
+  EXPECT_GT(after_dash, 2 * alone);
+  EXPECT_GT(after_dash, 1.5 * expected_with_reference(prior, "long_hover"));
 }
 
 // Without the cable, a robot with it and one without it fly alike.

@@ -1,0 +1,131 @@
+// What changed at a quadrotor whose firmware holds its attitude, flown by equations that are written here and nowhere else: its log has no gyro, and
+// commands follow what disturbs it; on the mean they tell which motor works harder.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "gap/diagnose/diagnose.hpp"
+#include "gap/replay/beat_averaged_prediction.hpp"
+#include "io/config.hpp"
+#include "vehicles.hpp"
+
+namespace flappy::gap::beat_averaged_contrast_test {
+namespace {
+
+using Eigen::Matrix4d, Eigen::Vector3d, Eigen::Vector4d;
+constexpr double kGravity_m_s2 = 9.81, kStep_s = 1e-3, kDuration_s = 15, kArm_m = 0.0325, kReaction_m = 0.006;
+
+struct Robot {
+  double mass_kg = 0.037;
+  Vector3d com_m = {-0.001, 0.0005, 0};
+  Vector4d thrust_N = {0.150, 0.144, 0.141, 0.152};
+};
+
+/// 15 s of hover that sways, 100 Hz.
+flightlog::FlightLog fly(const Robot& r, std::uint64_t seed) {
+  flightlog::FlightLog log;
+  flightlog::FlightHeader& h = log.header;
+  h.vehicle = "crazyflie_sd.toml";
+  h.gravity_m_s2 = kGravity_m_s2;
+  h.inputs = {"motor_1", "motor_2", "motor_3", "motor_4"};
+  h.mocap = {100, 0, 1e-3, 1e-3, flightlog::PoseSource::estimate};
+  h.ambient.ground_z_m = -100;
+  log.command.declared.resize(4);
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> phase(0, 6.28);
+  const double p[] = {phase(random), phase(random), phase(random)};
+  const double x[] = {kArm_m, -kArm_m, -kArm_m, kArm_m}, y[] = {-kArm_m, -kArm_m, kArm_m, kArm_m};
+  Matrix4d loads;  // thrust along z and moments about the centre of mass of each motor
+  for (int i = 0; i < 4; ++i)
+    loads.col(i) << 1, y[i] - r.com_m.y(), -(x[i] - r.com_m.x()), (i % 2 == 0 ? -1 : 1) * kReaction_m;
+  const Matrix4d thrusts = loads.inverse();
+  const Vector3d inertia(1.43e-5, 1.43e-5, 2.85e-5);
+  Vector3d position(0, 0, 2), velocity = Vector3d::Zero(), disturbed_Nm = Vector3d::Zero();
+  for (int n = 0; n < static_cast<int>(kDuration_s / kStep_s); ++n) {
+    const double t = n * kStep_s, rates[] = {1.3, 0.9, 0.4}, sizes[] = {0.06, 0.08, 0.1};
+    double angle[3], turning[3];
+    for (int k = 0; k < 3; ++k) {
+      angle[k] = sizes[k] * std::sin(rates[k] * t + p[k]);
+      turning[k] = -rates[k] * rates[k] * angle[k];
+    }
+    const Eigen::Quaterniond q = Eigen::AngleAxisd(angle[2], Vector3d::UnitZ()) *
+                                 Eigen::AngleAxisd(angle[1], Vector3d::UnitY()) *
+                                 Eigen::AngleAxisd(angle[0], Vector3d::UnitX());
+    const double thrust = r.mass_kg * (kGravity_m_s2 + 2 * (2 - position.z()) - 2 * velocity.z());
+    for (int k = 0; k < 3; ++k)
+      disturbed_Nm[k] += kStep_s * -3 * disturbed_Nm[k] + std::sqrt(kStep_s) * 4e-4 * normal(random);
+    Vector4d wanted;
+    wanted << thrust, inertia[0] * turning[0] - disturbed_Nm[0], inertia[1] * turning[1] - disturbed_Nm[1],
+        inertia[2] * turning[2] - 0.1 * disturbed_Nm[2];
+    const Vector4d command = (thrusts * wanted).cwiseQuotient(r.thrust_N);
+    if (n % 10 == 0) {
+      flightlog::MocapStream& m = log.mocap;
+      m.t_s.push_back(t), log.command.t_s.push_back(t);
+      m.x_m.push_back(position.x() + 1e-3 * normal(random));
+      m.y_m.push_back(position.y() + 1e-3 * normal(random));
+      m.z_m.push_back(position.z() + 1e-3 * normal(random));
+      m.qw.push_back(q.w()), m.qx.push_back(q.x()), m.qy.push_back(q.y()), m.qz.push_back(q.z());
+      for (int k = 0; k < 4; ++k) log.command.declared[static_cast<std::size_t>(k)].push_back(command[k]);
+    }
+    velocity += kStep_s * (q * Vector3d(0, 0, thrust / r.mass_kg) - Vector3d(0, 0, kGravity_m_s2) - 0.5 * velocity);
+    position += kStep_s * velocity;
+  }
+  return log;
+}
+
+Inference contrast(const Robot& before, const Robot& after, std::vector<std::string> withheld = {}) {
+  const model::Vehicle vehicle = model::read_any_vehicle(test::source_path("configs/vehicles/crazyflie_sd.toml"));
+  Flights references, flights;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const auto flight = std::make_shared<BeatAveragedPrediction>("flight_" + std::to_string(seed),
+                                                                 fly(seed <= 3 ? before : after, seed), vehicle);
+    if (seed <= 3) flight->set_reference(), references.push_back(flight);
+    flights.push_back(flight);
+  }
+  const std::string configs = test::source_path("configs/gap/");
+  const sim::Randomisation uncertain =
+      sim::read_randomisation(vehicle, io::Config::load(configs + "beat_averaged/priors.toml").root());
+  InferenceOptions options{.max_finalists = 20,
+                           .max_effects = 4,
+                           .withheld = std::move(withheld),
+                           .progress = {},
+                           .discrepancy = read_model_discrepancy(configs + "beat_averaged/contrast_discrepancy.toml"),
+                           .rule = read_verdict_rule(configs + "contrast_verdict.toml")};
+  options.discrepancy.session = read_session_variation(configs + "beat_averaged/session_variation.toml");
+  const RobotFit fit = RobotFit::of_references(references, uncertain, options.discrepancy, options.withheld, 0);
+  return infer(flights, uncertain, std::move(options), &fit);
+}
+
+double magnitude(const Inference& d, int k) {
+  const model::Vehicle vehicle = model::read_any_vehicle(test::source_path("configs/vehicles/crazyflie_sd.toml"));
+  const sim::Randomisation uncertain = sim::read_randomisation(
+      vehicle, io::Config::load(test::source_path("configs/gap/beat_averaged/priors.toml")).root());
+  const Hypothesis h(uncertain, d.conclusion().effects);
+  const auto i = h.shared() + k;
+  return h.unknowns()[static_cast<std::size_t>(i)].value(d.conclusion().fit.mean()[i]);
+}
+
+TEST(BeatAveragedContrast, AMotorThatLosesThrustIsNamed) {
+  Robot after;
+  after.thrust_N[2] *= 0.8;
+  const Inference d = contrast({}, after);
+  ASSERT_EQ(d.verdict.kind, VerdictKind::effect);
+  EXPECT_EQ(d.verdict.effects, (std::vector<std::string>{"actuator_loss"}));
+  // sessions differ by 2 to 3 % of a motor's moment in roll, pitch and yaw
+  EXPECT_NEAR(magnitude(d, 2), 0.2, 0.06);
+  for (const int other : {0, 1, 3}) EXPECT_LT(magnitude(d, other), 0.06) << other;
+}
+
+// The trims of two sessions differ by half a per cent of a motor, and 0.2 mm: nothing that matters.
+TEST(BeatAveragedContrast, WhatSessionsDifferByIsNoFinding) {
+  Robot after;
+  after.thrust_N[0] *= 1.005, after.thrust_N[3] *= 0.995;
+  after.com_m.x() += 2e-4;
+  const VerdictKind kind = contrast({}, after).verdict.kind;
+  EXPECT_TRUE(kind == VerdictKind::parameters || kind == VerdictKind::none);
+}
+
+}  // namespace
+}  // namespace flappy::gap::beat_averaged_contrast_test
