@@ -3,8 +3,11 @@
 #include "io/text.hpp"
 
 namespace flappy::gap {
+namespace {
 
 using Json = nlohmann::ordered_json;
+
+}  // namespace
 
 Json to_json(const Plan& plan) {
   Json effects = Json::array(), choices = Json::array();
