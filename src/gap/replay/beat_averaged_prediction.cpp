@@ -358,8 +358,7 @@ Rows BeatAveragedPrediction::predict(const VehicleHypothesis& hypothesis) const 
     Vector3d turning = per_inertia * (eigen(load.moment_Nm) - w.cross(inertia * w));
     // a trim is where the thrust acts: relative to the thrust, so that no fit makes the moments small to explain their
     // scatter
-    if (b.trims)
-      turning = nominal_turning * (eigen(load.moment_Nm) / std::max(load.force_N.z, kMinThrust * nominal_N));
+    if (b.trims) turning = nominal_turning * (eigen(load.moment_Nm) / std::max(load.force_N.z, kMinThrust * nominal_N));
     for (int k = 0; k < 3; ++k) rows[row(j, kTorqueX + k)] = turning[k];
   }
   if (b.trims) take_means(rows);

@@ -62,10 +62,11 @@ TEST(Mapping, RefusesFaults) {
   EXPECT_EQ(edited("schema = 1", "schema = 2"),
             "m.toml:3:10: schema: 2 is read by a newer flappy than this one; accepted: 1");
   EXPECT_EQ(edited("channel = \"/pose\"\n", ""), "m.toml:27:1: mocap.channel: is missing; accepted: a string");
-  EXPECT_EQ(edited("channel = \"/pose\"", "topic = \"/pose\""),
-            "m.toml:28:1: mocap.topic: unknown key; accepted: attitude_noise_rad, channel, clock, columns, frame, "
-            "from, late_s, "
-            "latency_s, offset, position_noise_m, rate_hz, scale, sequence, source, time, time_field, time_unit, world");
+  EXPECT_EQ(
+      edited("channel = \"/pose\"", "topic = \"/pose\""),
+      "m.toml:28:1: mocap.topic: unknown key; accepted: attitude_noise_rad, channel, clock, columns, frame, "
+      "from, late_s, "
+      "latency_s, offset, position_noise_m, rate_hz, scale, sequence, source, time, time_field, time_unit, world");
   EXPECT_EQ(edited("x_m = \"pose", "x_mm = \"pose"),
             "m.toml:34:1: mocap.columns.x_mm: unknown key; accepted here with another unit: \"x_m\"");
   EXPECT_EQ(edited("qz = \"pose.orientation.z\"\n", ""),
