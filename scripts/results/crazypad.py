@@ -13,7 +13,7 @@ import sys
 
 BIN, PROJECT, DATA, OUT = (pathlib.Path(a).resolve() for a in sys.argv[1:5])
 NORMAL = "normal_flight"
-# What is withheld of the catalogue for a condition.
+# The effect that is taken out of the catalogue, by condition.
 WITHHELD = {
     "cut_propeller_M3_2mm_2mm_43mm": "actuator_loss",
     "cut_m3_2mm_2mm": "actuator_loss",

@@ -34,30 +34,28 @@ void refute(const Evidence& evidence, const Flights& flights, double min_share, 
   }
 }
 
-/// Whether flights held out are predicted better with a further effect than without it.
-bool predicts_better(const RowContext& context, const Residuals& with, const Residuals& without) {
-  const std::optional<double> better = losses_of(context, with).mean(), before = losses_of(context, without).mean();
-  return !better || !before || *better < *before;
-}
-
-/// Refutes hypotheses with an effect that does not help to predict flights held out.
+/// Refutes hypotheses with an effect that does not lower the loss of flights held out.
 void refute_idle_effects(const Flights& flights, Inference& d) {
   const RowContext context = row_context_of(flights, d.noise_sd);
-  std::vector<const ScoredHypothesis*> idle;
-  for (const ScoredHypothesis& a : d.hypotheses) {
-    if (!a.fitted()) continue;
-    const auto is_part = [&](const ScoredHypothesis& b) {
-      return b.fitted() && b.has_remainder() == a.has_remainder() && b.effects.size() + 1 == a.effects.size() &&
-             std::ranges::all_of(b.effects, [&](const std::string& e) { return std::ranges::count(a.effects, e) > 0; });
-    };
-    const bool alone = a.effects.size() == 1 && !predicts_better(context, a.held_out, d.refit);
-    if (alone || std::ranges::any_of(d.hypotheses, [&](const ScoredHypothesis& b) {
-          return is_part(b) && !predicts_better(context, a.held_out, b.held_out);
-        }))
-      idle.push_back(&a);
+  const std::optional<double> alone = losses_of(context, d.refit).mean();
+  std::vector<ScoredHypothesis>& all = d.hypotheses;
+  std::vector<std::optional<double>> losses;
+  for (const ScoredHypothesis& a : all) losses.push_back(losses_of(context, a.held_out).mean());
+  const auto idle = [&](std::size_t with, const std::optional<double>& without) {
+    return losses[with] && without && !(*losses[with] < *without);
+  };
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (!all[i].fitted()) continue;
+    bool refuted = all[i].effects.size() == 1 && idle(i, alone);
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      const ScoredHypothesis& part = all[k];
+      refuted |= part.fitted() && part.has_remainder() == all[i].has_remainder() &&
+                 part.effects.size() + 1 == all[i].effects.size() && idle(i, losses[k]) &&
+                 std::ranges::all_of(part.effects,
+                                     [&](const std::string& e) { return std::ranges::count(all[i].effects, e) > 0; });
+    }
+    if (refuted) all[i].log_evidence = kRefuted;
   }
-  for (ScoredHypothesis& a : d.hypotheses)
-    if (std::ranges::count(idle, &a) > 0) a.log_evidence = kRefuted;
 }
 
 /// A background magnitude acts linearly, while a simulated effect may explain more. So that this is no evidence for the

@@ -288,9 +288,10 @@ Rows BeatAveragedPrediction::predict(const VehicleHypothesis& hypothesis) const 
     s.gravity_m_s2 = log_.header.gravity_m_s2;
     return s;
   };
-  std::vector<model::Hanging<double>> weights(motion_.size());
+  std::vector<model::Hanging<double>> weights;  // [grid] a weight on a line; empty: none
   for (const Acting& a : acting) {
     if (a.effect->averaged.swing == nullptr) continue;
+    weights.resize(motion_.size());
     a.effect->averaged.hang(a.values.data(), at_rest(0), weights[0]);
     for (std::size_t k = 1; k < weights.size(); ++k) {
       weights[k] = weights[k - 1];
@@ -314,7 +315,7 @@ Rows BeatAveragedPrediction::predict(const VehicleHypothesis& hypothesis) const 
     s.gravity_m_s2 = log_.header.gravity_m_s2;
     s.air_density_kg_m3 = ambient.air_density_kg_m3;
     s.ground_z_m = ambient.ground_z_m;
-    s.weight = weights[at];
+    if (!weights.empty()) s.weight = weights[at];
     double flapping = 0;
     for (std::size_t k = 0; k < b.actuators.size(); ++k) {
       const model::BeatAveraged::Actuator& a = b.actuators[k];

@@ -156,7 +156,7 @@ TEST(NextExperiment, ProposesNothingWithoutRivalsOrWhereOneIsLost) {
   EXPECT_TRUE(rank_experiments(d, prior, choice).empty());
 }
 
-/// What a dash is expected to tell of a little drag, given reference flights of a manoeuvre.
+/// Expected nats of a dash for a little drag over none, where reference flights of `manoeuvre` are at hand.
 double expected_with_reference(const sim::Randomisation& prior, const char* manoeuvre) {
   const model::Vehicle& vehicle = prior.nominal();
   const rollout::FlyConfig flown = library({manoeuvre})[0].config;
