@@ -62,12 +62,12 @@ std::vector<std::string> contrast_warnings(const std::vector<flightlog::FlightHe
     if (quantities[q].name == "time" || quantities[q].name == "heading")
       continue;  // a model's errors do not depend on it
     Range range;
+    const auto values = [q](const auto& f) { return f->regimes()[q].values; };
     for (const auto& f : references)
-      for (const double v : f->regimes()[q].values)
-        range.low = std::min(range.low, v), range.high = std::max(range.high, v);
+      for (const double v : values(f)) range.low = std::min(range.low, v), range.high = std::max(range.high, v);
     double beyond = 0, all = 0;
     for (const auto& f : tests)
-      for (const double v : f->regimes()[q].values) beyond += v < range.low || v > range.high ? 1 : 0, all += 1;
+      for (const double v : values(f)) beyond += v < range.low || v > range.high ? 1 : 0, all += 1;
     if (beyond > kMaxBeyond * all)
       lines.push_back(io::format(
           "%.0f %% of the flights have a %s that the reference never has (%.3g to %.3g %s): "
