@@ -14,6 +14,7 @@ struct PartInfo {
   const char* name;
   const char* frame;
   std::vector<Signal> signals;
+  const char* positive = "";
 };
 
 /// Signals of each Part, in bit order; previous_action's are added from the task's action. Ranges of a flying vehicle.
@@ -21,13 +22,23 @@ const std::vector<PartInfo>& part_infos() {
   static const std::vector<PartInfo> infos = [] {
     std::vector<PartInfo> list = {
         {"rotation_matrix", "B in W", {}},
-        {"position_error", "W", {{"x_error", "m", -1, 1}, {"y_error", "m", -1, 1}, {"z_error", "m", -1, 1}}},
-        {"velocity", "W", {{"x_velocity", "m/s", -3, 3}, {"y_velocity", "m/s", -3, 3}, {"z_velocity", "m/s", -3, 3}}},
+        {"position_error",
+         "W",
+         {{"x_error", "m", -1, 1}, {"y_error", "m", -1, 1}, {"z_error", "m", -1, 1}},
+         "estimate beyond the set point along the axis"},
+        {"velocity",
+         "W",
+         {{"x_velocity", "m/s", -3, 3}, {"y_velocity", "m/s", -3, 3}, {"z_velocity", "m/s", -3, 3}},
+         "estimate less set point, along the axis"},
         {"body_rate",
          "B",
-         {{"roll_rate", "rad/s", -50, 50}, {"pitch_rate", "rad/s", -50, 50}, {"yaw_rate", "rad/s", -50, 50}}},
-        {"beat_phase", "", {{"beat_sin", "1", -1, 1}, {"beat_cos", "1", -1, 1}}},
-        {"heading_error", "about z of W", {{"heading_sin", "1", -1, 1}, {"heading_cos", "1", -1, 1}}},
+         {{"roll_rate", "rad/s", -50, 50}, {"pitch_rate", "rad/s", -50, 50}, {"yaw_rate", "rad/s", -50, 50}},
+         "right-handed about x, y, z: right side down, nose down, nose to the left"},
+        {"beat_phase", "", {{"beat_sin", "1", -1, 1}, {"beat_cos", "1", -1, 1}}, "of the phase, 0 where a beat begins"},
+        {"heading_error",
+         "about z of W",
+         {{"heading_sin", "1", -1, 1}, {"heading_cos", "1", -1, 1}},
+         "of the estimate's heading less the set point's; nose to the left of it"},
         {"previous_action", "", {}},
         {"goal_rotation", "B in the goal's heading frame", {}},
         {"time", "", {{"time", "s", 0, 1}}},
@@ -37,7 +48,8 @@ const std::vector<PartInfo>& part_infos() {
          {{"left_stroke", "rad", -1.6, 1.6},
           {"right_stroke", "rad", -1.6, 1.6},
           {"left_stroke_rate", "rad/s", -300, 300},
-          {"right_stroke_rate", "rad/s", -300, 300}}}};
+          {"right_stroke_rate", "rad/s", -300, 300}},
+         "wing backward"}};
     for (const char* row : {"x", "y", "z"})
       for (const char* column : {"x", "y", "z"})
         for (const auto& [part, name] :
@@ -50,7 +62,7 @@ const std::vector<PartInfo>& part_infos() {
           {std::string("trim_") + inputs[i], i < 3 ? "V" : "1", i > 0 ? -trim_high[i] : 0, trim_high[i]});
     }
     for (PartInfo& info : list)
-      for (Signal& s : info.signals) s.frame = info.frame;
+      for (Signal& s : info.signals) s.frame = info.frame, s.positive = info.positive;
     return list;
   }();
   return infos;
@@ -321,10 +333,15 @@ std::vector<Signal> Task::observation() const {
 std::vector<Signal> Task::action() const {
   static constexpr const char* kInputs[] = {"amplitude", "difference", "bias", "split_cycle"};
   static constexpr const char* kVoltages[] = {"left_voltage", "right_voltage"};
+  static constexpr const char* kPositive[] = {"both voltages swing wider", "left swings wider, right less",
+                                              "both voltages higher", "left falls faster than it rises, right slower"};
   std::vector<Signal> list;
   for (int i = 0; i < actions(); ++i)
     list.push_back({sets_voltages() ? kVoltages[i] : kInputs[i], i < 3 ? input_unit : "1", constants.action_low[i],
-                    constants.action_high[i]});
+                    constants.action_high[i], "",
+                    sets_voltages()     ? "wing backward"
+                    : input_unit == "V" ? kPositive[i]
+                                        : ""});
   return list;
 }
 

@@ -19,8 +19,9 @@ using policy::kMaxActions, policy::kMaxHistory, policy::kMaxObservation;
 /// Description of one element of the observation or the action.
 struct Signal {
   std::string name, unit;
-  double low, high;     ///< expected range; values outside are possible
-  std::string frame{};  ///< frame of its axes; empty: none
+  double low, high;        ///< expected range; values outside are possible
+  std::string frame{};     ///< frame of its axes; empty: none
+  std::string positive{};  ///< what a positive value means; empty: not signed
 };
 
 /// Parts of an observation, in the order of their bits.

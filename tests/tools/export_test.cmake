@@ -21,7 +21,9 @@ foreach(row IN ITEMS "8 bits differ by at most, % of an output's range: amplitud
 endforeach()
 expect_keys(${WORK}/out.json run=STRING config_sha256=STRING int8_error.largest=ARRAY parity=OBJECT)
 file(GLOB left RELATIVE ${WORK}/out ${WORK}/out/* ${WORK}/out/.*)
-set(expected flappy_controller.h flappy_policy.h flappy_policy_int8.h)
+set(expected README.md contract.json flappy_controller.h flappy_policy.h flappy_policy_int8.h)
+expect_keys(${WORK}/out/contract.json policy_crc32=NUMBER controller_crc32=NUMBER period_us.control=NUMBER observation=ARRAY normalisation.mean=ARRAY
+  test_vectors.action=ARRAY)
 if(TORCH)
   list(APPEND expected policy.pt)
   expect_match("stdout" "${out}" "TorchScript differs by at most, % of an output's range: amplitude [0-9.e-]+ ")

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "deploy/header/contract.hpp"
 #include "deploy/header/controller_header.hpp"
 #include "deploy/header/policy_header.hpp"
 #include "deploy/header/policy_vectors.hpp"
@@ -129,6 +130,12 @@ void run(const Request& request, const io::Program& program) {
     print("8 bits differ by at most", error, run.fly.fleet.task.action());
     json["int8_error"] = json_of(error);
   }
+  deploy::ExportedCrc crc{deploy::crc_of_header(e.files["flappy_policy.h"]), {}};
+  if (with_controller) crc.controller = deploy::crc_of_header(e.files["flappy_controller.h"]);
+  PolicyVectors own = tests;
+  own.action = deploy::evaluate(network, own.observation);
+  e.files["contract.json"] = deploy::contract_json(run.fly, run.info, network, own, crc);
+  e.files["README.md"] = deploy::wiring_text(run.fly, run.info, with_controller);
   const io::TemporaryFolder work;
   if (policy::reads_torch_script()) {
     e.files["policy.pt"] = policy::torch_script(network, deploy::contract_text(run.fly, run.info));
@@ -170,7 +177,7 @@ void run(const Request& request, const io::Program& program) {
   std::map<std::string, std::string> files;
   for (const auto& [name, text] : e.files)
     if (name.ends_with(".h")) files[policy::with_prefix(name, request.name)] = policy::with_prefix(text, request.name);
-    else files[name] = text;
+    else files[name] = name == "README.md" ? policy::with_prefix(text, request.name) : text;
   write_all(request.out, request.name, files);
   for (const auto& [name, text] : files)
     std::printf("%s: %zu bytes\n", (fs::path(request.out) / name).c_str(), text.size());

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "deploy/header/c_text.hpp"
@@ -36,6 +37,27 @@ void list(std::ostringstream& text, const char* title, const std::vector<Signal>
     trimmed.erase(trimmed.find_last_not_of(' ') + 1);
     text << trimmed << "\n";
   }
+}
+
+nlohmann::ordered_json json_of(const std::vector<Signal>& signals) {
+  auto list = nlohmann::ordered_json::array();
+  for (const Signal& s : signals)
+    list.push_back({{"name", s.name},
+                    {"unit", s.unit},
+                    {"frame", s.frame},
+                    {"positive", s.positive},
+                    {"low", s.low},
+                    {"high", s.high}});
+  return list;
+}
+
+/// Rows of `width` numbers.
+nlohmann::ordered_json rows_of(const std::vector<float>& numbers, std::size_t width) {
+  auto rows = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i + width <= numbers.size(); i += width)
+    rows.push_back(std::vector<float>(numbers.begin() + static_cast<std::ptrdiff_t>(i),
+                                      numbers.begin() + static_cast<std::ptrdiff_t>(i + width)));
+  return rows;
 }
 
 bool holds_trim(const FlyConfig& config) { return config.fleet.task.constants.holds_trim > 0; }
@@ -107,6 +129,77 @@ std::uint32_t contract_crc32(const FlyConfig& config) {
   std::vector<float> letters;  // one number per letter, because only equality matters
   for (const char c : text.str()) letters.push_back(c);
   return crc32(0, letters);
+}
+
+std::uint32_t crc_of_header(const std::string& text) {
+  const std::string key = "_CRC32 ";
+  return static_cast<std::uint32_t>(std::stoul(text.substr(text.find(key) + key.size())));
+}
+
+std::string contract_json(const FlyConfig& config, const policy::RunInfo& run, const policy::PolicyNetwork& network,
+                          const policy::PolicyVectors& vectors, const ExportedCrc& crc) {
+  const Periods p = periods_of(config);
+  const flight::Task& task = config.fleet.task;
+  const flight::Sensors& s = config.fleet.sensors;
+  nlohmann::ordered_json json = {
+      {"schema", 1},
+      {"task", run.task},
+      {"config_sha256", run.config_sha256},
+      {"commit", run.commit},
+      {"dirty", run.dirty},
+      {"contract_crc32", contract_crc32(config)},
+      {"policy_crc32", crc.policy},
+      {"controller_crc32", crc.controller ? nlohmann::ordered_json(*crc.controller) : nlohmann::ordered_json()},
+      {"period_us", {{"control", p.control_us}, {"policy", p.policy_us}, {"driver", p.driver_us}}},
+      {"flapping_Hz", model::beats_Hz(config.vehicle)},
+      {"holds_trim", holds_trim(config)},
+      {"sensors",
+       {{"imu_Hz", s.imu.rate_hz},
+        {"imu_latency_s", s.imu.latency_s},
+        {"imu_position_m", {s.imu.position_m.x, s.imu.position_m.y, s.imu.position_m.z}},
+        {"mocap_Hz", s.mocap.rate_hz},
+        {"mocap_latency_s", s.mocap.latency_s}}},
+      {"history", task.history},
+      {"observation", json_of(task.observation())},
+      {"normalisation", {{"mean", network.mean}, {"scale", network.scale}, {"clip", network.clip}}},
+      {"action", json_of(task.action())},
+      {"test_vectors",
+       {{"observation", rows_of(vectors.observation, static_cast<std::size_t>(network.inputs()))},
+        {"action", rows_of(vectors.action, static_cast<std::size_t>(network.outputs()))}}}};
+  return json.dump(2) + "\n";
+}
+
+std::string wiring_text(const FlyConfig& config, const policy::RunInfo& run, bool with_controller) {
+  const Periods p = periods_of(config);
+  std::ostringstream text;
+  text
+      << "# A policy of the task " << run.task << ", exported by flappy-export\n\n"
+      << "`contract.json` has the order, frame, unit, sign and range of every observation and action, the periods, "
+         "the\n"
+      << "normalisation, checksums and test vectors. The comment at the head of each header says the same in words.\n\n"
+      << "1. Put the headers on the include path, of gcc from 9 or clang from 11. They need no library.\n"
+      << "2. At start-up, fly only if `flappy_policy_selftest()`"
+      << (with_controller ? " and `flappy_controller_selftest()` return" : " returns") << " 0.\n";
+  if (with_controller) {
+    text << "3. Convert what your sensors say: rates in rad/s and specific force in m/s^2 (at rest +9.8 along z), both "
+            "in\n"
+         << "   B: x forward, y left, z up; poses of the torso's origin in W, z up, attitude as w, x, y, z from B to "
+            "W.\n"
+         << "4. `flappy_controller_start()` with the pose; then, every " << p.control_us << " us, in this order:\n"
+         << "   - if `flappy_controller_policy_due()`: `_observe()`, `flappy_policy_step()`, `_act()`\n"
+         << "   - `_steer()`, and from then on `_drive()` every " << p.driver_us << " us: the motors' voltages\n"
+         << "   - at the end of the period `_imu()` and `_pose()` with all that has arrived, oldest first, then "
+            "`_tick()`\n"
+         << "5. `flappy_controller_hover()` until the trim is learnt, then `flappy_controller_begin()`: the policy "
+            "acts.\n"
+         << "6. Log what the sensors said and the voltages that were set, with their times, for `flappy-gap`.\n";
+  } else {
+    text << "3. Every " << p.policy_us
+         << " us, fill the observation in the order of `contract.json`, raw, in its units:\n"
+         << "   `flappy_policy_step()` normalises it. What it returns holds until the next call.\n"
+         << "4. If it returns 1, a number was none: do not use the action.\n";
+  }
+  return text.str();
 }
 
 std::string contract_macros(const std::string& prefix, const FlyConfig& config, const policy::RunInfo& run) {
