@@ -92,6 +92,20 @@ struct FamilyEscape {
   flightlog::FlightLog log;
 };
 
+/// What steers a robot from on board: samples go in as they arrive, the motors' voltages come out. Times are the log's.
+class OnBoard {
+ public:
+  using Pose = std::array<double, 7>;  ///< torso origin in W, m; attitude w, x, y, z, B to W
+  virtual ~OnBoard() = default;
+  /// The robot is at rest in the air.
+  virtual void start(double now_s, const Pose& pose) = 0;
+  /// Rate, rad/s, and specific force, m/s^2, in the axes of the IMU.
+  virtual void imu(double arrived_s, const std::array<double, 3>& rate, const std::array<double, 3>& force) = 0;
+  virtual void pose(double arrived_s, const Pose& pose) = 0;
+  /// Voltages (left, right) until the next call; all that has arrived by now was handed over.
+  virtual std::array<double, 2> volts(double now_s) = 0;
+};
+
 class Family {
  public:
   virtual ~Family() = default;
@@ -104,6 +118,10 @@ class Family {
   virtual FamilyFlight fly(const Assignment& a, std::size_t flight) const = 0;
   virtual Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect,
                             double magnitude) const = 0;
+  /// Flies under a firmware, from rest at `start` (x, y, z in m, heading in rad) and t = 0 on; it may tumble. The log has
+  /// no inputs of the beat and no phase.
+  virtual FamilyFlight fly_on_board(const Assignment& a, std::size_t number, const std::array<double, 4>& start,
+                                    double lasts_s, OnBoard& firmware) const = 0;
   virtual FamilyEscape escape(const Assignment& a, std::size_t number, const EscapeAssignment& rules) const = 0;
 };
 

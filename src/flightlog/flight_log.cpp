@@ -117,10 +117,26 @@ PowerHeader parse_power_header(const io::Table& power, bool declared_inputs) {
   return h;
 }
 
+FlownHeader parse_flown(const io::Table& flown) {
+  flown.accept({"start_s", "start_pose", "begin_s", "hand_back_s", "policy_crc32", "controller_crc32"});
+  const io::Range time{-kLatest, kLatest};
+  FlownHeader h{.start_s = flown.number("start_s", time)};
+  if (flown.has("start_pose"))
+    std::ranges::copy(flown.numbers("start_pose", 7, {-1e6, 1e6}), h.start_pose.emplace().begin());
+  if (flown.has("begin_s")) h.begin_s = flown.number("begin_s", time);
+  if (flown.has("hand_back_s")) h.hand_back_s = flown.number("hand_back_s", time);
+  const auto crc = [&](const char* key, std::optional<std::uint32_t>& to) {
+    if (flown.has(key)) to = static_cast<std::uint32_t>(flown.integer_or(key, 0, 0, 0xffffffff));
+  };
+  crc("policy_crc32", h.policy_crc32);
+  crc("controller_crc32", h.controller_crc32);
+  return h;
+}
+
 FlightHeader parse_header(const io::Table& root) {
   root.schema(1);
   root.accept({"schema", "vehicle", "vehicle_sha256", "flapping_Hz", "gravity_m_s2", "ambient", "command", "mocap",
-               "imu", "power", "wings", "attitude", "changes"});
+               "imu", "power", "wings", "attitude", "changes", "flown"});
   FlightHeader h;
   h.vehicle = root.string("vehicle");
   if (h.vehicle.empty() || h.vehicle.find_first_of("/\\") != std::string::npos)
@@ -149,6 +165,7 @@ FlightHeader parse_header(const io::Table& root) {
     h.attitude = {attitude->number("rate_hz", rate), attitude->number("latency_s", latency),
                   attitude->number("noise_rad", non_negative(1))};
   h.changes = model::read_changes(root);
+  if (const auto flown = root.optional_table("flown")) h.flown = parse_flown(*flown);
   root.finish();
   return h;
 }
@@ -236,6 +253,15 @@ std::string header_text(const FlightHeader& h) {
     number("noise_rad", h.attitude->noise_rad);
   }
   text += model::changes_text(h.changes);
+  if (h.flown) {
+    text += "\n[flown]\n";
+    number("start_s", h.flown->start_s);
+    if (h.flown->start_pose) line("start_pose", array(*h.flown->start_pose));
+    if (h.flown->begin_s) number("begin_s", *h.flown->begin_s);
+    if (h.flown->hand_back_s) number("hand_back_s", *h.flown->hand_back_s);
+    if (h.flown->policy_crc32) line("policy_crc32", std::to_string(*h.flown->policy_crc32));
+    if (h.flown->controller_crc32) line("controller_crc32", std::to_string(*h.flown->controller_crc32));
+  }
   return text;
 }
 

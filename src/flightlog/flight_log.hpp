@@ -19,6 +19,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -97,6 +98,16 @@ struct AttitudeHeader {
   bool operator==(const AttitudeHeader&) const = default;
 };
 
+/// How exported C (flappy-export) flew, for its replay: table [flown]. Times are on the log's clock.
+struct FlownHeader {
+  double start_s = 0;                                           ///< flappy_controller_start()
+  std::optional<std::array<double, 7>> start_pose;              ///< told to it: m; attitude w, x, y, z
+  std::optional<double> begin_s;                                ///< flappy_controller_begin(): the policy acts
+  std::optional<double> hand_back_s;                            ///< when the policy handed back
+  std::optional<std::uint32_t> policy_crc32, controller_crc32;  ///< FLAPPY_POLICY_CRC32 of what flew, and so on
+  bool operator==(const FlownHeader&) const = default;
+};
+
 /// All of flight.toml.
 struct FlightHeader {
   std::string vehicle;              ///< name of the vehicle's file, without folder
@@ -111,6 +122,7 @@ struct FlightHeader {
   std::optional<WingsHeader> wings;
   std::optional<AttitudeHeader> attitude;
   model::Changes changes;  ///< what was done to the robot on purpose before this flight
+  std::optional<FlownHeader> flown;
   bool operator==(const FlightHeader&) const = default;
 };
 

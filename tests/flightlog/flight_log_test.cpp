@@ -82,6 +82,14 @@ std::string with_line(const std::string& name, int number, const std::string& li
 TEST(FlightLog, ReadsBackExactly) {
   const flightlog::FlightLog log = sample_log();
   EXPECT_EQ(flightlog::parse_flight_log(flight_log_files(log), "log"), log);
+  flightlog::FlightLog flown = log;
+  flown.header.flown = {.start_s = 0.1,
+                        .start_pose = {{0.1, 0.2, 1, 1, 0, 0, 0}},
+                        .begin_s = 2,
+                        .hand_back_s = 2.6,
+                        .policy_crc32 = 4294967295U,
+                        .controller_crc32 = 1};
+  EXPECT_EQ(flightlog::parse_flight_log(flight_log_files(flown), "log"), flown);
   flightlog::FlightLog least = log;
   least.header.vehicle_sha256.clear();
   least.header.ambient.walls.clear();
@@ -255,10 +263,11 @@ TEST(FlightLog, RefusesFaultyHeaders) {
   EXPECT_EQ(header("schema = 1", "schema = 2"),
             "log/flight.toml:1:10: schema: 2 is read by a newer flappy than this one; accepted: 1");
   EXPECT_EQ(header("schema = 1", "schema = 0"), "log/flight.toml:1:10: schema: 0 is read by no flappy; accepted: 1");
-  EXPECT_EQ(header("gravity_m_s2", "gravity"),
-            "log/flight.toml:5:1: gravity: unknown key; accepted: ambient, attitude, changes, command, flapping_Hz, "
-            "gravity_m_s2, imu, "
-            "mocap, power, schema, vehicle, vehicle_sha256, wings");
+  EXPECT_EQ(
+      header("gravity_m_s2", "gravity"),
+      "log/flight.toml:5:1: gravity: unknown key; accepted: ambient, attitude, changes, command, flapping_Hz, flown, "
+      "gravity_m_s2, imu, "
+      "mocap, power, schema, vehicle, vehicle_sha256, wings");
   EXPECT_EQ(header("gravity_m_s2 = 9.8", "# "),
             "log/flight.toml: gravity_m_s2: is missing; accepted: a number from 0 to 100");
   EXPECT_EQ(header("flapping_Hz = 34.0", "flapping_Hz = -34.0"),

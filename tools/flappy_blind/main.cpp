@@ -1,4 +1,5 @@
 // flappy-blind: flies robots of independent simulators, with or without effects, and writes their logs; makes and scores benchmarks.
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -11,6 +12,7 @@
 #include "benchmark/score_bench.hpp"
 #include "benchmark/true_values.hpp"
 #include "blind/a/family_a.hpp"
+#include "blind/firmware/firmware.hpp"
 #include "escapes.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "io/config.hpp"
@@ -63,6 +65,61 @@ Json fly_family(const RobotOptions& o, const FamilyOptions& f) {
   return {{"family", f.family}, {"seed", o.seed}, {"draw", robot.draw}, {"crashes", robot.lost}, {"flights", folders}};
 }
 
+constexpr double kOrigin_m = 1;  ///< of the task's world above the ground, so that its goal is in mid-air
+
+/// Poses in the task's world.
+class InTask final : public OnBoard {
+ public:
+  explicit InTask(OnBoard& firmware) : firmware_(firmware) {}
+  void start(double now_s, const Pose& pose) override { firmware_.start(now_s, lowered(pose)); }
+  void imu(double arrived_s, const std::array<double, 3>& rate, const std::array<double, 3>& force) override {
+    firmware_.imu(arrived_s, rate, force);
+  }
+  void pose(double arrived_s, const Pose& pose) override { firmware_.pose(arrived_s, lowered(pose)); }
+  std::array<double, 2> volts(double now_s) override { return firmware_.volts(now_s); }
+
+ private:
+  static Pose lowered(Pose pose) {
+    pose[2] -= kOrigin_m;
+    return pose;
+  }
+  OnBoard& firmware_;
+};
+
+/// A robot under exported C: it hovers from rest on, and from `begin_s` on the policy acts.
+struct OnBoardOptions {
+  std::string exported, firmware = "none";
+  double begin_s = 2, lasts_s = 5;
+  std::vector<double> start = {0, 0, 0, 0};  ///< x, y, z in m in the task's world, heading in rad
+};
+
+Json fly_with_firmware(const RobotOptions& o, const FamilyOptions& f, const OnBoardOptions& b) {
+  const Family& family = benchmark::family_named(f.family);
+  Assignment a;
+  a.vehicle_file = o.vehicle;
+  for (const BlindEffect& e : effects_of(o.effects)) a.effects.emplace_back(e.id, e.magnitude);
+  a.own_parameters = f.own_parameters, a.conventions = f.conventions;
+  a.seed = o.seed;
+  const std::array<double, 4> start = {b.start[0], b.start[1], b.start[2] + kOrigin_m, b.start[3]};
+  // what the laboratory declares of the sensors is what its firmware knows
+  const flightlog::FlightHeader declared = family.fly_on_board(a, 0, start, 0.01, *silent_firmware()).log.header;
+  const auto firmware =
+      make_firmware(b.exported, b.firmware, {declared.imu.latency_s, declared.mocap.latency_s}, b.begin_s);
+  InTask in_task(*firmware);
+  FamilyFlight flown = family.fly_on_board(a, 0, start, b.lasts_s, in_task);
+  for (double& z : flown.log.mocap.z_m) z -= kOrigin_m;
+  flown.log.header.ambient.ground_z_m -= kOrigin_m;
+  flown.log.header.ambient.ceiling_z_m -= kOrigin_m;
+  flightlog::FlownHeader& h = flown.log.header.flown.emplace();
+  h.start_pose = {b.start[0], b.start[1], b.start[2], std::cos(start[3] / 2), 0, 0, std::sin(start[3] / 2)};
+  h.begin_s = b.begin_s;
+  flightlog::write_flight_log(o.out, flown.log);
+  const double lasted_s = flown.log.command.t_s.back();
+  std::printf("%s: %.3f s%s%s\n", o.out.c_str(), lasted_s, flown.crashed ? ", then " : "", flown.how.c_str());
+  return {{"family", f.family},   {"seed", o.seed},           {"firmware", b.firmware},
+          {"lasted_s", lasted_s}, {"crashed", flown.crashed}, {"how", flown.how}};
+}
+
 Json fly_case(const RobotOptions& o, Programme programme) {
   const Robots robots(o);
   const std::filesystem::path folder(o.out);
@@ -113,6 +170,13 @@ int main(int argc, char** argv) {
   fly.flag("--calm-reference", of.calm_reference, "the reference hovers and follows slow paths");
   fly.flag("--own-parameters", of.own_parameters, "of a family: draw the parameters of each body");
   fly.flag("--conventions", of.conventions, "of a family: draw sensors and declarations as laboratories have them");
+  blind::OnBoardOptions on_board;
+  fly.option("--exported", on_board.exported,
+             "of a family: one flight under what flappy-export wrote, into --out itself");
+  fly.option("--firmware", on_board.firmware, "mistake of the firmware around it").shows_default();
+  fly.option("--begin", on_board.begin_s, "when the policy acts, s").range(0.0, 60.0).shows_default();
+  fly.option("--duration", on_board.lasts_s, "of that flight, s").range(0.1, 60.0).shows_default();
+  fly.option("--start", on_board.start, "x, y, z in m and heading in rad");
   fly.option("--out", robot.out, "folder for flight_1, flight_2, flight_3").required();
   io::Command escape = program.app().command("escape", "flies a policy's manoeuvre many times over");
   blind::EscapeOptions escapes{.robot = {}, .policy = {}, .config = io::config_path("fly/escape.toml")};
@@ -236,6 +300,12 @@ int main(int argc, char** argv) {
       of.hover = of.hover || programme == "hover";
       if (of.family.empty() && (of.own_parameters || of.conventions))
         throw io::InputError("--own-parameters, --conventions: are of a family; accepted: with --family");
+      if (!on_board.exported.empty()) {
+        if (of.family.empty()) throw io::InputError("--exported: flies robots of a family; accepted: with --family");
+        if (on_board.start.size() != 4) throw io::InputError("--start: accepted: four numbers, x y z heading");
+        program.write_json(blind::fly_with_firmware(robot, of, on_board));
+        return;
+      }
       program.write_json(of.family.empty() ? blind::fly_case(robot, of.hover ? Programme::hover : Programme::rich)
                                            : blind::fly_family(robot, of));
       std::printf("%s\n", io::shown_by(robot.out).c_str());

@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "check_flown.hpp"
 #include "flightlog/check/check.hpp"
 #include "flightlog/check/data_faults.hpp"
 #include "gap/diagnose/diagnose_command.hpp"
@@ -154,7 +155,10 @@ int main(int argc, char** argv) {
   io::Command check = program.app().command(
       "check", "axes, units, clocks and dropouts of logs; exit code 1 where a fault forbids a diagnosis");
   std::vector<std::string> folders;
+  std::string exported;
   check.option("flight", folders, "folders of flight logs").required();
+  check.option("--flown", exported,
+               "what flappy-export wrote: whether the robot flew it; exit code 1 where it did not");
   io::Command import =
       program.app().command("import", "makes a flight log of a bag (MCAP, SQLite), a ULog, or CSV files");
   gap::ImportCommand import_command;
@@ -227,7 +231,11 @@ int main(int argc, char** argv) {
     if (blind.given())
       throw io::InputError(
           "flappy-gap blind: is a program of its own now; accepted: flappy-blind make, flappy-blind score");
-    if (check.given()) {
+    if (check.given() && !exported.empty()) {
+      const nlohmann::ordered_json found = gap::check_flown(exported, folders);
+      faulty = !found["as_exported"];
+      program.write_json(found);
+    } else if (check.given()) {
       const nlohmann::ordered_json found = gap::check(folders);
       faulty = found["faults"] > 0;
       program.write_json(found);

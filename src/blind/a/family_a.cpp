@@ -226,6 +226,16 @@ class FamilyA final : public Family {
     return out;
   }
 
+  FamilyFlight fly_on_board(const Assignment& a, std::size_t number, const std::array<double, 4>& start, double lasts_s,
+                            OnBoard& firmware) const override {
+    Torso at;
+    at.position_m = {start[0], start[1], start[2]};
+    at.attitude = turned_by({0, 0, start[3]});
+    RobotFlight f = blind::fly_on_board(case_of(a), number, at, lasts_s, firmware);
+    if (a.conventions) misdeclare(f.log.header, a.seed);
+    return {f.crashed, std::move(f.how), std::move(f.log)};
+  }
+
   FamilyEscape escape(const Assignment&, std::size_t, const EscapeAssignment&) const override {
     throw io::InputError("--family a: flies escapes by the task's own rules; accepted: escape without --family");
   }

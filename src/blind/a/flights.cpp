@@ -54,6 +54,7 @@ void add_command(flightlog::FlightLog& log, double t_s, const std::array<double,
   c.t_s.push_back(tidy(t_s));
   c.left_voltage_V.push_back(volts[0]);
   c.right_voltage_V.push_back(volts[1]);
+  if (!c.inputs) return;
   c.inputs->amplitude_V.push_back(u.amplitude_V);
   c.inputs->difference_V.push_back(u.difference_V);
   c.inputs->bias_V.push_back(u.bias_V);
@@ -161,8 +162,33 @@ RobotFlight fly(const Case& c, std::size_t flight, const Watch& watch) {
   return f;
 }
 
-RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double duration_s, double least_upright,
-                const Steer& steer, const Watch& watch) {
+namespace {
+
+/// Hands samples to a firmware when they arrive.
+class Arrivals {
+ public:
+  explicit Arrivals(OnBoard& firmware) : firmware_(firmware) {}
+  void add(const RobotImu::Sample& s) { imu_.push_back(s); }
+  void add(const RobotMocap::Sample& s) { mocap_.push_back(s); }
+  void hand_over(double now_s) {
+    const auto three = [](const Vector3d& v) { return std::array<double, 3>{v.x(), v.y(), v.z()}; };
+    for (; !imu_.empty() && tidy(imu_.front().arrival_s) <= now_s + 1e-9; imu_.erase(imu_.begin()))
+      firmware_.imu(tidy(imu_.front().arrival_s), three(imu_.front().gyro_rad_s), three(imu_.front().accel_m_s2));
+    for (; !mocap_.empty() && tidy(mocap_.front().arrival_s) <= now_s + 1e-9; mocap_.erase(mocap_.begin()))
+      firmware_.pose(tidy(mocap_.front().arrival_s), pose_of(mocap_.front().position_m, mocap_.front().attitude));
+  }
+  static OnBoard::Pose pose_of(const Vector3d& p, const Quaterniond& q) {
+    return {p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()};
+  }
+
+ private:
+  OnBoard& firmware_;
+  std::vector<RobotImu::Sample> imu_;
+  std::vector<RobotMocap::Sample> mocap_;
+};
+
+RobotFlight flown(const Case& c, std::size_t flight, const Torso& start, double duration_s, double least_upright,
+                  const Steer& steer, const Watch& watch, OnBoard* firmware) {
   const Room room = flight_room();
   const SensorSet sensors = c.sensors ? *c.sensors : sensors_of(c.seed, c.power, c.wings);
   const std::uint64_t number = flight_number(c.session, flight);
@@ -172,19 +198,23 @@ RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double du
   Random power_random(c.seed, 100 * number + 161), wings_random(c.seed, 100 * number + 162);
   RobotFlight f;
   f.log.header = header_of(c, sensors, room);
-  f.log.command.inputs.emplace();
-  f.log.command.phase_rad.emplace();
+  if (!firmware) f.log.command.inputs.emplace(), f.log.command.phase_rad.emplace();
   if (sensors.power) f.log.power.emplace();
   if (sensors.wings) f.log.wings.emplace();
 
   robot.place_torso(start);
 
   const auto steps_of = [](double s) { return static_cast<std::int64_t>(std::lround(s / kRobotStep_s)); };
-  const std::int64_t trim = steps_of(kTrim_s), end = trim + steps_of(duration_s), control = steps_of(kControl_s),
-                     hold = steps_of(c.vehicle.driver.hold_s);
+  const std::int64_t trim = firmware ? 0 : steps_of(kTrim_s), end = trim + steps_of(duration_s),
+                     control = steps_of(kControl_s), hold = steps_of(c.vehicle.driver.hold_s);
   std::array<double, 2> volts{};
   Inputs inputs;
   std::int64_t mocap_count = 0, power_count = 0, wings_count = 0;
+  std::optional<Arrivals> arrivals;
+  if (firmware) {
+    arrivals.emplace(*firmware);
+    firmware->start(0, Arrivals::pose_of(start.position_m, start.attitude));
+  }
   const auto due = [](std::int64_t step, double rate_hz, std::int64_t& count) {
     if (step < std::llround(static_cast<double>(count) / (rate_hz * kRobotStep_s))) return false;
     ++count;
@@ -197,7 +227,7 @@ RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double du
     const double turns = static_cast<double>(n) * kRobotStep_s * c.vehicle.driver.flapping_Hz,
                  beat = turns - std::floor(turns);
     if (n % control == 0) {
-      inputs = steer(t_s, beat, robot.torso());
+      if (!firmware) inputs = steer(t_s, beat, robot.torso());
       if (logged) {
         add_truth(f.truth, t_s, robot, imu.constant_bias_rad_s());
         f.most_tilt_rad = std::max(f.most_tilt_rad,
@@ -213,12 +243,20 @@ RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double du
       }
     }
     if (n % hold == 0) {
-      volts = {RobotController::voltage(inputs, 0, beat, c.vehicle.left.motor.voltage_limit_V),
-               RobotController::voltage(inputs, 1, beat, c.vehicle.right.motor.voltage_limit_V)};
+      if (firmware) {
+        arrivals->hand_over(t_s);
+        volts = firmware->volts(t_s);
+      } else {
+        volts = {RobotController::voltage(inputs, 0, beat, c.vehicle.left.motor.voltage_limit_V),
+                 RobotController::voltage(inputs, 1, beat, c.vehicle.right.motor.voltage_limit_V)};
+      }
       if (logged) add_command(f.log, t_s, volts, inputs, 2 * kPi * beat);
     }
     if (logged && due(step, sensors.mocap.rate_hz, mocap_count))
-      if (const auto s = mocap.look(robot.torso(), t_s)) add(f.log, *s);
+      if (const auto s = mocap.look(robot.torso(), t_s)) {
+        add(f.log, *s);
+        if (arrivals) arrivals->add(*s);
+      }
     if (logged && sensors.wings && due(step, sensors.wings->rate_hz, wings_count)) {
       flightlog::WingsStream& w = *f.log.wings;
       const auto seen = [&](double angle) { return angle + sensors.wings->noise_rad * wings_random.normal(); };
@@ -231,7 +269,10 @@ RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double du
     if (watch) watch(robot, volts);
     robot.step(volts[0], volts[1]);
     if (!logged) continue;
-    if (const auto s = imu.after_step(robot, t_s + kRobotStep_s)) add(f.log, *s);
+    if (const auto s = imu.after_step(robot, t_s + kRobotStep_s)) {
+      add(f.log, *s);
+      if (arrivals) arrivals->add(*s);
+    }
     if (sensors.power && due(step, sensors.power->rate_hz, power_count)) {
       flightlog::PowerStream& p = *f.log.power;  // values at the start of the step
       p.t_s.push_back(tidy(t_s + sensors.power->latency_s));
@@ -241,6 +282,18 @@ RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double du
     }
   }
   return f;
+}
+
+}  // namespace
+
+RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double duration_s, double least_upright,
+                const Steer& steer, const Watch& watch) {
+  return flown(c, flight, start, duration_s, least_upright, steer, watch, nullptr);
+}
+
+RobotFlight fly_on_board(const Case& c, std::size_t flight, const Torso& start, double duration_s, OnBoard& firmware) {
+  constexpr double kAnyWayUp = -2;
+  return flown(c, flight, start, duration_s, kAnyWayUp, {}, {}, &firmware);
 }
 
 }  // namespace flappy::blind

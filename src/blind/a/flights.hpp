@@ -59,4 +59,7 @@ using Steer = std::function<Inputs(double t_s, double beat, const Torso& torso)>
 RobotFlight fly(const Case& c, std::size_t flight, const Torso& start, double duration_s, double least_upright,
                 const Steer& steer, const Watch& watch = {});
 
+/// Flies under a firmware, without trimming.
+RobotFlight fly_on_board(const Case& c, std::size_t flight, const Torso& start, double duration_s, OnBoard& firmware);
+
 }  // namespace flappy::blind

@@ -1,5 +1,6 @@
 #include "blind/b/family_b.hpp"
 
+#include <cmath>
 #include <string>
 
 #include "blind/b/contrast.hpp"
@@ -29,6 +30,16 @@ class FamilyB final : public Family {
                     double magnitude) const override {
     check_flight(flight);
     return contrast_of(a, flight, effect, magnitude);
+  }
+  FamilyFlight fly_on_board(const Assignment& a, std::size_t number, const std::array<double, 4>& start, double lasts_s,
+                            OnBoard& firmware) const override {
+    Flight flown(a, make_case(a), draw_number(number, a.session), {start[0], start[1], start[2]}, start[3], 0);
+    firmware.start(0, {start[0], start[1], start[2], std::cos(start[3] / 2), 0, 0, std::sin(start[3] / 2)});
+    FamilyFlight out;
+    while (out.how.empty() && flown.time_s() < lasts_s - 1e-9) out.how = flown.tick(firmware);
+    out.crashed = !out.how.empty();
+    out.log = flown.log(flown.time_s());
+    return out;
   }
   FamilyEscape escape(const Assignment& a, std::size_t number, const EscapeAssignment& rules) const override {
     return fly_escape(a, number, rules);

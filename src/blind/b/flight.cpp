@@ -74,8 +74,33 @@ std::string Flight::tick(const Beat& sent, bool may_tumble) {
     const double beats = (now + trim_s_) * f.flapping_Hz;
     c.phase_rad->push_back(2 * std::numbers::pi * (beats - std::floor(beats)));
   }
+  const std::string how = fly(waveform(f, radio_.arrived(sent, now), now + trim_s_), may_tumble);
+  observer_.tick(sensors_, time_s());  // takes the samples, which are then no firmware's
+  return how;
+}
+
+std::string Flight::tick(OnBoard& firmware) {
+  const double now = std::max(0.0, time_s());
+  const auto three = [](const Vector3d& v) { return std::array<double, 3>{v.x(), v.y(), v.z()}; };
+  while (const auto s = sensors_.imu(now)) firmware.imu(s->arrival_s, three(s->gyro_rad_s), three(s->accel_m_s2));
+  while (const auto s = sensors_.mocap(now)) {
+    const Vector3d& p = s->position_m;
+    const Eigen::Quaterniond& q = s->attitude;
+    firmware.pose(s->arrival_s, {p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()});
+  }
+  const std::array<double, 2> volts = firmware.volts(now);
+  log_.command.inputs.reset();
+  log_.command.phase_rad.reset();
+  log_.command.t_s.push_back(now);
+  log_.command.left_voltage_V.push_back(volts[0]);
+  log_.command.right_voltage_V.push_back(volts[1]);
+  return fly(volts, true);
+}
+
+std::string Flight::fly(const std::array<double, 2>& volts, bool may_tumble) {
+  const double now = time_s();
   sensors_.before_tick(robot_, now);
-  robot_.drive(waveform(f, radio_.arrived(sent, now), now + trim_s_));
+  robot_.drive(volts);
   for (int step = 1; step <= kStepsPerTick; ++step) {
     if (path_) {
       std::array<double, 13> pose;
@@ -87,7 +112,6 @@ std::string Flight::tick(const Beat& sent, bool may_tumble) {
     sensors_.after_step(robot_, now + step * kStep_s, step);
   }
   ++ticks_;
-  observer_.tick(sensors_, time_s());
   return robot_.crash(may_tumble);
 }
 

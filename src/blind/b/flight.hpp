@@ -39,6 +39,8 @@ class Flight {
 
   /// Flies one tick; inputs are held between the pilot's periods. Returns how the robot crashed, or an empty string.
   std::string tick(const Beat& sent, bool may_tumble = false);
+  /// The same with voltages of a firmware, which gets the samples that have arrived.
+  std::string tick(OnBoard& firmware);
   double time_s() const { return static_cast<double>(ticks_) * kTick_s - trim_s_; }
   long ticks() const { return ticks_; }
   bool steers_now() const { return ticks_ % 2 == 0; }
@@ -57,6 +59,7 @@ class Flight {
   Radio radio_;
   double trim_s_;
   long ticks_ = 0;
+  std::string fly(const std::array<double, 2>& volts, bool may_tumble);
   Path* path_ = nullptr;
   flightlog::FlightLog log_;
 };

@@ -20,6 +20,10 @@ class FamilyC final : public Family {
                     double magnitude) const override {
     return contrast_of(a, flight, effect, magnitude);
   }
+  FamilyFlight fly_on_board(const Assignment& a, std::size_t number, const std::array<double, 4>& start, double lasts_s,
+                            OnBoard& firmware) const override {
+    return c::fly_on_board(a, number, start, lasts_s, firmware);
+  }
   FamilyEscape escape(const Assignment& a, std::size_t number, const EscapeAssignment& rules) const override {
     return escape_of(a, number, rules);
   }

@@ -85,4 +85,32 @@ Flown fly_one(const Assignment& a, std::size_t flight, bool keep_path, Length le
   return flown;
 }
 
+FamilyFlight fly_on_board(const Assignment& a, std::size_t number, const std::array<double, 4>& start, double lasts_s,
+                          OnBoard& firmware) {
+  Robot robot(a, number);
+  Sensors sensors(a, number, robot, sensor_parameters(a, robot));
+  const double tick_s = robot.parameters().hold_s;
+  const Eigen::Quaterniond attitude(Eigen::AngleAxisd(start[3], Eigen::Vector3d::UnitZ()));
+  robot.mechanism().place({start[0], start[1], start[2]}, attitude);
+  firmware.start(0, {start[0], start[1], start[2], attitude.w(), attitude.x(), attitude.y(), attitude.z()});
+  FamilyFlight flight;
+  flightlog::CommandStream& commands = flight.log.command;
+  double end_s = 0;
+  for (long tick = 0; flight.how.empty() && tick < std::lround(lasts_s / tick_s); ++tick) {
+    const double t_s = static_cast<double>(tick) * tick_s;
+    sensors.hand_over(firmware, t_s);
+    const std::array<double, 2> volts = firmware.volts(t_s);
+    commands.t_s.push_back(t_s);
+    commands.left_voltage_V.push_back(volts[0]);
+    commands.right_voltage_V.push_back(volts[1]);
+    std::size_t step = 0;
+    robot.tick(volts, [&] { sensors.after_step(robot, t_s + static_cast<double>(++step) * robot.step_s()); });
+    end_s = t_s + tick_s;
+    flight.how = trouble(robot, true);
+  }
+  flight.crashed = !flight.how.empty();
+  sensors.finish(flight.log, end_s);
+  return flight;
+}
+
 }  // namespace flappy::blind::c

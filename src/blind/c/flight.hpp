@@ -19,6 +19,10 @@ struct Flown {
 
 Flown fly_one(const Assignment& a, std::size_t flight, bool keep_path = false, Length length = {});
 
+/// Family::fly_on_board().
+FamilyFlight fly_on_board(const Assignment& a, std::size_t number, const std::array<double, 4>& start, double lasts_s,
+                          OnBoard& firmware);
+
 /// Phase of the beat from 0 to 1; a beat begins at t = 0.
 double beat_phase(double t_s, double flapping_Hz);
 void add_command(flightlog::CommandStream& commands, double t_s, const std::array<double, 2>& voltages,

@@ -173,6 +173,15 @@ void Sensors::wings(const Robot& robot, double t_s) {
   for (std::size_t i = 0; i < 4; ++i) columns[i]->push_back(read[i]);
 }
 
+void Sensors::hand_over(OnBoard& firmware, double now_s) {
+  for (std::size_t& i = imu_given_; i < imu_.t_s.size() && imu_.t_s[i] <= now_s; ++i)
+    firmware.imu(imu_.t_s[i], {imu_.gyro_x_rad_s[i], imu_.gyro_y_rad_s[i], imu_.gyro_z_rad_s[i]},
+                 {imu_.accel_x_m_s2[i], imu_.accel_y_m_s2[i], imu_.accel_z_m_s2[i]});
+  for (std::size_t& i = mocap_given_; i < mocap_.t_s.size() && mocap_.t_s[i] <= now_s; ++i)
+    firmware.pose(mocap_.t_s[i], {mocap_.x_m[i], mocap_.y_m[i], mocap_.z_m[i], mocap_.qw[i], mocap_.qx[i], mocap_.qy[i],
+                                  mocap_.qz[i]});
+}
+
 void Sensors::finish(flightlog::FlightLog& log, double end_s) const {
   log.header = f_.declared;
   log.mocap = mocap_;

@@ -51,6 +51,8 @@ class Sensors {
   Sensors(const Assignment& a, std::size_t flight, const Robot& robot, SensorParameters parameters);
   /// To be called when a step of the robot has ended, at `t_s` of the log.
   void after_step(const Robot& robot, double t_s);
+  /// Gives a firmware what has arrived by now and was not given before.
+  void hand_over(OnBoard& firmware, double now_s);
   /// Puts the record from t = 0 to `end_s` into a log that already has its commands.
   void finish(flightlog::FlightLog& log, double end_s) const;
 
@@ -71,7 +73,7 @@ class Sensors {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
   Vector6 passed_ = Vector6::Zero(), sum_ = Vector6::Zero(), held_ = Vector6::Zero(), foam_ = Vector6::Zero(),
           foam_rate_ = Vector6::Zero();
-  std::size_t count_ = 0, lost_ = 0;
+  std::size_t count_ = 0, lost_ = 0, imu_given_ = 0, mocap_given_ = 0;
   bool settled_ = false;
   flightlog::MocapStream mocap_;
   flightlog::ImuStream imu_;

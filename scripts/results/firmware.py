@@ -1,0 +1,209 @@
+#!/usr/bin/env python3
+"""Whether flappy-gap check --flown finds the mistakes of firmwares: robots of the blind families fly an exported policy with one mistake each.
+Prints the tables of docs/results/firmware.md; every flight and answer is kept in OUT, so it goes on where it was stopped.
+
+    scripts/results/firmware.py BIN PROJECT RUN OTHER_RUN OUT [--robots N] [--families a b c] [--only MISTAKE...] [--effects N]
+"""
+
+import argparse
+import csv
+import json
+import pathlib
+import re
+import shutil
+import subprocess
+import time
+
+# What the check has to answer for each mistake of the firmware: the kind, and a pattern for its words.
+ANSWERS = {
+    "gyro_degrees": ("sensor", "gyro's rates are in degrees"),
+    "accel_g": ("sensor", "accelerometer's values are in g"),
+    "accel_sign": ("sensor", "accelerometer has the other sign"),
+    "accel_z_sign": ("sensor", "accelerometer's z has the other sign"),
+    "gyro_x_sign": ("sensor", "gyro's x has the other sign"),
+    "gyro_y_sign": ("sensor", "gyro's y has the other sign"),
+    "gyro_z_sign": ("sensor", "gyro's z has the other sign"),
+    "gyro_xy_swapped": ("sensor", "gyro's x and y are swapped"),
+    "gyro_yz_swapped": ("sensor", "gyro's y and z are swapped"),
+    "accel_xy_swapped": ("sensor", "accelerometer's x and y are swapped"),
+    "imu_quarter_turn": ("sensor", "IMU is turned by 90 degrees about z"),
+    "imu_upside_down": ("sensor", "IMU is turned by 180 degrees about x"),
+    "quaternion_xyzw": ("sensor", "order x, y, z, w"),
+    "quaternion_to_body": ("sensor", "quaternion turns W into B"),
+    "yaw_quarter_turn": ("sensor", "world is turned by (90|89.99\\d*|90.0\\d*) degrees about z"),
+    "yaw_third_turn": ("sensor", "world is turned by (30|29.99\\d*|30.0\\d*) degrees about z"),
+    "heading_half_turn": ("sensor", "heading of motion capture is -?(180|179.9\\d*|180.0\\d*) degrees off"),
+    "mocap_z_down": ("sensor", "motion capture has z down"),
+    "mocap_y_up": ("sensor", "motion capture's world has y up"),
+    "position_mm": ("sensor", "position is in mm"),
+    "position_and_velocity_swapped": ("observation", "position error and velocity are swapped"),
+    "velocity_and_rate_swapped": ("observation", "velocity and body rate are swapped"),
+    "rate_and_phase_swapped": ("observation", "body rate and beat phase are swapped"),
+    "no_mean": ("observation", "normalisation's mean is left out"),
+    "no_scale": ("observation", "normalisation's scale is left out"),
+    "no_normalisation": ("observation", "normalisation is left out"),
+    "rate_zero": ("observation", "body rate stays 0"),
+    "velocity_zero": ("observation", "velocity stays 0"),
+    "previous_zero": ("observation", "previous action stays 0"),
+    "trim_zero": ("observation", "trim stays 0"),
+    "rotation_transposed": ("observation", "goal rotation is transposed"),
+    "goal_elsewhere": ("observation", "relative to a goal"),
+    "every_second": ("time", "acts every 2 of"),
+    "every_third": ("time", "acts every 3 of"),
+    "one_period_late": ("time", "act \\d+ control periods late"),
+    "two_periods_late": ("time", "act \\d+ control periods late"),
+    "imu_held": ("time", "one of 2 samples of the IMU"),
+    "pose_held": ("time", "one of 3 poses"),
+    "clock_1024": ("time", "clock takes 1.02"),
+    "never_back": ("time", "never hands back"),
+    "back_early": ("time", "hands back after"),
+    "difference_and_bias_swapped": ("output", "inputs difference and bias are swapped"),
+    "bias_sign": ("output", "input bias has the other sign"),
+    "split_mirrored": ("output", "input split cycle has the other sign"),
+    "policy_difference_sign": ("output", "policy's difference has the other sign"),
+    "not_clipped": ("output", "not clipped"),
+    "clipped_low": ("output", "clipped at 9"),
+    "shares": ("output", "voltages are 0.45"),
+    "wings_swapped": ("output", "other wing's voltage"),
+    "int8": ("software", "policy in 8 bits"),
+    "contracted": ("software", "contracted"),
+    "another_policy": ("software", "another policy flies"),
+    "another_gain": ("software", "controller's .* is 0.7"),
+}
+CRASH_S = 0.3  # a robot that flies for less leaves little to go by
+EFFECTS = ["wing_damage", "battery_sag", "added_mass", "driver_bandwidth", "com_offset", "spring_hardening", "wind", "body_drag", "gear_backlash", "mocap_delay"]
+
+
+def run(*arguments, accept=(0,)):
+    done = subprocess.run([str(a) for a in arguments], capture_output=True, text=True)
+    if done.returncode not in accept:
+        raise SystemExit(f"{' '.join(str(a) for a in arguments)}\n{done.stderr.strip()}")
+    return done
+
+
+def export(a, source, to, *more):
+    if not (to / "contract.json").exists():
+        run(a.bin / "flappy-export", source, "--out", to, *more)
+    return to
+
+
+def with_another_gain(exported, to):
+    """The same export, the roll's first gain multiplied by 0.7."""
+    if not to.exists():
+        shutil.copytree(exported, to)
+        header = to / "flappy_controller.h"
+        line = re.compile(r"(\n *\{?)(-?0x[0-9a-fp.+-]+)(F.*/\* roll \*/)")
+        text, count = line.subn(lambda m: m[1] + float.hex(float.fromhex(m[2]) * 0.7) + m[3], header.read_text(), count=1)
+        if count != 1:
+            raise SystemExit(f"{header}: no gain of this name")
+        header.write_text(text)
+    return to
+
+
+def fly(a, family, seed, exported, mistake, out, effects=()):
+    log = out / "flight"
+    answer = out / "flown.json"
+    if not answer.exists():
+        out.mkdir(parents=True, exist_ok=True)
+        run(a.bin / "flappy-blind", "fly", "--family", family, "--seed", seed, "--own-parameters", "--exported", exported, "--firmware", mistake,
+            "--out", log, "--json", out / "fly.json", *[x for e in effects for x in ("--effect", e)])
+    return log, json.loads((out / "fly.json").read_text())
+
+
+def check(a, log, out, name="flown"):
+    answer = out / f"{name}.json"
+    if not answer.exists():
+        before = time.monotonic()
+        run(a.bin / "flappy-gap", "check", log, "--flown", a.out / "exported", "--json", answer, accept=(0, 1))
+        (out / f"{name}.s").write_text(f"{time.monotonic() - before:.3f}")
+    return json.loads(answer.read_text())["flights"][0], float((out / f"{name}.s").read_text())
+
+
+def coarse(log, to):
+    """The log as a real one: five digits, and every second sample of the IMU."""
+    if to.exists():
+        return to
+    shutil.copytree(log, to)
+    for file in to.glob("*.csv"):
+        rows = list(csv.reader(file.open()))
+        keep = rows[:1] + (rows[2::2] if file.name == "imu.csv" else rows[1:])
+        with file.open("w", newline="") as f:
+            writer = csv.writer(f, lineterminator="\n")
+            writer.writerow(keep[0])
+            for row in keep[1:]:
+                writer.writerow([row[0]] + [f"{float(x):.5g}" for x in row[1:]])
+    return to
+
+
+def verdict(answer, kind, words):
+    """right, kind, wrong, silent or unexplained."""
+    if answer["as_exported"]:
+        return "silent"
+    if not answer["mistakes"]:
+        return "unexplained"
+    first = answer["mistakes"][0]
+    if len(answer["mistakes"]) == 1 and re.search(words, first["words"]):
+        return "right"
+    return "kind" if first["kind"] == kind else "wrong"
+
+
+def main():
+    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name in ("bin", "project", "run", "other_run", "out"):
+        p.add_argument(name, type=pathlib.Path)
+    p.add_argument("--robots", type=int, default=3)
+    p.add_argument("--families", nargs="+", default=["a", "b", "c"])
+    p.add_argument("--only", nargs="+", default=list(ANSWERS))
+    p.add_argument("--effects", type=int, default=60, help="flights without a mistake but with an effect")
+    a = p.parse_args()
+    a.out.mkdir(parents=True, exist_ok=True)
+    exported = export(a, a.run, a.out / "exported", "--int8")
+    others = {"another_policy": export(a, a.other_run, a.out / "other"), "another_gain": with_another_gain(exported, a.out / "gain")}
+    rows = {}
+    print("| mistake | full log | five digits, half the samples | crashed within 0.3 s | answers that were not right |\n|---|---|---|---|---|")
+    for mistake in a.only:
+        kind, words = ANSWERS[mistake]
+        full, thin, early, others_said = [], [], [], []
+        for family in a.families:
+            for seed in range(1, a.robots + 1):
+                out = a.out / "flights" / mistake / f"{family}_{seed}"
+                log, flown = fly(a, family, seed, others.get(mistake, exported), "none" if mistake in others else mistake, out)
+                answer, took = check(a, log, out)
+                is_early = flown["crashed"] and flown["lasted_s"] < CRASH_S
+                (early if is_early else full).append((verdict(answer, kind, words), took))
+                if (early if is_early else full)[-1][0] not in ("right", "silent"):
+                    said = answer["mistakes"][0]["words"] if answer["mistakes"] else answer["unexplained"]
+                    others_said.append(f"{family}{seed}: {said}")
+                if not is_early:
+                    thin.append((verdict(check(a, coarse(log, out / "coarse"), out, "coarse")[0], kind, words), 0))
+        rows[mistake] = (full, thin, early)
+
+        def share(list_):
+            counted = [v for v, _ in list_ if v != "silent"]
+            return f"{sum(v == 'right' for v in counted)} of {len(counted)}" if list_ else "-"
+
+        print(f"| {mistake} | {share(full)} | {share(thin)} | {share(early)} | {'; '.join(others_said)} |", flush=True)
+    everything = {k: [v for row in rows.values() for v in row[i]] for i, k in enumerate(("full", "thin", "early"))}
+    for name, list_ in everything.items():
+        counted = [v for v, _ in list_ if v != "silent"]
+        right, of_kind = sum(v == "right" for v in counted), sum(v in ("right", "kind") for v in counted)
+        print(f"{name}: right {right} of {len(counted)}, kind right {of_kind}, no change beyond the digits {len(list_) - len(counted)}")
+    took = sorted(s for _, s in everything["full"])
+    if took:
+        print(f"time of a check: median {took[len(took) // 2]:.2f} s, longest {took[-1]:.2f} s")
+    as_exported, times, wrong = 0, [], []
+    for i in range(a.effects):
+        family, effect, size = a.families[i % len(a.families)], EFFECTS[i // len(a.families) % len(EFFECTS)], 1 + i // (len(EFFECTS) * len(a.families)) % 2
+        out = a.out / "effects" / f"{family}_{effect}_{size}_{i}"
+        log, _ = fly(a, family, 100 + i, exported, "none", out, [f"{effect}={size}"])
+        answer, took = check(a, log, out)
+        as_exported += answer["as_exported"]
+        times.append(took)
+        if not answer["as_exported"]:
+            wrong.append(out.name)
+    if times:
+        print(f"no mistake, an effect: {as_exported} of {len(times)} flew what was exported; a check takes {sorted(times)[len(times) // 2]:.2f} s; not: {' '.join(wrong) or 'none'}")
+
+
+if __name__ == "__main__":
+    main()

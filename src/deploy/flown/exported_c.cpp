@@ -1,0 +1,190 @@
+#include "deploy/flown/exported_c.hpp"
+
+#include <dlfcn.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <system_error>
+
+#include "io/files.hpp"
+#include "io/run_program.hpp"
+#include "io/temporary_folder.hpp"
+
+namespace flappy::deploy {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Compiled after both headers. Its names stand for static inline functions, which no library shows.
+constexpr const char* kWrapper = R"(
+unsigned flown_state_bytes(void) { return (unsigned)sizeof(flappy_controller); }
+float *flown_constants(void) { return (float *)&flappy_controller_k; }
+static flappy_quaternion flown_quaternion(const float *x) {
+  flappy_quaternion q;
+  q.w = x[0];
+  q.x = x[1];
+  q.y = x[2];
+  q.z = x[3];
+  return q;
+}
+void flown_start(flappy_controller *c, uint32_t now_us, const float *x) {
+  flappy_controller_start(c, now_us, flappy_vector_from(x), flown_quaternion(x + 3));
+}
+void flown_begin(flappy_controller *c) { flappy_controller_begin(c); }
+int flown_imu(flappy_controller *c, uint32_t taken_us, const float *x) {
+  return flappy_controller_imu(c, taken_us, flappy_vector_from(x), flappy_vector_from(x + 3));
+}
+int flown_pose(flappy_controller *c, uint32_t taken_us, const float *x) {
+  return flappy_controller_pose(c, taken_us, 1, flappy_vector_from(x), flown_quaternion(x + 3));
+}
+int flown_tick(flappy_controller *c, uint32_t now_us) { return flappy_controller_tick(c, now_us); }
+int flown_handed_back(const flappy_controller *c) { return c->handed_back; }
+void flown_set_handed_back(flappy_controller *c, int is) { c->handed_back = is; }
+uint32_t flown_ticks(const flappy_controller *c) { return c->tick; }
+void flown_observe(const flappy_controller *c, float *obs) { flappy_controller_observe(c, obs); }
+void flown_forget(flappy_controller *c) {
+#if FLAPPY_CONTROLLER_PAST > 0
+  c->remembers = 0;
+#else
+  (void)c;
+#endif
+}
+int flown_policy(const float *obs, float *action) { return flappy_policy_step(obs, action); }
+void flown_act(flappy_controller *c, const float *action) { flappy_controller_act(c, action); }
+void flown_steer(flappy_controller *c, float *input) {
+  flappy_controller_steer(c);
+  input[0] = c->input.amplitude_V;
+  input[1] = c->input.difference_V;
+  input[2] = c->input.bias_V;
+  input[3] = c->input.split_cycle;
+}
+void flown_drive(flappy_controller *c, const float *input, float *volts) {
+  c->input.amplitude_V = input[0];
+  c->input.difference_V = input[1];
+  c->input.bias_V = input[2];
+  c->input.split_cycle = input[3];
+  flappy_controller_drive(c, volts, volts + 1);
+}
+)";
+
+/// Names of the numbers of flappy_controller_k, in their order: each is in a comment at the end of its line.
+std::vector<std::pair<std::string, std::size_t>> names_of_constants(const std::string& header) {
+  std::vector<std::pair<std::string, std::size_t>> names;
+  const std::size_t begin = header.find("flappy_controller_constants flappy_controller_k = {");
+  std::istringstream lines(header.substr(begin, header.find("};", begin) - begin));
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t comment = line.find("/* "), end = line.find(" */");
+    if (comment == std::string::npos || line.find("0x") == std::string::npos) continue;
+    std::size_t count = 0;
+    for (std::size_t at = line.find("0x"); at < comment; at = line.find("0x", at + 2)) ++count;
+    names.emplace_back(line.substr(comment + 3, end - comment - 3), count);
+  }
+  return names;
+}
+
+[[noreturn]] void refuse(const fs::path& file, const std::string& what, const std::string& accepted) {
+  throw io::InputError(file.string() + ": " + what + "; accepted: " + accepted);
+}
+
+std::string read_header(const fs::path& file) {
+  if (!fs::exists(file)) refuse(file, "is not there", "a folder that flappy-export wrote");
+  return io::read_text(file);
+}
+
+/// The headers with constants that may be changed.
+std::string source_of(const fs::path& folder, Build build, const std::string& controller) {
+  const std::string constant = "static const flappy_controller_constants flappy_controller_k";
+  std::string text = controller;
+  const std::size_t at = text.find(constant);
+  if (at == std::string::npos)
+    refuse(folder / "flappy_controller.h", "has no constants", "a header that flappy-export wrote");
+  text.replace(at, constant.size(), "static flappy_controller_constants flappy_controller_k");
+  return read_header(folder / (build == Build::int8 ? "flappy_policy_int8.h" : "flappy_policy.h")) + text + kWrapper;
+}
+
+}  // namespace
+
+Contract read_contract(const fs::path& folder) {
+  const fs::path file = folder / "contract.json";
+  if (!fs::exists(file)) refuse(file, "is not there", "a folder that flappy-export wrote");
+  try {
+    const auto json = nlohmann::json::parse(io::read_text(file));
+    if (json.at("schema") != 1) refuse(file, "schema " + json.at("schema").dump(), "1");
+    if (json.at("controller_crc32").is_null()) refuse(file, "has no controller", "an export with flappy_controller.h");
+    Contract c;
+    c.task = json.at("task");
+    c.policy_crc32 = json.at("policy_crc32");
+    c.controller_crc32 = json.at("controller_crc32");
+    const auto& period = json.at("period_us");
+    c.control_s = 1e-6 * period.at("control").get<double>();
+    c.policy_s = 1e-6 * period.at("policy").get<double>();
+    c.driver_s = 1e-6 * period.at("driver").get<double>();
+    const auto& sensors = json.at("sensors");
+    c.imu_Hz = sensors.at("imu_Hz");
+    c.imu_latency_s = sensors.at("imu_latency_s");
+    c.mocap_Hz = sensors.at("mocap_Hz");
+    c.mocap_latency_s = sensors.at("mocap_latency_s");
+    c.history = json.at("history");
+    const auto signals = [](const nlohmann::json& list) {
+      std::vector<Contract::Signal> to;
+      for (const auto& s : list) to.push_back({s.at("name"), s.at("unit"), s.at("low"), s.at("high")});
+      return to;
+    };
+    c.observation = signals(json.at("observation"));
+    c.action = signals(json.at("action"));
+    c.mean = json.at("normalisation").at("mean").get<std::vector<float>>();
+    c.scale = json.at("normalisation").at("scale").get<std::vector<float>>();
+    if (c.mean.size() != c.observation.size() || c.scale.size() != c.observation.size() || c.action.size() != 4)
+      refuse(file, "its lists differ in length", "a file that flappy-export wrote");
+    return c;
+  } catch (const nlohmann::json::exception& e) {
+    refuse(file, std::string("is damaged: ") + e.what(), "a file that flappy-export wrote");
+  }
+}
+
+ExportedC::ExportedC(const fs::path& folder, Build build) {
+  const std::string controller = read_header(folder / "flappy_controller.h");
+  const io::TemporaryFolder work;
+  const fs::path source = work / "flown.c", library = work / "flown.so";
+  io::write_atomically(source, source_of(folder, build, controller));
+  std::vector<std::string> command = {build == Build::contracted ? "clang" : "cc", "-O1", "-shared", "-fPIC"};
+  if (build == Build::contracted) command.insert(command.end(), {"-ffp-contract=fast", "-march=native"});
+  command.insert(command.end(), {source.string(), "-o", library.string()});
+  try {
+    if (const io::Finished done = io::run(command); done.exit_code != 0)
+      refuse(folder, "does not compile: " + done.err.substr(0, done.err.find('\n')),
+             "headers that flappy-export wrote");
+  } catch (const std::system_error& e) {
+    refuse(folder, "cannot be compiled: " + command.front() + ": " + e.code().message(), "a compiler of this name");
+  }
+  library_ = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (library_ == nullptr) refuse(folder, std::string("cannot be loaded: ") + dlerror(), "headers for this processor");
+  const auto take = [&](auto& to, const char* name) {
+    to = reinterpret_cast<std::remove_reference_t<decltype(to)>>(dlsym(library_, name));
+  };
+  take(start, "flown_start");
+  take(begin, "flown_begin");
+  take(imu, "flown_imu");
+  take(pose, "flown_pose");
+  take(tick, "flown_tick");
+  take(handed_back, "flown_handed_back");
+  take(set_handed_back, "flown_set_handed_back");
+  take(ticks, "flown_ticks");
+  take(observe, "flown_observe");
+  take(forget, "flown_forget");
+  take(policy, "flown_policy");
+  take(act, "flown_act");
+  take(steer, "flown_steer");
+  take(drive, "flown_drive");
+  float* next = reinterpret_cast<float* (*)()>(dlsym(library_, "flown_constants"))();
+  for (const auto& [name, count] : names_of_constants(controller))
+    for (std::size_t i = 0; i < count; ++i) constants_[name].push_back(next++);
+}
+
+ExportedC::~ExportedC() { dlclose(library_); }
+
+std::size_t ExportedC::state_bytes() const {
+  return reinterpret_cast<unsigned (*)()>(dlsym(library_, "flown_state_bytes"))();
+}
+
+}  // namespace flappy::deploy

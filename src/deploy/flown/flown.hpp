@@ -1,0 +1,45 @@
+// Says whether a robot flew what was exported: its log, replayed through the exported C, gives the voltages that it
+// logged, or which mistake of its firmware explains them.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "deploy/flown/mistakes.hpp"
+#include "deploy/flown/onboard_log.hpp"
+
+namespace flappy::deploy {
+
+struct FlownMistake {
+  Stage stage = Stage::sensor;
+  std::string id, words;
+};
+
+struct Flown {
+  bool as_exported = false;
+  double share = 0;                    ///< of the commands, within tolerance as exported
+  double tolerance_V = 0;              ///< median over commands
+  double from_s = 0;                   ///< first command that differs, on the log's clock
+  std::vector<FlownMistake> mistakes;  ///< that explain it together; empty: none does
+  double explained = 0;                ///< share of the commands within tolerance with these mistakes
+  std::string unexplained;             ///< where nothing explains it: what differs
+};
+
+/// Checks one flight. `folder`: what flappy-export wrote. io::InputError for a folder without headers or contract.json.
+class FlownCheck {
+ public:
+  explicit FlownCheck(const std::filesystem::path& folder);
+  Flown check(const OnboardLog& log) const;
+  const Contract& contract() const { return contract_; }
+
+ private:
+  const ExportedC& library(Build build) const;
+  std::filesystem::path folder_;
+  Contract contract_;
+  bool has_int8_;
+  mutable std::map<Build, std::unique_ptr<const ExportedC>> libraries_;  ///< compiled when first used
+  std::vector<Mistake> mistakes_;
+};
+
+}  // namespace flappy::deploy

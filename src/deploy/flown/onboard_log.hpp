@@ -1,0 +1,38 @@
+// What reached a robot's processor in a flight, and what it told the motors. One clock; times in s.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+namespace flappy::deploy {
+
+struct OnboardLog {
+  struct Imu {
+    double arrived_s;
+    std::array<double, 3> rate_rad_s, force_m_s2;  ///< in B
+  };
+  struct Pose {
+    double arrived_s;
+    std::array<double, 3> position_m;
+    std::array<double, 4> attitude;  ///< w, x, y, z, B to W
+  };
+  /// Voltages that hold until the next.
+  struct Command {
+    double t_s, left_V, right_V;
+  };
+  std::vector<Imu> imu;
+  std::vector<Pose> poses;
+  std::vector<Command> commands;
+  double imu_latency_s = 0, pose_latency_s = 0;
+
+  double start_s = 0;                               ///< flappy_controller_start()
+  std::optional<std::array<double, 7>> start_pose;  ///< none: of the pose that arrived last before it
+  std::optional<double> begin_s;                    ///< flappy_controller_begin(); none: the policy never acts
+  std::optional<double> hand_back_s;                ///< as the robot says; none: not known
+
+  // Steps between the numbers that the log can tell apart; 0: all digits are there
+  double rate_step_rad_s = 0, force_step_m_s2 = 0, position_step_m = 0, attitude_step = 0, voltage_step_V = 0;
+};
+
+}  // namespace flappy::deploy

@@ -1,0 +1,129 @@
+// Whether the robot flew what was exported: each mistake is put between the samples of a flight and the exported C, and
+// has to be found again from samples and voltages.
+#include "deploy/flown/flown.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "deploy/flown/replay.hpp"
+#include "deploy/header/contract.hpp"
+#include "deploy/header/controller_header.hpp"
+#include "deploy/header/policy_header.hpp"
+#include "deploy/header/policy_vectors.hpp"
+#include "rollout/fly_fixture.hpp"
+#include "rollout/rollout.hpp"
+
+namespace flappy::deploy {
+namespace {
+
+using flight::Folder;
+using flight::source_path;
+
+std::shared_ptr<const policy::Actor> random_actor(const flight::Task& task, std::uint32_t seed) {
+  policy::Actor a;
+  a.task = task.name;
+  for (const auto& s : task.observation()) a.observation.push_back(s.name);
+  for (const auto& s : task.action()) a.action.push_back(s.name);
+  a.widths = {static_cast<int>(a.observation.size()), 16, flight::kMaxActions};
+  std::mt19937 random(seed);
+  for (std::size_t i = 0; i < policy::weight_count(a.widths); ++i)
+    a.weights.push_back(0.6 * (static_cast<double>(random()) / 4294967296.0 - 0.5));
+  for (std::size_t i = 0; i < a.observation.size(); ++i) {
+    a.mean.push_back(0.1 + 0.02 * static_cast<double>(i));
+    a.scale.push_back(0.5 + 0.03 * static_cast<double>(i));
+  }
+  return std::make_shared<const policy::Actor>(a);
+}
+
+/// What flappy-export writes.
+void write_export(const std::filesystem::path& folder, std::uint32_t seed) {
+  rollout::FlyConfig config = rollout::read_fly_config(source_path("configs/fly/escape.toml"));
+  config.actor = random_actor(config.fleet.task, seed);
+  const policy::RunInfo run{"0123", "abcd", false, "escape"};
+  const policy::PolicyNetwork network = network_of(config);
+  policy::PolicyVectors tests = corners(network, config.fleet.task.observation());
+  tests.action = evaluate(network, tests.observation);
+  const std::string actor = policy_header(config, run, network, tests),
+                    controller = controller_header(config, run, record_controller(config));
+  io::write_atomically(folder / "flappy_policy.h", actor);
+  io::write_atomically(folder / "flappy_controller.h", controller);
+  io::write_atomically(folder / "contract.json",
+                       contract_json(config, run, network, tests, {crc_of_header(actor), crc_of_header(controller)}));
+}
+
+/// Samples of a lively flight; commands at all times of the driver, their voltages still 0.
+OnboardLog samples(double lasts_s) {
+  rollout::FlyConfig config = rollout::read_fly_config(source_path("configs/fly/lively.toml"), {"precision=float"});
+  rollout::Rollout<float> flight(config, 1);
+  flight.fleet().record(true);
+  OnboardLog log;
+  log.imu_latency_s = config.fleet.sensors.imu.latency_s;
+  log.pose_latency_s = config.fleet.sensors.mocap.latency_s;
+  while (flight.t_s() < lasts_s && !flight.over()) {
+    flight.step();
+    for (const auto& s : flight.fleet().imu_samples(0)) {
+      OnboardLog::Imu to{s.arrival_s, {}, {}};
+      std::ranges::copy(s.gyro_rad_s, to.rate_rad_s.begin());
+      std::ranges::copy(s.accel_m_s2, to.force_m_s2.begin());
+      log.imu.push_back(to);
+    }
+    for (const auto& s : flight.fleet().mocap_samples(0)) {
+      OnboardLog::Pose to{s.arrival_s, {}, {}};
+      std::ranges::copy(s.position_m, to.position_m.begin());
+      std::ranges::copy(s.attitude, to.attitude.begin());
+      if (s.valid) log.poses.push_back(to);
+    }
+  }
+  const double hold_s = config.vehicle.driver.hold_s;
+  for (std::int64_t i = 0; static_cast<double>(i) * hold_s < lasts_s; ++i)
+    log.commands.push_back({static_cast<double>(i) * hold_s, 0, 0});
+  log.begin_s = 0.2;
+  return log;
+}
+
+OnboardLog flown_with(const FlownCheck& check, const ExportedC& c, OnboardLog log, const Wiring& wiring) {
+  const auto volts = replay(c, check.contract(), log, wiring).volts;
+  for (std::size_t i = 0; i < volts.size(); ++i)
+    log.commands[i].left_V = volts[i][0], log.commands[i].right_V = volts[i][1];
+  return log;
+}
+
+TEST(Flown, FindsEachMistakeAgain) {
+  const Folder folder;
+  write_export(folder / "", 7);
+  const FlownCheck check(folder / "");
+  const ExportedC exact(folder / "", Build::exact);
+  const OnboardLog log = samples(0.5);
+  const Flown right = check.check(flown_with(check, exact, log, {}));
+  EXPECT_TRUE(right.as_exported);
+  EXPECT_EQ(right.share, 1);
+  int tried = 0, found = 0, silent = 0;
+  for (const Mistake& m : mistakes_of(check.contract(), exact, false)) {
+    if (!m.starts.empty() || (m.stage != Stage::sensor && m.stage != Stage::output)) continue;
+    std::vector<double> p = m.starts.empty() ? std::vector<double>() : m.starts.front();
+    for (std::size_t k = 0; k < p.size(); ++k) p[k] += 0.7 * m.scales[k];  // not where the search begins
+    Wiring wiring;
+    m.make(wiring, p);
+    if (wiring.build != Build::exact) continue;
+    const Flown flown = check.check(flown_with(check, exact, log, wiring));
+    if (flown.as_exported) {
+      ++silent;
+      std::printf("%s changes nothing\n", m.id.c_str());
+      continue;
+    }
+    ++tried;
+    const bool is = flown.mistakes.size() == 1 && flown.mistakes[0].id == m.id;
+    found += is;
+    if (!is) {
+      std::printf("%s:", m.said(p).c_str());
+      for (const FlownMistake& other : flown.mistakes) std::printf(" %s", other.words.c_str());
+      std::printf(" %s (%.3f)\n", flown.unexplained.c_str(), flown.explained);
+    }
+  }
+  std::printf("%d of %d mistakes found, %d change nothing\n", found, tried, silent);
+  EXPECT_GE(found, 0.95 * tried);
+}
+
+}  // namespace
+}  // namespace flappy::deploy

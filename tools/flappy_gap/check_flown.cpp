@@ -1,0 +1,100 @@
+#include "check_flown.hpp"
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "deploy/flown/flown.hpp"
+#include "flightlog/check/digits.hpp"
+#include "flightlog/flight_log.hpp"
+#include "io/files.hpp"
+#include "io/text.hpp"
+
+namespace flappy::gap {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+[[noreturn]] void refuse(const std::string& folder, const std::string& what, const std::string& accepted) {
+  throw io::InputError(folder + "/flight.toml: " + what + "; accepted: " + accepted);
+}
+
+/// The flight as it passed the robot's processor.
+deploy::OnboardLog onboard(const std::string& folder, const flightlog::FlightLog& log) {
+  const flightlog::FlightHeader& h = log.header;
+  if (!h.inputs.empty())
+    refuse(folder, "has declared inputs, which no exported controller sets", "a log with voltages");
+  deploy::OnboardLog to;
+  to.imu_latency_s = h.imu.latency_s;
+  to.pose_latency_s = h.mocap.latency_s;
+  for (std::size_t i = 0; i < log.imu.t_s.size(); ++i)
+    to.imu.push_back({log.imu.t_s[i],
+                      {log.imu.gyro_x_rad_s[i], log.imu.gyro_y_rad_s[i], log.imu.gyro_z_rad_s[i]},
+                      {log.imu.accel_x_m_s2[i], log.imu.accel_y_m_s2[i], log.imu.accel_z_m_s2[i]}});
+  const flightlog::MocapStream& m = log.mocap;
+  for (std::size_t i = 0; i < m.t_s.size(); ++i)
+    to.poses.push_back({m.t_s[i], {m.x_m[i], m.y_m[i], m.z_m[i]}, {m.qw[i], m.qx[i], m.qy[i], m.qz[i]}});
+  const flightlog::CommandStream& c = log.command;
+  for (std::size_t i = 0; i < c.t_s.size(); ++i)
+    to.commands.push_back({c.t_s[i], c.left_voltage_V[i], c.right_voltage_V[i]});
+  if (h.flown) {
+    to.start_s = h.flown->start_s;
+    to.start_pose = h.flown->start_pose;
+    to.begin_s = h.flown->begin_s;
+    to.hand_back_s = h.flown->hand_back_s;
+  } else {
+    to.start_s = c.t_s.front();
+  }
+  using flightlog::last_digit;
+  to.rate_step_rad_s = last_digit(log.imu.gyro_x_rad_s);
+  to.force_step_m_s2 = last_digit(log.imu.accel_z_m_s2);
+  to.position_step_m = last_digit(m.x_m);
+  to.attitude_step = last_digit(m.qx);
+  to.voltage_step_V = last_digit(c.left_voltage_V);
+  return to;
+}
+
+std::string percent(double share) { return io::format("%.2f %%", 100 * share); }
+
+/// What a person reads.
+std::string sentence(const deploy::Flown& f) {
+  if (f.as_exported)
+    return "the robot flew what was exported (" + percent(f.share) + " of the commands within " +
+           io::format("%.2g V", f.tolerance_V) + ")";
+  std::string text = "the robot did not fly what was exported, from " + io::format("%.3f s", f.from_s) + " on: ";
+  if (f.mistakes.empty()) return text + "no mistake explains it; it differs in " + f.unexplained;
+  for (std::size_t i = 0; i < f.mistakes.size(); ++i) text += (i > 0 ? ", and " : "") + f.mistakes[i].words;
+  return f.explained > 0 ? text + " (" + percent(f.explained) + " of the commands)" : text;
+}
+
+}  // namespace
+
+Json check_flown(const std::string& exported, const std::vector<std::string>& folders) {
+  const deploy::FlownCheck check(exported);
+  Json flights = Json::array();
+  bool all = true;
+  for (const std::string& folder : folders) {
+    const flightlog::FlightLog log = flightlog::read_flight_log(folder);
+    if (const auto& flown = log.header.flown; flown && flown->policy_crc32) {
+      if (*flown->policy_crc32 != check.contract().policy_crc32)
+        std::printf("%s: the log says that another policy flew: %u, and %s has %u\n", folder.c_str(),
+                    *flown->policy_crc32, exported.c_str(), check.contract().policy_crc32);
+    }
+    const deploy::Flown f = check.check(onboard(folder, log));
+    std::printf("%s: %s\n", folder.c_str(), sentence(f).c_str());
+    Json mistakes = Json::array();
+    for (const deploy::FlownMistake& m : f.mistakes)
+      mistakes.push_back({{"kind", name_of(m.stage)}, {"mistake", m.id}, {"words", m.words}});
+    flights.push_back({{"folder", folder},
+                       {"as_exported", f.as_exported},
+                       {"share", f.share},
+                       {"tolerance_V", f.tolerance_V},
+                       {"from_s", f.from_s},
+                       {"mistakes", mistakes},
+                       {"explained", f.explained},
+                       {"unexplained", f.unexplained}});
+    all = all && f.as_exported;
+  }
+  return {{"exported", exported}, {"as_exported", all}, {"flights", flights}};
+}
+
+}  // namespace flappy::gap
