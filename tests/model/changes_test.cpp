@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "flappy/vehicle_file.hpp"
 #include "io/config.hpp"
 #include "refusal.hpp"
