@@ -10,9 +10,11 @@
 namespace flappy::learn {
 namespace {
 
+constexpr std::size_t kLongest = 64;  // numbers of any observation or action below
+
 /// A transition whose numbers all tell its number.
 void add_numbered(Replay& replay, int number) {
-  const std::vector<float> many(32, static_cast<float>(number));
+  const std::vector<float> many(kLongest, static_cast<float>(number));
   replay.add({many.data(), many.data(), many.data(), many[0], many[0]});
 }
 
@@ -44,7 +46,7 @@ TEST(Replay, putting_many_at_once_is_adding_them) {
   Replay one = random_replay(kWide, 7), other = random_replay(kWide, 7);
   for (int i = 0; i < 5; ++i) add_numbered(one, i);
   for (const std::size_t i : {3U, 0U, 4U, 1U, 2U}) {
-    const std::vector<float> many(32, static_cast<float>(i));
+    const std::vector<float> many(kLongest, static_cast<float>(i));
     other.put(i, {many.data(), many.data(), many.data(), many[0], many[0]});
   }
   other.advance(5);

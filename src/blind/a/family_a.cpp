@@ -142,7 +142,8 @@ SensorSet drawn_sensors(const Assignment& a) {
   s.imu_transport_s = random.between(0.3e-3, 2.5e-3);
   declare_imu(s);
   s.imu.position_m = {random.between(-6e-3, 6e-3), random.between(-4e-3, 4e-3), random.between(-12e-3, 4e-3)};
-  s.imu_turned = turned_by(kDegree * random.uniform() * random.normals().normalized()).toRotationMatrix();
+  const Vector3d axis = random.normals().normalized();
+  s.imu_turned = turned_by(kDegree * random.uniform() * axis).toRotationMatrix();
   s.mocap.rate_hz = one_of(kMocap_Hz);
   s.mocap.latency_s = random.between(8e-3, 25e-3);
   if (s.power) s.power->latency_s = random.between(1e-4, 2e-3);

@@ -137,7 +137,8 @@ Programme::Programme(const Assignment& a, std::uint64_t flight, const RobotParam
     at = to;
   };
   const auto about = [&](double x, double y, double z, double r) {
-    return Vector3d(x + random.uniform(-r, r), y + random.uniform(-r, r), z);
+    const double to_y = y + random.uniform(-r, r), to_x = x + random.uniform(-r, r);
+    return Vector3d(to_x, to_y, z);
   };
   if (a.hover || (a.calm && flight == 0)) {
     const std::array<double, 3> heights = {0.4, 0.8, 0.6};

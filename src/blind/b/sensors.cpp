@@ -44,7 +44,9 @@ SensorTruth draw_sensors(const Assignment& a, double battery_nominal_V, flightlo
   t.imu_rate_hz = imu_rates[random.below(4)];
   t.imu_late_s = random.uniform(0.8e-3, 2.5e-3);
   t.bandwidth_hz = random.uniform(180, 350);
-  t.imu_place_m = Vector3d(random.uniform(-6e-3, 6e-3), random.uniform(-4e-3, 4e-3), random.uniform(-12e-3, 4e-3));
+  t.imu_place_m.z() = random.uniform(-12e-3, 4e-3);
+  t.imu_place_m.y() = random.uniform(-4e-3, 4e-3);
+  t.imu_place_m.x() = random.uniform(-6e-3, 6e-3);
   t.gyro_noise_rad_s = 0.04 * random.uniform(0.7, 1.4);
   t.accel_noise_m_s2 = 0.4 * random.uniform(0.7, 1.4);
   t.mocap_rate_hz = mocap_rates[random.below(4)];

@@ -33,7 +33,9 @@ Air::Air(const RobotParameters& parameters, const Magnitudes& magnitudes, std::u
   Random once(seed, "air");
   const double heading = once.uniform(0, 2 * M_PI);
   mean_wind_ = 0.3 * wind_ * Eigen::Vector3d(std::cos(heading), std::sin(heading), 0);
-  anchor_ = Eigen::Vector3d(once.uniform(-0.3, 0.3), once.uniform(-0.3, 0.3), Room::kGround_m);
+  anchor_.z() = Room::kGround_m;
+  anchor_.y() = once.uniform(-0.3, 0.3);
+  anchor_.x() = once.uniform(-0.3, 0.3);
 }
 
 double Air::room_factor(const Mechanism& mechanism, std::size_t side, double wall_m) const {

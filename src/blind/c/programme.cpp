@@ -31,8 +31,9 @@ Programme::Programme(const Assignment& a, std::size_t flight, const RobotParamet
   Random random(a.seed, "programme", stream_of(a, flight));
   const bool hover = a.hover || (a.calm && flight == 0);
   const double height = random.uniform(0.5, 1.0), heading = random.uniform(-0.6, 0.6);
-  Eigen::Vector3d start(random.uniform(-0.3, 0.3), random.uniform(-0.3, 0.2),
-                        hover ? random.uniform(0.4, 1.4) : height);
+  const double start_z = hover ? random.uniform(0.4, 1.4) : height;
+  const double start_y = random.uniform(-0.3, 0.2), start_x = random.uniform(-0.3, 0.3);
+  Eigen::Vector3d start(start_x, start_y, start_z);
   if (!quiet_ && flight == 1) start.z() += 0.5;
   if (!quiet_ && flight == 2) start.y() += 0.3;
   legs_.push_back({-1e3, 0.4, start, start, heading, heading});
@@ -49,7 +50,8 @@ Programme::Programme(const Assignment& a, std::size_t flight, const RobotParamet
   }
   const auto near = [&] {
     const double close = random.uniform(0.03, 0.10);
-    Eigen::Vector3d at(random.uniform(-0.6, 0.6), random.uniform(-0.5, 0.4), random.uniform(0.5, 1.5));
+    const double z = random.uniform(0.5, 1.5), y = random.uniform(-0.5, 0.4), x = random.uniform(-0.6, 0.6);
+    Eigen::Vector3d at(x, y, z);
     if (flight == 0) at.z() = Room::kGround_m + parameters.below_m + close;
     if (flight == 1) at.z() = Room::kCeiling_m - parameters.above_m - 0.01 - close;
     if (flight == 2) at.y() = Room::kWall_m - parameters.around_m - 0.03 - close;

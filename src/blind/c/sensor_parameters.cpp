@@ -51,9 +51,11 @@ void declare_loosely(SensorParameters& f, const Robot& robot, Random random) {
   h.mocap.latency_s += random.uniform(-0.5e-3, 0.5e-3);
   h.imu.rate_hz = rounded(h.imu.rate_hz);
   h.mocap.rate_hz = rounded(h.mocap.rate_hz);
-  const Eigen::Vector3d off = random.uniform(0.5e-3, 2e-3) * random.direction();
+  const Eigen::Vector3d way = random.direction();
+  const Eigen::Vector3d off = random.uniform(0.5e-3, 2e-3) * way;
   for (int i = 0; i < 3; ++i) h.imu.position_m[static_cast<std::size_t>(i)] += off[i];
-  const Eigen::Matrix3d mounting = turned(random.uniform(0.1, 1.0) * kDegree * random.direction());
+  const Eigen::Vector3d axis = random.direction();
+  const Eigen::Matrix3d mounting = turned(random.uniform(0.1, 1.0) * kDegree * axis);
   f.imu.gyro_axes = f.imu.gyro_axes * mounting;
   f.imu.accel_axes = f.imu.accel_axes * mounting;
   for (double* noise :

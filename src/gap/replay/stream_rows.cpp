@@ -112,7 +112,10 @@ std::vector<StreamRow> stream_noise(const Recording& r, std::uint64_t seed, bool
   const flightlog::FlightHeader& h = r.log.header;
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
-  const auto noise = [&](double sd) { return Vector3d(sd * normal(random), sd * normal(random), sd * normal(random)); };
+  const auto noise = [&](double sd) {
+    const double z = sd * normal(random), y = sd * normal(random), x = sd * normal(random);
+    return Vector3d(x, y, z);
+  };
   // errors of path and angle by dead reckoning with noise alone
   std::vector<double> t_s = {r.begin_s};
   std::vector<Vector3d> path = {Vector3d::Zero()}, angle = {Vector3d::Zero()};

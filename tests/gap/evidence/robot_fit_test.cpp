@@ -10,6 +10,7 @@ namespace {
 class RobotFits : public testing::Test {
  protected:
   static void SetUpTestSuite() {
+    priors_ = new auto(synthetic_priors());
     made_ = new auto(synthetic_flights(2, synthetic_law));
     const Hypothesis wind(*priors_, {"wind"});
     Eigen::VectorXd at = wind.start();
@@ -25,8 +26,9 @@ class RobotFits : public testing::Test {
     delete robot_;
     delete flights_;
     delete made_;
+    delete priors_;
   }
-  static inline const sim::Randomisation* priors_ = new sim::Randomisation(synthetic_priors());
+  static inline const sim::Randomisation* priors_ = nullptr;
   static inline std::vector<std::shared_ptr<SyntheticFlight>>* made_ = nullptr;
   static inline Flights* flights_ = nullptr;
   static inline RobotFit* robot_ = nullptr;
