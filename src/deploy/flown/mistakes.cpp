@@ -277,7 +277,7 @@ void add_software(List& list, const ExportedC& c, bool int8) {
     const bool of_feedback = std::ranges::none_of(
         std::array{"start_", "hand_back", "driver_", "_limit_V", "mocap_", "angle_noise", "gyro_bias", "velocity_noise",
                    "accel_bias", "gravity", "period", "imu_position", "_share"},
-        [&](const char* other) { return name.find(other) != std::string::npos; });
+        [&name = name](const char* other) { return name.find(other) != std::string::npos; });
     if (!of_feedback) continue;
     for (std::size_t i = 0; i < numbers.size(); ++i) {
       if (*numbers[i] == 0) continue;

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 
+#include "gap/evidence/one_sided.hpp"
 #include "io/parallel.hpp"
 #include "model/effects/registry.hpp"
 
@@ -62,6 +62,15 @@ ScaledEvidence weigh_freely(const RobotFit& robot, const Hypothesis& hypothesis,
   if (unknown_scales == nullptr) return w;
   ScaledEvidence other = robot.weigh(hypothesis, fit, *unknown_scales, penalty_nats);
   return other.posterior.log_evidence > w.posterior.log_evidence ? other : w;
+}
+
+/// Evidence of a fitted hypothesis with the half-normal priors of its one-sided magnitudes.
+double explained_by(const Hypothesis& h, const Fit& fit, const Posterior& p) {
+  const Eigen::MatrixXd& axes = fit.directions.axes;
+  const Index n = axes.cols();
+  return p.log_evidence +
+         one_sided(h, fit.at + axes * p.mean.head(n), axes * p.covariance.topLeftCorner(n, n) * axes.transpose())
+             .log_factor;
 }
 
 /// The function of the place along which the law of an effect deviates most from the catalogue's.
@@ -165,10 +174,6 @@ ScoredHypothesis EffectFits::fitted(const std::vector<ScreenedEffect>& set, cons
   a.log_prior = log_prior_of_one();
   for (std::size_t i = 1; i < set.size(); ++i)
     a.log_prior += std::log(rule_.prior.further_effect / static_cast<double>(catalogue_size_));
-  for (Index i = h.shared(); i < h.size(); ++i) {
-    const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
-    if (u.magnitude && u.low >= 0) a.log_prior += std::log(2.0);
-  }
   const bool effects_first = robot_.evidence().policy().move_parameters;
   take(h, effects_first ? fitter.fit_effects(h, start(h, set), robot_.parameters()) : fit_jointly(h, set, fitter),
        fitter.scales(), a);
@@ -188,9 +193,10 @@ void EffectFits::move_parameters(const std::vector<ScreenedEffect>& set, const F
 void EffectFits::take(const Hypothesis& h, Fit fit, const Scales& scales, ScoredHypothesis& a) const {
   if (!fit.flown()) return;
   const ScaledEvidence w = robot_.weigh(h, fit, scales);
-  if (a.fitted() && w.posterior.log_evidence + a.log_prior <= a.log_evidence) return;
+  const double log_evidence = explained_by(h, fit, w.posterior) + a.log_prior;
+  if (a.fitted() && log_evidence <= a.log_evidence) return;
   fit.law_factor = w.law_factor;
-  a.log_evidence = w.posterior.log_evidence + a.log_prior;
+  a.log_evidence = log_evidence;
   a.fit = std::move(fit);
   a.other_law.reset();
   if (w.law_factor > 1) a.other_law = largest_deviation(w, robot_.evidence().basis());
@@ -208,14 +214,8 @@ ScoredHypothesis EffectFits::linear(const ScreenedEffect& effect) const {
   a.fit = robot_.fitter().fit_linear(h, robot_.parameters(), columns);
   a.log_prior = log_prior_of_one();
   a.log_evidence = baselines_.parameters.explained() + std::min(effect.gain, 0.0) + a.log_prior;
-  Posterior& p = a.fit.posterior;
-  const Index first = h.shared();
-  if (h.unknowns()[static_cast<std::size_t>(first)].low < 0) return a;
-  // mean of the first magnitude given that it is positive, and means of the others given that mean
-  const double mean = p.mean[first], sd = std::sqrt(p.covariance(first, first)), t = mean / sd;
-  const double beyond =
-      std::exp(-0.5 * t * t) / (std::sqrt(std::numbers::pi / 2) * std::erfc(-t / std::numbers::sqrt2));
-  p.mean += p.covariance.col(first) / sd * (t > -5 ? beyond : -t);
+  a.fit.posterior.mean =
+      a.fit.directions.axes.transpose() * (one_sided(h, a.fit.mean(), a.fit.covariance()).mean - a.fit.at);
   return a;
 }
 
@@ -341,7 +341,7 @@ std::vector<ScoredHypothesis> EffectFits::with_remainders(const std::vector<Scor
     found[i].jointly_with = a.effects;
     found[i].fit.law_factor = w.law_factor;
     found[i].log_prior = a.log_prior + std::log(rule_.prior.remainder);
-    found[i].log_evidence = w.posterior.log_evidence + found[i].log_prior;
+    found[i].log_evidence = explained_by(h, a.fit, w.posterior) + found[i].log_prior;
   });
   std::erase_if(found, [](const ScoredHypothesis& a) { return !a.has_remainder(); });
   return found;

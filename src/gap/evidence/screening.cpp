@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "gap/evidence/one_sided.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::gap {
@@ -11,15 +11,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-
-/// log(2 P(N(mean, sd^2) > 0)). Twice, as the prior of a magnitude that cannot be negative is half-normal. Far below 0,
-/// where it takes back all that the negative magnitude gained, by the asymptotic series (Abramowitz, Stegun 7.1.23).
-double log_twice_positive(double mean, double sd) {
-  constexpr double kFar = 10;
-  const double x = -mean / (sd * std::numbers::sqrt2);
-  if (x < kFar) return std::log(std::erfc(x));
-  return -x * x - std::log(x * std::sqrt(std::numbers::pi)) + std::log1p(-1 / (2 * x * x));
-}
 
 class Screening {
  public:
