@@ -5,9 +5,11 @@ Prints the tables of docs/results/faults.md; keeps every diagnosis in OUT. --nor
     scripts/results/crazypad.py BIN PROJECT DATA OUT [--normal]
 """
 
+import csv
 import itertools
 import json
 import pathlib
+import statistics
 import subprocess
 import sys
 
@@ -48,6 +50,16 @@ def contrast(name, reference, flights, *more):
     return json.loads((out / "diagnosis.json").read_text())
 
 
+def mean_commands(folders):
+    """Means of the motors' commands over the middle three fifths of each flight, then over flights."""
+    flights = []
+    for folder in folders:
+        rows = [[float(x) for x in row[1:]] for row in list(csv.reader((folder / "command.csv").open()))[1:]]
+        middle = rows[len(rows) // 5 : len(rows) * 4 // 5]
+        flights.append([statistics.fmean(column) for column in zip(*middle)])
+    return [statistics.fmean(column) for column in zip(*flights)]
+
+
 def named(verdict):
     if verdict["kind"] not in ("effect", "group"):
         return {"none": "unchanged", "parameters": "unchanged"}.get(verdict["kind"], verdict["kind"])
@@ -81,6 +93,10 @@ def main():
     if "--normal" in sys.argv[5:]:
         return
     conditions = sorted(p.name for p in DATA.iterdir() if p.is_dir() and p.name != NORMAL)
+    print("\n| condition | mean commands of motors 1 to 4, less normal ones |\n|---|---|")
+    usual = mean_commands(normal)
+    for condition in conditions:
+        print(f"| {condition} | " + ", ".join(f"{m - u:+.3f}" for m, u in zip(mean_commands(imported(condition)), usual)) + " |")
     print("\n| condition | verdict | first effect | magnitudes |\n|---|---|---|---|")
     for condition in conditions:
         row(condition, contrast(condition, normal, imported(condition)))

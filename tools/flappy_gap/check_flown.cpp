@@ -1,5 +1,6 @@
 #include "check_flown.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -45,6 +46,7 @@ deploy::OnboardLog onboard(const std::string& folder, const flightlog::FlightLog
     to.start_s = c.t_s.front();
   }
   using flightlog::last_digit;
+  to.time_step_s = std::max(last_digit(log.imu.t_s), last_digit(m.t_s));
   to.rate_step_rad_s = last_digit(log.imu.gyro_x_rad_s);
   to.force_step_m_s2 = last_digit(log.imu.accel_z_m_s2);
   to.position_step_m = last_digit(m.x_m);

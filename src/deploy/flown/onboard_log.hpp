@@ -32,7 +32,8 @@ struct OnboardLog {
   std::optional<double> hand_back_s;                ///< as the robot says; none: not known
 
   // Steps between the numbers that the log can tell apart; 0: all digits are there
-  double rate_step_rad_s = 0, force_step_m_s2 = 0, position_step_m = 0, attitude_step = 0, voltage_step_V = 0;
+  double time_step_s = 0, rate_step_rad_s = 0, force_step_m_s2 = 0, position_step_m = 0, attitude_step = 0,
+         voltage_step_V = 0;
 };
 
 }  // namespace flappy::deploy

@@ -56,6 +56,7 @@ class Loop {
         w_(wiring),
         factors_(c, wiring),
         state_(c.state_bytes() / sizeof(std::max_align_t) + 1),
+        slack_s_(std::clamp(log.time_step_s / 2, 1e-9, 1e-6)),
         period_s_(contract.control_s * wiring.loop_scale),
         observation_(contract.observation.size()) {
     for (std::size_t i = 0; i < contract.observation.size(); ++i)
@@ -64,7 +65,7 @@ class Loop {
 
   Replay fly(double until_s) {
     Replay out;
-    const auto first = std::ranges::lower_bound(log_.commands, log_.start_s - kSlack_s, {}, &OnboardLog::Command::t_s);
+    const auto first = std::ranges::lower_bound(log_.commands, log_.start_s - slack_s_, {}, &OnboardLog::Command::t_s);
     // before the start, motors are off
     out.volts.assign(static_cast<std::size_t>(first - log_.commands.begin()), {0, 0});
     c_.start(state(), stamp(log_.start_s), start_pose().data());
@@ -74,15 +75,13 @@ class Loop {
       if (tick > 0) end_period(now_s);
       steer(now_s);
       // drives fall on multiples of the driver's period
-      for (; next != log_.commands.end() && next->t_s <= until_s && next->t_s < end_s - kSlack_s; ++next)
+      for (; next != log_.commands.end() && next->t_s <= until_s && next->t_s < end_s - slack_s_; ++next)
         out.volts.push_back(drive(next->t_s));
     }
     return out;
   }
 
  private:
-  static constexpr double kSlack_s = 1e-6;  ///< times of a log are rounded
-
   void* state() { return state_.data(); }
   /// The robot's clock, at a time of the log.
   std::uint32_t stamp(double t_s) const {
@@ -113,7 +112,7 @@ class Loop {
       std::copy_n(log_.start_pose->begin() + 3, 4, at.attitude.begin());
     } else if (!log_.poses.empty()) {
       const auto after =
-          std::ranges::upper_bound(log_.poses, log_.start_s + kSlack_s, {}, &OnboardLog::Pose::arrived_s);
+          std::ranges::upper_bound(log_.poses, log_.start_s + slack_s_, {}, &OnboardLog::Pose::arrived_s);
       at = after == log_.poses.begin() ? *after : *(after - 1);
     }
     return wired(at);
@@ -121,31 +120,31 @@ class Loop {
 
   /// Takes what has arrived, then estimates.
   void end_period(double now_s) {
-    for (; imu_ < log_.imu.size() && log_.imu[imu_].arrived_s <= now_s + kSlack_s; ++imu_) {
+    for (; imu_ < log_.imu.size() && log_.imu[imu_].arrived_s <= now_s + slack_s_; ++imu_) {
       const OnboardLog::Imu& s = log_.imu[imu_];
-      if (s.arrived_s < log_.start_s - kSlack_s || imu_ % static_cast<std::size_t>(w_.hold_imu) != 0) continue;
+      if (s.arrived_s < log_.start_s - slack_s_ || imu_ % static_cast<std::size_t>(w_.hold_imu) != 0) continue;
       const Vector3d rate = w_.rate * Vector3d(s.rate_rad_s.data()), force = w_.force * Vector3d(s.force_m_s2.data());
       float x[6];
       for (int i = 0; i < 3; ++i) x[i] = static_cast<float>(rate[i]), x[3 + i] = static_cast<float>(force[i]);
       c_.imu(state(), sample_stamp(s.arrived_s - log_.imu_latency_s), x);
     }
-    for (; pose_ < log_.poses.size() && log_.poses[pose_].arrived_s <= now_s + kSlack_s; ++pose_) {
+    for (; pose_ < log_.poses.size() && log_.poses[pose_].arrived_s <= now_s + slack_s_; ++pose_) {
       const OnboardLog::Pose& s = log_.poses[pose_];
-      if (s.arrived_s < log_.start_s - kSlack_s || pose_ % static_cast<std::size_t>(w_.hold_pose) != 0) continue;
+      if (s.arrived_s < log_.start_s - slack_s_ || pose_ % static_cast<std::size_t>(w_.hold_pose) != 0) continue;
       c_.pose(state(), sample_stamp(s.arrived_s - log_.pose_latency_s), wired(s).data());
     }
     c_.tick(state(), stamp(now_s));
   }
 
   void steer(double now_s) {
-    if (log_.begin_s && !begun_ && now_s > *log_.begin_s - kSlack_s) {
+    if (log_.begin_s && !begun_ && now_s > *log_.begin_s - slack_s_) {
       c_.begin(state());
       begun_ = true;
       acted_ = 0;
     }
     if (begun_ && w_.hand_back_s) {
       if (!std::isfinite(*w_.hand_back_s)) c_.set_handed_back(state(), 0);
-      else if (now_s > *log_.begin_s + *w_.hand_back_s - kSlack_s) c_.set_handed_back(state(), 1);
+      else if (now_s > *log_.begin_s + *w_.hand_back_s - slack_s_) c_.set_handed_back(state(), 1);
       else c_.set_handed_back(state(), 0);
     }
     if (begun_ && c_.handed_back(state()) == 0) act();
@@ -212,6 +211,7 @@ class Loop {
   const Wiring& w_;
   const Factors factors_;
   std::vector<std::max_align_t> state_;
+  const double slack_s_;  ///< times of a log are rounded
   const double period_s_;
   std::vector<float> observation_;
   std::vector<std::size_t> errors_;  ///< first of the three errors of the position, now and in the past
