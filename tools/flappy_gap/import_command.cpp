@@ -6,7 +6,11 @@
 #include "flightlog/import/assemble.hpp"
 
 namespace flappy::gap {
+namespace {
+
 using Json = nlohmann::ordered_json;
+
+}  // namespace
 
 Json run_import(const ImportCommand& command) {
   const flightlog::Mapping mapping = flightlog::read_mapping(command.mapping, command.overrides);
