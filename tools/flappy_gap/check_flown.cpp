@@ -5,10 +5,16 @@
 #include <nlohmann/json.hpp>
 
 #include "deploy/flown/flown.hpp"
+#include "deploy/header/contract.hpp"
+#include "deploy/header/controller_header.hpp"
+#include "deploy/header/policy_header.hpp"
+#include "deploy/header/policy_vectors.hpp"
 #include "flightlog/check/digits.hpp"
 #include "flightlog/flight_log.hpp"
 #include "io/files.hpp"
+#include "io/temporary_folder.hpp"
 #include "io/text.hpp"
+#include "learn/run_folder.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -19,6 +25,24 @@ using Json = nlohmann::ordered_json;
   throw io::InputError(folder + "/flight.toml: " + what + "; accepted: " + accepted);
 }
 
+/// Writes what a check needs of the export of a finished run.
+void export_run(const std::string& folder, const std::filesystem::path& to) {
+  const learn::FinishedRun run = learn::read_finished_run(folder);
+  if (const std::string why = deploy::no_controller(run.fly); !why.empty())
+    throw io::InputError(folder + ": has no controller to export: " + why +
+                         "; accepted: a run whose controller flappy-export writes");
+  const policy::PolicyNetwork network = deploy::network_of(run.fly);
+  policy::PolicyVectors tests = deploy::corners(network, run.fly.fleet.task.observation());
+  tests.action = deploy::evaluate(network, tests.observation);
+  const std::string policy = deploy::policy_header(run.fly, run.info, network, tests),
+                    controller = deploy::controller_header(run.fly, run.info, deploy::record_controller(run.fly));
+  io::write_atomically(to / "flappy_policy.h", policy);
+  io::write_atomically(to / "flappy_controller.h", controller);
+  io::write_atomically(to / "contract.json",
+                       deploy::contract_json(run.fly, run.info, network, tests,
+                                             {deploy::crc_of_header(policy), deploy::crc_of_header(controller)}));
+}
+
 /// The flight as it passed the robot's processor.
 deploy::OnboardLog onboard(const std::string& folder, const flightlog::FlightLog& log) {
   const flightlog::FlightHeader& h = log.header;
@@ -27,6 +51,7 @@ deploy::OnboardLog onboard(const std::string& folder, const flightlog::FlightLog
   deploy::OnboardLog to;
   to.imu_latency_s = h.imu.latency_s;
   to.pose_latency_s = h.mocap.latency_s;
+  to.imu_Hz = h.imu.rate_hz;
   for (std::size_t i = 0; i < log.imu.t_s.size(); ++i)
     to.imu.push_back({log.imu.t_s[i],
                       {log.imu.gyro_x_rad_s[i], log.imu.gyro_y_rad_s[i], log.imu.gyro_z_rad_s[i]},
@@ -71,7 +96,10 @@ std::string sentence(const deploy::Flown& f) {
 }  // namespace
 
 Json check_flown(const std::string& exported, const std::vector<std::string>& folders) {
-  const deploy::FlownCheck check(exported);
+  const io::TemporaryFolder made;
+  const bool is_run = std::filesystem::exists(std::filesystem::path(exported) / "run.json");
+  if (is_run) export_run(exported, made / "");
+  const deploy::FlownCheck check(is_run ? made / "" : std::filesystem::path(exported));
   Json flights = Json::array();
   bool all = true;
   for (const std::string& folder : folders) {

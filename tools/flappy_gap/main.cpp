@@ -158,7 +158,7 @@ int main(int argc, char** argv) {
   std::string exported;
   check.option("flight", folders, "folders of flight logs").required();
   check.option("--flown", exported,
-               "what flappy-export wrote: whether the robot flew it; exit code 1 where it did not");
+               "what flappy-export wrote, or a run folder: whether the robot flew it; exit code 1 where it did not");
   io::Command import =
       program.app().command("import", "makes a flight log of a bag (MCAP, SQLite), a ULog, or CSV files");
   gap::ImportCommand import_command;
@@ -187,6 +187,9 @@ int main(int argc, char** argv) {
                   "what was flown, as a configuration of flappy-fly; else the recorded paths, under its hover's");
   diagnose.option("--channels", command.settings.channels, "of a beat-averaged vehicle: only these, as force_x");
   diagnose.option("--withhold", command.settings.withheld, "effects to leave out of the catalogue");
+  std::string software;
+  diagnose.option("--flown", software,
+                  "what flappy-export wrote, or a run folder: diagnose only if the robot flew it in all flights");
   diagnose.flag("--residual", command.settings.residual,
                 "give the corrected vehicle what is left, as a smooth load without a cause");
   diagnose.option("--out", command.out, "folder for diagnosis.json, the corrected vehicle, tables and figures");
@@ -248,6 +251,17 @@ int main(int argc, char** argv) {
     } else if (learn.given()) {
       gap::run_learn_discrepancy(lessons);
     } else {
+      if (!software.empty()) {
+        std::vector<std::string> all = command.settings.flights;
+        for (const std::string& set : command.settings.reference) all.push_back(set.substr(set.find('=') + 1));
+        const nlohmann::ordered_json found = gap::check_flown(software, all);
+        faulty = !found["as_exported"];
+        if (faulty) {
+          std::printf("nothing is diagnosed: what flew is not what was exported\n");
+          program.write_json({{"flown", found}});
+          return;
+        }
+      }
       program.write_json(gap::run_diagnose(command));
     }
   });

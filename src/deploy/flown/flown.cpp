@@ -1,5 +1,6 @@
 #include "deploy/flown/flown.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -16,7 +17,9 @@ using Parameters = std::vector<double>;
 using Volts = std::vector<std::array<double, 2>>;
 
 /// Share of commands within tolerance from which the log is explained: a few may fall on the edge of a period.
-constexpr double kExplained = 0.98;
+constexpr double kExplained = 0.98, kNearlyAll = 0.9995;
+/// Mean square of what a mistake leaves, over that of none, from which it counts on a log that lost samples.
+constexpr double kMuch = 0.6;
 /// So many commands in a row have to differ.
 constexpr std::size_t kInARow = 3;
 /// How far beyond the first difference candidates are replayed at first, s.
@@ -63,41 +66,76 @@ OnboardLog dithered(OnboardLog log) {
   return log;
 }
 
-/// The log with every second sample of the IMU.
+/// One of so many of the IMU's samples that the processor had is in the log.
+std::size_t thinning(const OnboardLog& log, const Contract& contract) {
+  const double had_Hz = log.imu_Hz > 0 ? log.imu_Hz : contract.imu_Hz;
+  if (log.imu.size() < 2) return 1;
+  const double lasts_s = log.imu.back().arrived_s - log.imu.front().arrived_s;
+  return static_cast<std::size_t>(
+      std::max(1L, std::lround(had_Hz * lasts_s / static_cast<double>(log.imu.size() - 1))));
+}
+
+/// The log with `every` samples of the IMU in place of one, by cubics through four neighbours.
+OnboardLog filled(OnboardLog log, std::size_t every) {
+  const std::vector<OnboardLog::Imu> had = std::move(log.imu);
+  log.imu.clear();
+  for (std::size_t i = 0; i < had.size(); ++i) {
+    log.imu.push_back(had[i]);
+    if (i + 1 == had.size()) break;
+    const OnboardLog::Imu &before = had[i > 0 ? i - 1 : 0], &here = had[i], &next = had[i + 1],
+                          &after = had[std::min(i + 2, had.size() - 1)];
+    for (std::size_t k = 1; k < every; ++k) {
+      const double f = static_cast<double>(k) / static_cast<double>(every);
+      const std::array<double, 4> w = {-f * (f - 1) * (f - 2) / 6, (f + 1) * (f - 1) * (f - 2) / 2,
+                                       -(f + 1) * f * (f - 2) / 2, (f + 1) * f * (f - 1) / 6};
+      const auto at = [&](const std::array<double, 3> OnboardLog::Imu::*x) {
+        std::array<double, 3> v{};
+        for (std::size_t j = 0; j < 3; ++j)
+          v[j] = w[0] * (before.*x)[j] + w[1] * (here.*x)[j] + w[2] * (next.*x)[j] + w[3] * (after.*x)[j];
+        return v;
+      };
+      log.imu.push_back({(1 - f) * here.arrived_s + f * next.arrived_s, at(&OnboardLog::Imu::rate_rad_s),
+                         at(&OnboardLog::Imu::force_m_s2)});
+    }
+  }
+  return log;
+}
+
+/// The log with every second sample of the IMU, the others interpolated.
 OnboardLog thinned(OnboardLog log) {
   std::vector<OnboardLog::Imu> half;
   for (std::size_t i = 1; i < log.imu.size(); i += 2) half.push_back(log.imu[i]);
   log.imu = std::move(half);
-  return log;
+  return filled(std::move(log), 2);
 }
 
 class Search {
  public:
   using Library = std::function<const ExportedC&(Build)>;
   Search(const Contract& contract, const std::vector<Mistake>& mistakes, const OnboardLog& log, Library library)
-      : contract_(contract), mistakes_(mistakes), log_(log), library_(std::move(library)) {
-    find_tolerances();
-  }
+      : contract_(contract),
+        mistakes_(mistakes),
+        thinning_(thinning(log, contract)),
+        logged_(log),
+        log_(filled(log, thinning_)),
+        library_(std::move(library)),
+        tolerance_(tolerances({})) {}
 
   Flown run() {
     const Volts exported = volts({}, kForever);
     Flown flown;
-    flown.share = share(exported);
+    flown.share = share(exported, tolerance_);
     flown.tolerance_V = io::median(tolerance_);
     const std::size_t first = first_difference(exported);
-    flown.from_s = first < log_.commands.size() ? log_.commands[first].t_s : 0;
-    flown.as_exported = flown.share >= kExplained && first == log_.commands.size();
+    flown.as_exported = (flown.share >= kExplained && first == log_.commands.size()) || flown.share >= kNearlyAll;
     if (flown.as_exported) return flown;
-    if (flown.share >= 0.9995) {
-      flown.as_exported = true;
-      return flown;
-    }
+    if (first < log_.commands.size()) flown.from_s = log_.commands[first].t_s;
     Candidate best = one_mistake(flown.from_s);
-    if (share(volts(best.wiring(), kForever)) < kExplained) {
-      const Candidate two = two_mistakes(flown.from_s);
-      if (two.parts.size() > 1) best = two;
+    flown.explained = explained(best, exported);
+    if (flown.explained < kExplained) {
+      const Candidate two = two_mistakes();
+      if (const double both = explained(two, exported); both > flown.explained) best = two, flown.explained = both;
     }
-    flown.explained = share(volts(best.wiring(), kForever));
     if (flown.explained >= kExplained) {
       for (const auto& [mistake, p] : best.parts)
         flown.mistakes.push_back({mistake->stage, mistake->id, mistake->said(p)});
@@ -114,41 +152,61 @@ class Search {
     return replay(library_(w.build), contract_, log_, w, until_s).volts;
   }
 
-  void find_tolerances() {
-    const Volts as_logged = volts({}, kForever);
-    std::vector<double> moved(as_logged.size(), 0);
-    const auto add = [&](const OnboardLog& other, double margin) {
-      const Volts v = replay(library_(Build::exact), contract_, other, {}).volts;
+  /// By how much commands may differ under a wiring, for what the log has lost. [command], V.
+  std::vector<double> tolerances(const Wiring& w) const {
+    const Volts as_logged = volts(w, kForever);
+    const auto differences = [&](const OnboardLog& other) {
+      const Volts v = replay(library_(w.build), contract_, other, w).volts;
+      std::vector<double> list(v.size());
       for (std::size_t i = 0; i < v.size(); ++i)
-        moved[i] += margin * std::max(std::abs(v[i][0] - as_logged[i][0]), std::abs(v[i][1] - as_logged[i][1]));
+        list[i] = std::max(std::abs(v[i][0] - as_logged[i][0]), std::abs(v[i][1] - as_logged[i][1]));
+      return list;
     };
-    if (log_.rate_step_rad_s + log_.force_step_m_s2 + log_.position_step_m + log_.attitude_step > 0)
-      add(dithered(log_), kMargin);
-    if (!log_.imu.empty() && contract_.imu_Hz > 0) {
-      const double rate = static_cast<double>(log_.imu.size() - 1) /
-                          std::max(log_.imu.back().arrived_s - log_.imu.front().arrived_s, 1e-9);
-      if (rate < 0.75 * contract_.imu_Hz) add(thinned(log_), kMargin);
+    std::vector<double> moved(as_logged.size(), 0);
+    if (log_.rate_step_rad_s + log_.force_step_m_s2 + log_.position_step_m + log_.attitude_step > 0) {
+      moved = differences(dithered(log_));
+      for (double& m : moved) m *= kMargin;
     }
-    tolerance_.resize(log_.commands.size());
-    for (std::size_t begin = 0, end = 0; begin < tolerance_.size(); begin = end) {
-      while (end < tolerance_.size() && log_.commands[end].t_s < log_.commands[begin].t_s + kBlock_s) ++end;
+    if (thinning_ > 1) {
+      // what further samples lose tells what those lost, whose noise is of the same size throughout
+      double sum = 0;
+      for (const double d : differences(filled(thinned(logged_), thinning_))) sum += d * d;
+      const double rms = std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, moved.size())));
+      for (double& m : moved) m += kMargin * rms;
+    }
+    std::vector<double> list(log_.commands.size());
+    for (std::size_t begin = 0, end = 0; begin < list.size(); begin = end) {
+      while (end < list.size() && log_.commands[end].t_s < log_.commands[begin].t_s + kBlock_s) ++end;
       const double most = *std::max_element(moved.begin() + static_cast<std::ptrdiff_t>(begin),
                                             moved.begin() + static_cast<std::ptrdiff_t>(end));
       for (std::size_t i = begin; i < end; ++i) {
         const double size = std::max(std::abs(log_.commands[i].left_V), std::abs(log_.commands[i].right_V));
-        tolerance_[i] = most + log_.voltage_step_V + 1e-5 + 4e-7 * size;
+        list[i] = most + log_.voltage_step_V + 1e-5 + 4e-7 * size;
       }
     }
+    return list;
   }
 
   double difference(const Volts& v, std::size_t i) const {
     return std::max(std::abs(v[i][0] - log_.commands[i].left_V), std::abs(v[i][1] - log_.commands[i].right_V));
   }
-  double share(const Volts& v) const {
+  double share(const Volts& v, const std::vector<double>& tolerance) const {
     if (v.empty()) return 0;
     std::size_t within = 0;
-    for (std::size_t i = 0; i < v.size(); ++i) within += difference(v, i) <= tolerance_[i];
+    for (std::size_t i = 0; i < v.size(); ++i) within += difference(v, i) <= tolerance[i];
     return static_cast<double>(within) / static_cast<double>(v.size());
+  }
+  /// Share of the commands that a candidate explains. Where samples were lost, it has to explain much of what differs.
+  double explained(const Candidate& c, const Volts& exported) const {
+    if (c.parts.empty()) return 0;
+    const Volts v = volts(c.wiring(), kForever);
+    if (thinning_ == 1) return share(v, tolerance_);
+    return mean_square(v) > kMuch * mean_square(exported) ? 0 : share(v, tolerances(c.wiring()));
+  }
+  double mean_square(const Volts& v) const {
+    double sum = 0;
+    for (std::size_t i = 0; i < v.size(); ++i) sum += std::pow(difference(v, i), 2);
+    return sum / static_cast<double>(std::max<std::size_t>(1, v.size()));
   }
   double loss(const Volts& v) const {
     double sum = 0;
@@ -168,34 +226,99 @@ class Search {
     return log_.commands.size();
   }
 
-  /// The loss with a candidate's mistakes, its last one with the best parameters.
-  void fit(Candidate& c, double until_s, double from_s, bool thorough) const {
-    const auto loss_at = [&](const Parameters& p) {
-      c.parts.back().second = p;
-      return loss(volts(c.wiring(), until_s));
+  double loss_with(Candidate& c, const Parameters& p, double until_s) const {
+    c.parts.back().second = p;
+    return loss(volts(c.wiring(), until_s));
+  }
+
+  /// Moves the parameters of a candidate's last mistake by Levenberg and Marquardt's method, which needs smooth ones.
+  void descend(Candidate& c, double until_s, int iterations) const {
+    const Parameters from = c.parts.back().second;
+    const auto count = static_cast<Eigen::Index>(from.size());
+    const std::vector<double>& scales = c.parts.back().first->scales;
+    const auto residual = [&](const Eigen::VectorXd& x) {
+      Candidate there = c;
+      for (Eigen::Index k = 0; k < count; ++k)
+        there.parts.back().second[static_cast<std::size_t>(k)] = x[k] * scales[static_cast<std::size_t>(k)];
+      const Volts v = volts(there.wiring(), until_s);
+      Eigen::VectorXd r(2 * static_cast<Eigen::Index>(v.size()));
+      for (std::size_t i = 0; i < v.size(); ++i) {
+        r[2 * static_cast<Eigen::Index>(i)] = v[i][0] - log_.commands[i].left_V;
+        r[2 * static_cast<Eigen::Index>(i) + 1] = v[i][1] - log_.commands[i].right_V;
+      }
+      return r;
     };
+    Eigen::VectorXd x(count);
+    for (Eigen::Index k = 0; k < count; ++k)
+      x[k] = from[static_cast<std::size_t>(k)] / scales[static_cast<std::size_t>(k)];
+    Eigen::VectorXd r = residual(x);
+    double damping = 1e-3;
+    for (int iteration = 0; iteration < iterations && r.allFinite(); ++iteration) {
+      constexpr double kStep = 1e-3;  // of a scale: outputs are floats
+      Eigen::MatrixXd slopes(r.size(), count);
+      for (Eigen::Index k = 0; k < count; ++k) {
+        Eigen::VectorXd there = x;
+        there[k] += kStep;
+        slopes.col(k) = (residual(there) - r) / kStep;
+      }
+      if (!slopes.allFinite()) break;
+      Eigen::MatrixXd normal = slopes.transpose() * slopes;
+      normal.diagonal() *= 1 + damping;
+      normal.diagonal().array() += 1e-12;
+      const Eigen::VectorXd next = x - normal.ldlt().solve(slopes.transpose() * r);
+      const Eigen::VectorXd left = residual(next);
+      if (left.allFinite() && left.squaredNorm() < r.squaredNorm()) {
+        x = next, r = left, damping /= 10;
+      } else {
+        damping *= 100;
+      }
+    }
+    Parameters to(from.size());
+    for (Eigen::Index k = 0; k < count; ++k)
+      to[static_cast<std::size_t>(k)] = x[k] * scales[static_cast<std::size_t>(k)];
+    if (const double l = loss_with(c, to, until_s); l < c.loss) c.loss = l;
+    else c.parts.back().second = from;
+  }
+
+  /// Begins a candidate's last mistake with its best parameters among the starts.
+  void begin(Candidate& c, double until_s, double from_s) const {
     const Mistake& last = *c.parts.back().first;
     std::vector<Parameters> starts = last.starts;
-    if (starts.empty()) {
-      c.loss = loss_at({});
-      return;
-    }
+    if (starts.empty()) starts.emplace_back();
     if (last.id == "handed_back_early" && log_.begin_s) starts.push_back({from_s - *log_.begin_s});
-    Parameters best;
-    c.loss = kForever;
-    for (const Parameters& p : starts)
-      if (const double l = loss_at(p); l < c.loss) c.loss = l, best = p;
-    c.parts.back().second = best;
-    if (!thorough) return;
-    // a pattern search with shrinking steps
-    std::vector<double> steps = last.scales;
+    std::vector<std::pair<double, Parameters>> tried;
+    for (const Parameters& p : starts) tried.emplace_back(loss_with(c, p, until_s), p);
+    std::ranges::stable_sort(tried, {}, [](const auto& t) { return t.first; });
+    Candidate best = c;
+    best.loss = kForever;
+    // one parameter is ranked by its starts well enough
+    const std::size_t refined = tried.front().second.size() > 1 ? std::min<std::size_t>(3, tried.size()) : 1;
+    for (std::size_t i = 0; i < refined; ++i) {
+      c.loss = tried[i].first;
+      c.parts.back().second = tried[i].second;
+      if (tried[i].second.size() > 1) descend(c, until_s, 8);
+      if (c.loss < best.loss) best = c;
+    }
+    c = best;
+  }
+
+  /// The best parameters of a candidate's last mistake over the whole flight.
+  void refine(Candidate& c) const {
+    c.loss = loss_with(c, Parameters(c.parts.back().second), kForever);
+    if (c.parts.back().second.empty()) return;
+    descend(c, kForever, 8);
+    constexpr double kGood = 0.05;
+    if (c.loss < kGood) return;
+    // a pattern search with shrinking steps, for parameters that act by jumps
+    Parameters best = c.parts.back().second;
+    const std::vector<double>& steps = c.parts.back().first->scales;
     for (double shrunk = 1; shrunk > 1e-7;) {
       bool better = false;
       for (std::size_t k = 0; k < best.size(); ++k)
         for (const double sign : {1.0, -1.0}) {
           Parameters p = best;
           p[k] += sign * steps[k] * shrunk;
-          if (const double l = loss_at(p); l < c.loss) {
+          if (const double l = loss_with(c, p, kForever); l < c.loss) {
             c.loss = l, best = p, better = true;
             break;
           }
@@ -212,7 +335,7 @@ class Search {
       if (std::ranges::any_of(given, [&](const auto& part) { return part.first == &m; })) continue;
       Candidate c{given};
       c.parts.emplace_back(&m, Parameters());
-      fit(c, until_s, from_s, false);
+      begin(c, until_s, from_s);
       list.push_back(std::move(c));
     }
     std::ranges::stable_sort(list, {}, &Candidate::loss);
@@ -220,27 +343,27 @@ class Search {
   }
 
   /// Fits the best of a list to the whole flight.
-  Candidate best_of(std::vector<Candidate> list, std::size_t count, double from_s) const {
+  Candidate best_of(std::vector<Candidate> list, std::size_t count) const {
     list.resize(std::min(count, list.size()));
-    for (Candidate& c : list) fit(c, kForever, from_s, true);
+    for (Candidate& c : list) refine(c);
     std::ranges::stable_sort(list, {}, &Candidate::loss);
     return list.front();
   }
 
   Candidate one_mistake(double from_s) {
     singles_ = ranked({}, from_s, from_s + kWindow_s);
-    return best_of(singles_, 5, from_s);
+    return best_of(singles_, 5);
   }
 
   /// The most promising mistakes, each with a second one for what it leaves.
-  Candidate two_mistakes(double) const {
+  Candidate two_mistakes() const {
     Candidate best;
     best.loss = kForever;
     for (std::size_t i = 0; i < std::min<std::size_t>(5, singles_.size()); ++i) {
       const std::size_t next = first_difference(volts(singles_[i].wiring(), kForever));
       if (next == log_.commands.size()) continue;
       const double from_s = log_.commands[next].t_s;
-      const Candidate c = best_of(ranked(singles_[i].parts, from_s, from_s + kWindow_s), 3, from_s);
+      const Candidate c = best_of(ranked(singles_[i].parts, from_s, from_s + kWindow_s), 3);
       if (c.loss < best.loss) best = c;
     }
     return best;
@@ -268,9 +391,11 @@ class Search {
 
   const Contract& contract_;
   const std::vector<Mistake>& mistakes_;
-  const OnboardLog& log_;
+  const std::size_t thinning_;
+  const OnboardLog& logged_;  ///< without the samples that are filled in
+  const OnboardLog log_;
   const Library library_;
-  std::vector<double> tolerance_;  ///< [command], V
+  const std::vector<double> tolerance_;  ///< as exported
   std::vector<Candidate> singles_;
 };
 

@@ -195,11 +195,15 @@ void add_observations(List& list, const Contract& contract) {
            [](Wiring& w) { w.mean = w.scale = false; });
   if (contract.history > 1)
     list.add(kStage, "history_not_kept", "earlier observations are not kept", [](Wiring& w) { w.history = false; });
+  std::vector<Parameters> around;
+  for (const double x : {-0.3, 0.0, 0.3})
+    for (const double y : {-0.3, 0.0, 0.3})
+      for (const double z : {-0.3, 0.0, 0.3}) around.push_back({x, y, z});
   list.search(kStage, "another_goal", "positions are relative to a goal that lies at (%g, %g, %g) m",
               [](Wiring& w, const Parameters& p) {
                 w.goal_m = {-p[0], -p[1], -p[2]};
               },
-              {{0, 0, 0}}, {0.05, 0.05, 0.05});
+              around, {0.05, 0.05, 0.05});
 }
 
 void add_times(List& list, const Contract& contract) {
@@ -214,10 +218,15 @@ void add_times(List& list, const Contract& contract) {
              [late](Wiring& w) { w.late = late; });
   }
   for (const int hold : {2, 3, 4, 5, 10}) {
-    list.add(kStage, io::format("imu_held_%d", hold), io::format("one of %d samples of the IMU is read", hold),
-             [hold](Wiring& w) { w.hold_imu = hold; });
-    list.add(kStage, io::format("pose_held_%d", hold), io::format("one of %d poses is read", hold),
-             [hold](Wiring& w) { w.hold_pose = hold; });
+    std::vector<Parameters> firsts;
+    for (int first = 0; first < hold; ++first) firsts.push_back({static_cast<double>(first)});
+    const auto which = [hold](const Parameters& p) { return std::clamp(static_cast<int>(p[0]), 0, hold - 1); };
+    list.search(kStage, io::format("imu_held_%d", hold), io::format("one of %d samples of the IMU is read", hold),
+                [hold, which](Wiring& w, const Parameters& p) { w.hold_imu = hold, w.first_imu = which(p); }, firsts,
+                {1});
+    list.search(kStage, io::format("pose_held_%d", hold), io::format("one of %d poses is read", hold),
+                [hold, which](Wiring& w, const Parameters& p) { w.hold_pose = hold, w.first_pose = which(p); }, firsts,
+                {1});
   }
   list.search(kStage, "clock_rate", "the loop's clock takes %g s for a second",
               [](Wiring& w, const Parameters& p) { w.loop_scale = p[0], w.stamp_scale = 1; },

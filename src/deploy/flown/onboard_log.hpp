@@ -25,6 +25,7 @@ struct OnboardLog {
   std::vector<Pose> poses;
   std::vector<Command> commands;
   double imu_latency_s = 0, pose_latency_s = 0;
+  double imu_Hz = 0;  ///< rate at which samples reached the processor; 0: as in the contract
 
   double start_s = 0;                               ///< flappy_controller_start()
   std::optional<std::array<double, 7>> start_pose;  ///< none: of the pose that arrived last before it

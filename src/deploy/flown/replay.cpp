@@ -58,6 +58,7 @@ class Loop {
         state_(c.state_bytes() / sizeof(std::max_align_t) + 1),
         slack_s_(std::clamp(log.time_step_s / 2, 1e-9, 1e-6)),
         period_s_(contract.control_s * wiring.loop_scale),
+        drives_often_(contract.driver_s < 1.001 * contract.control_s),
         observation_(contract.observation.size()) {
     for (std::size_t i = 0; i < contract.observation.size(); ++i)
       if (contract.observation[i].name.starts_with("x_error")) errors_.push_back(i);
@@ -71,8 +72,9 @@ class Loop {
     c_.start(state(), stamp(log_.start_s), start_pose().data());
     auto next = first;
     for (std::uint32_t tick = 0; next != log_.commands.end() && next->t_s <= until_s; ++tick) {
-      const double now_s = log_.start_s + tick * period_s_, end_s = now_s + period_s_;
-      if (tick > 0) end_period(now_s);
+      const double due_s = log_.start_s + tick * period_s_, end_s = due_s + period_s_;
+      const double now_s = drives_often_ ? std::max(due_s, next->t_s) : due_s;
+      if (tick > 0) end_period(due_s, now_s);
       steer(now_s);
       // drives fall on multiples of the driver's period
       for (; next != log_.commands.end() && next->t_s <= until_s && next->t_s < end_s - slack_s_; ++next)
@@ -118,11 +120,15 @@ class Loop {
     return wired(at);
   }
 
-  /// Takes what has arrived, then estimates.
-  void end_period(double now_s) {
+  static bool skipped(std::size_t sample, int hold, int first) {
+    return sample % static_cast<std::size_t>(hold) != static_cast<std::size_t>(first);
+  }
+
+  /// Takes what has arrived by now, then estimates.
+  void end_period(double due_s, double now_s) {
     for (; imu_ < log_.imu.size() && log_.imu[imu_].arrived_s <= now_s + slack_s_; ++imu_) {
       const OnboardLog::Imu& s = log_.imu[imu_];
-      if (s.arrived_s < log_.start_s - slack_s_ || imu_ % static_cast<std::size_t>(w_.hold_imu) != 0) continue;
+      if (s.arrived_s < log_.start_s - slack_s_ || skipped(imu_, w_.hold_imu, w_.first_imu)) continue;
       const Vector3d rate = w_.rate * Vector3d(s.rate_rad_s.data()), force = w_.force * Vector3d(s.force_m_s2.data());
       float x[6];
       for (int i = 0; i < 3; ++i) x[i] = static_cast<float>(rate[i]), x[3 + i] = static_cast<float>(force[i]);
@@ -130,10 +136,10 @@ class Loop {
     }
     for (; pose_ < log_.poses.size() && log_.poses[pose_].arrived_s <= now_s + slack_s_; ++pose_) {
       const OnboardLog::Pose& s = log_.poses[pose_];
-      if (s.arrived_s < log_.start_s - slack_s_ || pose_ % static_cast<std::size_t>(w_.hold_pose) != 0) continue;
+      if (s.arrived_s < log_.start_s - slack_s_ || skipped(pose_, w_.hold_pose, w_.first_pose)) continue;
       c_.pose(state(), sample_stamp(s.arrived_s - log_.pose_latency_s), wired(s).data());
     }
-    c_.tick(state(), stamp(now_s));
+    c_.tick(state(), stamp(due_s));
   }
 
   void steer(double now_s) {
@@ -213,6 +219,7 @@ class Loop {
   std::vector<std::max_align_t> state_;
   const double slack_s_;  ///< times of a log are rounded
   const double period_s_;
+  const bool drives_often_;  ///< the driver's calls find that a control period is due
   std::vector<float> observation_;
   std::vector<std::size_t> errors_;  ///< first of the three errors of the position, now and in the past
   std::size_t imu_ = 0, pose_ = 0;

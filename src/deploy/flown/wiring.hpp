@@ -22,8 +22,9 @@ struct Wiring {
   Eigen::Vector4d attitude_before = {1, 0, 0, 0}, attitude_after = {1, 0, 0, 0};  ///< q becomes before q after
   std::array<int, 4> attitude_order = {0, 1, 2, 3};                               ///< elements of w, x, y, z
   bool attitude_inverse = false;
-  int hold_imu = 1, hold_pose = 1;  ///< only every so many samples are read
-  double stamp_scale = 1;           ///< of the clock that stamps samples, over that of the loop
+  int hold_imu = 1, hold_pose = 1;    ///< only every so many samples are read
+  int first_imu = 0, first_pose = 0;  ///< and this one first
+  double stamp_scale = 1;             ///< of the clock that stamps samples, over that of the loop
 
   // Observation: the numbers that the policy gets
   std::vector<int> order;          ///< index of the right observation for each; empty: in order

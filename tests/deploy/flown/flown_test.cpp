@@ -125,5 +125,48 @@ TEST(Flown, FindsEachMistakeAgain) {
   EXPECT_GE(found, 0.95 * tried);
 }
 
+/// The flight as a log has it that kept one of two samples of the IMU.
+OnboardLog half_logged(OnboardLog log) {
+  log.imu_Hz = static_cast<double>(log.imu.size() - 1) / (log.imu.back().arrived_s - log.imu.front().arrived_s);
+  std::vector<OnboardLog::Imu> half;
+  for (std::size_t i = 0; i < log.imu.size(); i += 2) half.push_back(log.imu[i]);
+  log.imu = std::move(half);
+  return log;
+}
+
+TEST(Flown, FindsMistakesWhereEverySecondSampleIsLost) {
+  const Folder folder;
+  write_export(folder / "", 7);
+  const FlownCheck check(folder / "");
+  const ExportedC exact(folder / "", Build::exact);
+  const OnboardLog log = samples(0.5);
+  const Flown right = check.check(half_logged(flown_with(check, exact, log, {})));
+  EXPECT_TRUE(right.as_exported) << right.share;
+  EXPECT_GT(right.tolerance_V, 1e-3) << "what was lost";
+  for (const Mistake& m : mistakes_of(check.contract(), exact, false)) {
+    if (m.id != "accel_sign" && m.id != "accel_sign_z") continue;
+    Wiring wiring;
+    m.make(wiring, {});
+    const Flown flown = check.check(half_logged(flown_with(check, exact, log, wiring)));
+    ASSERT_EQ(flown.mistakes.size(), 1U) << m.id << " " << flown.unexplained;
+    EXPECT_EQ(flown.mistakes[0].id, m.id);
+  }
+}
+
+// A sample that arrives 0.8 us after a control period belongs to the next one, where the log has all digits of times.
+TEST(Flown, TakesArrivalsAsPreciselyAsTheLogHasThem) {
+  const Folder folder;
+  write_export(folder / "", 7);
+  const FlownCheck check(folder / "");
+  const ExportedC exact(folder / "", Build::exact);
+  OnboardLog log = samples(0.3);
+  const std::size_t at = log.imu.size() / 2;
+  const double tick_s = check.contract().control_s;
+  log.imu[at].arrived_s = std::ceil(log.imu[at].arrived_s / tick_s) * tick_s + 8e-7;
+  OnboardLog rounded = log;
+  rounded.time_step_s = 2e-6;
+  EXPECT_NE(replay(exact, check.contract(), log, {}).volts, replay(exact, check.contract(), rounded, {}).volts);
+}
+
 }  // namespace
 }  // namespace flappy::deploy
