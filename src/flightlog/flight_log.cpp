@@ -118,11 +118,12 @@ PowerHeader parse_power_header(const io::Table& power, bool declared_inputs) {
 }
 
 FlownHeader parse_flown(const io::Table& flown) {
-  flown.accept({"start_s", "start_pose", "begin_s", "hand_back_s", "policy_crc32", "controller_crc32"});
+  flown.accept({"start_s", "start_pose", "mode", "begin_s", "hand_back_s", "policy_crc32", "controller_crc32"});
   const io::Range time{-kLatest, kLatest};
   FlownHeader h{.start_s = flown.number("start_s", time)};
   if (flown.has("start_pose"))
     std::ranges::copy(flown.numbers("start_pose", 7, {-1e6, 1e6}), h.start_pose.emplace().begin());
+  h.mode = flown.choice_or("mode", "", {"hover", "stay", "task"});
   if (flown.has("begin_s")) h.begin_s = flown.number("begin_s", time);
   if (flown.has("hand_back_s")) h.hand_back_s = flown.number("hand_back_s", time);
   const auto crc = [&](const char* key, std::optional<std::uint32_t>& to) {
@@ -257,6 +258,7 @@ std::string header_text(const FlightHeader& h) {
     text += "\n[flown]\n";
     number("start_s", h.flown->start_s);
     if (h.flown->start_pose) line("start_pose", array(*h.flown->start_pose));
+    if (!h.flown->mode.empty()) line("mode", io::toml_string(h.flown->mode));
     if (h.flown->begin_s) number("begin_s", *h.flown->begin_s);
     if (h.flown->hand_back_s) number("hand_back_s", *h.flown->hand_back_s);
     if (h.flown->policy_crc32) line("policy_crc32", std::to_string(*h.flown->policy_crc32));

@@ -100,8 +100,9 @@ struct AttitudeHeader {
 
 /// How exported C (flappy-export) flew, for its replay: table [flown]. Times are on the log's clock.
 struct FlownHeader {
-  double start_s = 0;                                           ///< flappy_controller_start()
-  std::optional<std::array<double, 7>> start_pose;              ///< told to it: m; attitude w, x, y, z
+  double start_s = 0;                               ///< flappy_controller_start()
+  std::optional<std::array<double, 7>> start_pose;  ///< told to it: m; attitude w, x, y, z
+  std::string mode;  ///< "hover", "stay": flappy_controller_hover(), _stay() after it; "task": neither; "": not known
   std::optional<double> begin_s;                                ///< flappy_controller_begin(): the policy acts
   std::optional<double> hand_back_s;                            ///< when the policy handed back
   std::optional<std::uint32_t> policy_crc32, controller_crc32;  ///< FLAPPY_POLICY_CRC32 of what flew, and so on

@@ -85,6 +85,7 @@ TEST(FlightLog, ReadsBackExactly) {
   flightlog::FlightLog flown = log;
   flown.header.flown = {.start_s = 0.1,
                         .start_pose = {{0.1, 0.2, 1, 1, 0, 0, 0}},
+                        .mode = "hover",
                         .begin_s = 2,
                         .hand_back_s = 2.6,
                         .policy_crc32 = 4294967295U,

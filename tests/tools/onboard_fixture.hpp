@@ -19,10 +19,10 @@ using rollout::FlyConfig;
 using Words = std::vector<std::string>;
 
 /// Keeps roll, pitch and height much as the feedback would, besides small weights of everything it sees.
-inline std::shared_ptr<const policy::Actor> upright_actor(const flight::Task& task) {
+inline std::shared_ptr<const policy::Actor> upright_actor(const flight::Task& task, std::uint32_t seed = 3) {
   policy::Actor a;
   a.task = task.name;
-  std::mt19937 random(3);
+  std::mt19937 random(seed);
   for (const auto& s : task.observation()) a.observation.push_back(s.name);
   for (const auto& s : task.action()) a.action.push_back(s.name);
   a.widths = {static_cast<int>(a.observation.size()), flight::kMaxActions};
@@ -97,6 +97,11 @@ class Loop {
     folder_.write("flappy_controller.h", headers.controller);
     write_board(folder_ / "");
   }
+  /// Makes a mistake in the code between sensors and headers.
+  void spoil(const std::string& from, const std::string& to) {
+    folder_.write("hal_spoilt.c", replaced(io::read_text(source_path("tools/onboard/hal_simulated.c")), from, to));
+    hal_ = (folder_ / "hal_spoilt.c").string();
+  }
   /// Of this machine; the complaints of the compiler.
   std::string build(const std::string& compiler, const Words& options = {"-O1"}) {
     Words command = {compiler};
@@ -130,11 +135,12 @@ class Loop {
     append(options, strict_options({folder_ / "", source_path("tools/onboard")}));
     return options;
   }
-  static Words sources() {
+  Words sources() const {
     const std::string at = source_path("tools/onboard/");
-    return {at + "main.c", at + "onboard.c", at + "hal_simulated.c"};
+    return {at + "main.c", at + "onboard.c", hal_};
   }
   Folder folder_;
+  std::string hal_ = source_path("tools/onboard/hal_simulated.c");
 };
 
 /// The escape's loop on this machine, once.

@@ -16,6 +16,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "deploy/flown/onboard_log.hpp"
 #include "flight/flight_block.hpp"
 #include "hal_simulated.h"
 #include "rollout/fly_fixture.hpp"
@@ -127,6 +128,10 @@ class LedFlight {
   LedFlight(const rollout::FlyConfig& config, std::uint32_t flapper, const std::vector<std::string>& program)
       : program_(program), latency_(config.fleet.sensors), fleet_(1, config.vehicle_of(flapper), led(config, flapper)) {
     place(fleet_, config);
+    drive_s_ = config.vehicle.driver.hold_s;
+    log_.imu_latency_s = latency_.imu.latency_s;
+    log_.pose_latency_s = latency_.mocap.latency_s;
+    log_.mode = OnboardLog::Mode::hover;
     const double nothing[flight::kMaxActions] = {};
     fleet_.set_adds(0, nothing);
     fleet_.record(true);
@@ -153,6 +158,8 @@ class LedFlight {
   LoopProgram& program() { return program_; }
   int period() const { return period_; }
   const loop_output& said() const { return said_; }
+  /// What the loop got and gave, as its own log would have it.
+  const OnboardLog& log() const { return log_; }
 
   /// One control period; false where the motors got other voltages than the driver of the flapper.
   bool step(const Script& script) {
@@ -172,6 +179,10 @@ class LedFlight {
       to.taken_us = kZero_us + static_cast<std::uint32_t>(imu_.front().taken_us);
       std::ranges::copy(imu_.front().x.begin(), imu_.front().x.begin() + 3, to.gyro_rad_s);
       std::ranges::copy(imu_.front().x.begin() + 3, imu_.front().x.begin() + 6, to.accel_m_s2);
+      OnboardLog::Imu& logged = log_.imu.emplace_back();
+      logged.arrived_s = 1e-6 * static_cast<double>(imu_.front().arrived_us);
+      std::ranges::copy(to.gyro_rad_s, logged.rate_rad_s.begin());
+      std::ranges::copy(to.accel_m_s2, logged.force_m_s2.begin());
     }
     for (; !poses_.empty() && arrived(poses_.front()); poses_.pop_front()) {
       if (in.pose_count == LOOP_POSES) throw std::runtime_error("too many poses");
@@ -180,8 +191,17 @@ class LedFlight {
       to.valid = poses_.front().valid;
       std::ranges::copy(poses_.front().x.begin(), poses_.front().x.begin() + 3, to.position_m);
       std::ranges::copy(poses_.front().x.begin() + 3, poses_.front().x.end(), to.attitude);
+      if (!to.valid) continue;
+      OnboardLog::Pose& logged = log_.poses.emplace_back();
+      logged.arrived_s = 1e-6 * static_cast<double>(poses_.front().arrived_us);
+      std::ranges::copy(to.position_m, logged.position_m.begin());
+      std::ranges::copy(to.attitude, logged.attitude.begin());
     }
     said_ = program_.exchange(in);
+    const double now_s = 1e-6 * static_cast<double>(period_us_ * period_), hold_s = drive_s_;
+    for (std::uint32_t d = 0; d < said_.drive_count; ++d)
+      log_.commands.push_back({now_s + d * hold_s, said_.volts[d][0], said_.volts[d][1]});
+    if (said_.state == kActing && !log_.begin_s) log_.begin_s = now_s;
     const float* u = said_.input;
     fleet_.set_added(0, {u[0], u[1], u[2], u[3]});
     fly(script);
@@ -230,7 +250,7 @@ class LedFlight {
     return in;
   }
   /// What the sensors show before the flight.
-  void rest(loop_input& in) const {
+  void rest(loop_input& in) {
     const flight::Motion x = fleet_.estimate(0);
     in.imu_count = in.pose_count = 1;
     in.imu[0].taken_us = in.pose[0].taken_us = in.now_us;
@@ -238,6 +258,9 @@ class LedFlight {
     in.pose[0].valid = 1;
     for (int i = 0; i < 3; ++i) in.pose[0].position_m[i] = static_cast<float>(x.position_m[i]);
     for (int i = 0; i < 4; ++i) in.pose[0].attitude[i] = static_cast<float>(x.attitude[i]);
+    auto& pose = log_.start_pose.emplace();
+    std::ranges::copy(in.pose[0].position_m, pose.begin());
+    std::ranges::copy(in.pose[0].attitude, pose.begin() + 3);
   }
   void fly(const Script& script) {
     fleet_.step();
@@ -272,6 +295,8 @@ class LedFlight {
   std::deque<Sample> imu_, poses_;
   std::vector<loop_output> before_;
   loop_output said_{};
+  OnboardLog log_;
+  double drive_s_;
 };
 
 }  // namespace flappy::deploy

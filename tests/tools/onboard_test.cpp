@@ -1,4 +1,6 @@
 // The onboard loop in the simulator: its flapper moves as one that the lanes fly, to the bit.
+#include "deploy/flown/flown.hpp"
+#include "deploy/header/contract.hpp"
 #include "full.hpp"
 #include "tools/own_flight.hpp"
 
@@ -86,6 +88,56 @@ TEST(Onboard, FliesOnTheBoardAsTheLanesDo) {
   script.manoeuvre = 500;
   script.periods = 800;
   fly_as_the_lanes(of_nominal(escape()), 0, loop.board(), script);
+}
+
+/// The log of a loop, checked against what was exported.
+Flown checked(const Words& program) {
+  const FlyConfig config = of_nominal(escape());
+  Folder exported;
+  exported.write("flappy_policy.h", escape_headers().policy);
+  exported.write("flappy_controller.h", escape_headers().controller);
+  const policy::PolicyNetwork network = network_of(config);
+  policy::PolicyVectors tests = corners(network, config.fleet.task.observation());
+  tests.action = evaluate(network, tests.observation);
+  exported.write("contract.json",
+                 contract_json(config, kRun, network, tests,
+                               {crc_of_header(escape_headers().policy), crc_of_header(escape_headers().controller)}));
+  LedFlight led(config, 0, program);
+  Script script;
+  script.manoeuvre = 520;
+  while (led.period() < 700) led.step(script);
+  EXPECT_EQ(led.program().finish(), 0);
+  EXPECT_TRUE(led.log().begin_s);
+  return FlownCheck(exported / "").check(led.log());
+}
+
+const char* const kSwapped =
+    "sample->accel_m_s2 = vector(in.imu[imu_taken].accel_m_s2);\n"
+    "  sample->accel_m_s2 = flappy_vector_of(sample->accel_m_s2.y, sample->accel_m_s2.x, "
+    "sample->accel_m_s2.z);";
+
+Flown checked_on_board(Loop& loop) {
+  EXPECT_EQ(loop.build_for_board(), "");
+  return checked(loop.board());
+}
+
+TEST(Onboard, MistakesOfTheBoardAreFoundInItsLog) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
+  if (const std::string missing = board_missing(); !missing.empty()) GTEST_SKIP() << missing;
+  Loop right(escape_headers());
+  const Flown same = checked_on_board(right);
+  EXPECT_TRUE(same.as_exported) << same.share << " " << same.from_s;
+  Loop swapped(escape_headers());
+  swapped.spoil("sample->accel_m_s2 = vector(in.imu[imu_taken].accel_m_s2);", kSwapped);
+  const Flown axes = checked_on_board(swapped);
+  ASSERT_EQ(axes.mistakes.size(), 1U) << axes.unexplained;
+  EXPECT_EQ(axes.mistakes[0].id, "accel_swap_xy") << axes.mistakes[0].words;
+  FlyConfig before = escape();
+  before.actor = upright_actor(before.fleet.task, 4);
+  Loop old({policy_text(before), escape_headers().controller});
+  const Flown header = checked_on_board(old);
+  ASSERT_EQ(header.mistakes.size(), 1U) << header.unexplained;
+  EXPECT_EQ(header.mistakes[0].id, "another_policy") << header.mistakes[0].words;
 }
 
 }  // namespace

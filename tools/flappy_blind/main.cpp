@@ -112,6 +112,7 @@ Json fly_with_firmware(const RobotOptions& o, const FamilyOptions& f, const OnBo
   flown.log.header.ambient.ceiling_z_m -= kOrigin_m;
   flightlog::FlownHeader& h = flown.log.header.flown.emplace();
   h.start_pose = {b.start[0], b.start[1], b.start[2], std::cos(start[3] / 2), 0, 0, std::sin(start[3] / 2)};
+  h.mode = "task";
   h.begin_s = b.begin_s;
   flightlog::write_flight_log(o.out, flown.log);
   const double lasted_s = flown.log.command.t_s.back();

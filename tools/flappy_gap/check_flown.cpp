@@ -65,6 +65,10 @@ deploy::OnboardLog onboard(const std::string& folder, const flightlog::FlightLog
   if (h.flown) {
     to.start_s = h.flown->start_s;
     to.start_pose = h.flown->start_pose;
+    using Mode = deploy::OnboardLog::Mode;
+    if (h.flown->mode == "hover") to.mode = Mode::hover;
+    if (h.flown->mode == "stay") to.mode = Mode::stay;
+    if (h.flown->mode == "task") to.mode = Mode::task;
     to.begin_s = h.flown->begin_s;
     to.hand_back_s = h.flown->hand_back_s;
   } else {
@@ -111,6 +115,15 @@ Json check_flown(const std::string& exported, const std::vector<std::string>& fo
     }
     const deploy::Flown f = check.check(onboard(folder, log));
     std::printf("%s: %s\n", folder.c_str(), sentence(f).c_str());
+    constexpr const char* kModes[] = {"hover", "stay", "task"};
+    const char* mode = kModes[static_cast<std::size_t>(f.mode)];
+    const auto& header = log.header.flown;
+    if (!header)
+      std::printf(
+          "%s: flight.toml has no [flown]: the first command is taken for the start, and the policy for never begun\n",
+          folder.c_str());
+    if (!header || header->mode.empty())
+      std::printf("%s: flown.mode is missing: taken for \"%s\"\n", folder.c_str(), mode);
     Json mistakes = Json::array();
     for (const deploy::FlownMistake& m : f.mistakes)
       mistakes.push_back({{"kind", name_of(m.stage)}, {"mistake", m.id}, {"words", m.words}});
@@ -119,6 +132,7 @@ Json check_flown(const std::string& exported, const std::vector<std::string>& fo
                        {"share", f.share},
                        {"tolerance_V", f.tolerance_V},
                        {"from_s", f.from_s},
+                       {"mode", mode},
                        {"mistakes", mistakes},
                        {"explained", f.explained},
                        {"unexplained", f.unexplained}});

@@ -30,6 +30,8 @@ static flappy_quaternion flown_quaternion(const float *x) {
 void flown_start(flappy_controller *c, uint32_t now_us, const float *x) {
   flappy_controller_start(c, now_us, flappy_vector_from(x), flown_quaternion(x + 3));
 }
+void flown_hover(flappy_controller *c) { flappy_controller_hover(c); }
+void flown_stay(flappy_controller *c) { flappy_controller_stay(c); }
 void flown_begin(flappy_controller *c) { flappy_controller_begin(c); }
 int flown_imu(flappy_controller *c, uint32_t taken_us, const float *x) {
   return flappy_controller_imu(c, taken_us, flappy_vector_from(x), flappy_vector_from(x + 3));
@@ -163,6 +165,8 @@ ExportedC::ExportedC(const fs::path& folder, Build build) {
     to = reinterpret_cast<std::remove_reference_t<decltype(to)>>(dlsym(library_, name));
   };
   take(start, "flown_start");
+  take(hover, "flown_hover");
+  take(stay, "flown_stay");
   take(begin, "flown_begin");
   take(imu, "flown_imu");
   take(pose, "flown_pose");

@@ -53,6 +53,8 @@ class ExportedC {
   // The functions of the headers; `state` has state_bytes().
   std::size_t state_bytes() const;
   void (*start)(void* state, std::uint32_t now_us, const float* pose);
+  void (*hover)(void* state);
+  void (*stay)(void* state);
   void (*begin)(void* state);
   int (*imu)(void* state, std::uint32_t taken_us, const float* rate_and_force);
   int (*pose)(void* state, std::uint32_t taken_us, const float* pose);

@@ -101,12 +101,12 @@ OnboardLog filled(OnboardLog log, std::size_t every) {
   return log;
 }
 
-/// The log with every second sample of the IMU, the others interpolated.
-OnboardLog thinned(OnboardLog log) {
+/// The log without every second of the samples that were not filled in, these interpolated, too.
+OnboardLog thinned(OnboardLog log, std::size_t every) {
   std::vector<OnboardLog::Imu> half;
-  for (std::size_t i = 1; i < log.imu.size(); i += 2) half.push_back(log.imu[i]);
+  for (std::size_t i = every; i < log.imu.size(); i += 2 * every) half.push_back(log.imu[i]);
   log.imu = std::move(half);
-  return filled(std::move(log), 2);
+  return filled(std::move(log), 2 * every);
 }
 
 class Search {
@@ -115,10 +115,9 @@ class Search {
   Search(const Contract& contract, const std::vector<Mistake>& mistakes, const OnboardLog& log, Library library)
       : contract_(contract),
         mistakes_(mistakes),
-        thinning_(thinning(log, contract)),
-        logged_(log),
-        log_(filled(log, thinning_)),
         library_(std::move(library)),
+        thinning_(thinning(log, contract)),
+        log_(with_mode(filled(log, thinning_))),
         tolerance_(tolerances({})) {}
 
   Flown run() {
@@ -126,6 +125,7 @@ class Search {
     Flown flown;
     flown.share = share(exported, tolerance_);
     flown.tolerance_V = io::median(tolerance_);
+    flown.mode = *log_.mode;
     const std::size_t first = first_difference(exported);
     flown.as_exported = (flown.share >= kExplained && first == log_.commands.size()) || flown.share >= kNearlyAll;
     if (flown.as_exported) return flown;
@@ -147,6 +147,25 @@ class Search {
 
  private:
   static constexpr double kForever = std::numeric_limits<double>::infinity();
+
+  /// The log; where it lacks the mode, with the one that leaves the least at first.
+  OnboardLog with_mode(OnboardLog log) const {
+    if (log.mode) return log;
+    constexpr double kFirst_s = 0.5;
+    double least = kForever;
+    std::optional<OnboardLog::Mode> best;
+    for (const auto mode : {OnboardLog::Mode::task, OnboardLog::Mode::hover, OnboardLog::Mode::stay}) {
+      log.mode = mode;
+      const Volts v = replay(library_(Build::exact), contract_, log, {}, log.start_s + kFirst_s).volts;
+      double sum = 0;
+      for (std::size_t i = 0; i < v.size(); ++i)
+        sum += std::min(
+            1.0, std::max(std::abs(v[i][0] - log.commands[i].left_V), std::abs(v[i][1] - log.commands[i].right_V)));
+      if (sum < least) least = sum, best = mode;
+    }
+    log.mode = best;
+    return log;
+  }
 
   Volts volts(const Wiring& w, double until_s) const {
     return replay(library_(w.build), contract_, log_, w, until_s).volts;
@@ -170,7 +189,7 @@ class Search {
     if (thinning_ > 1) {
       // what further samples lose tells what those lost, whose noise is of the same size throughout
       double sum = 0;
-      for (const double d : differences(filled(thinned(logged_), thinning_))) sum += d * d;
+      for (const double d : differences(thinned(log_, thinning_))) sum += d * d;
       const double rms = std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, moved.size())));
       for (double& m : moved) m += kMargin * rms;
     }
@@ -391,10 +410,9 @@ class Search {
 
   const Contract& contract_;
   const std::vector<Mistake>& mistakes_;
-  const std::size_t thinning_;
-  const OnboardLog& logged_;  ///< without the samples that are filled in
-  const OnboardLog log_;
   const Library library_;
+  const std::size_t thinning_;
+  const OnboardLog log_;
   const std::vector<double> tolerance_;  ///< as exported
   std::vector<Candidate> singles_;
 };

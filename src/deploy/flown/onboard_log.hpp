@@ -29,8 +29,12 @@ struct OnboardLog {
 
   double start_s = 0;                               ///< flappy_controller_start()
   std::optional<std::array<double, 7>> start_pose;  ///< none: of the pose that arrived last before it
-  std::optional<double> begin_s;                    ///< flappy_controller_begin(); none: the policy never acts
-  std::optional<double> hand_back_s;                ///< as the robot says; none: not known
+  /// What the controller does before the policy begins: it hovers where the task begins, stays where it is, or flies the
+  /// task's path. None: not known.
+  enum class Mode { hover, stay, task };
+  std::optional<Mode> mode;
+  std::optional<double> begin_s;      ///< flappy_controller_begin(); none: the policy never acts
+  std::optional<double> hand_back_s;  ///< as the robot says; none: not known
 
   // Steps between the numbers that the log can tell apart; 0: all digits are there
   double time_step_s = 0, rate_step_rad_s = 0, force_step_m_s2 = 0, position_step_m = 0, attitude_step = 0,

@@ -70,6 +70,8 @@ class Loop {
     // before the start, motors are off
     out.volts.assign(static_cast<std::size_t>(first - log_.commands.begin()), {0, 0});
     c_.start(state(), stamp(log_.start_s), start_pose().data());
+    if (log_.mode == OnboardLog::Mode::hover) c_.hover(state());
+    if (log_.mode == OnboardLog::Mode::stay) c_.stay(state());
     auto next = first;
     for (std::uint32_t tick = 0; next != log_.commands.end() && next->t_s <= until_s; ++tick) {
       const double due_s = log_.start_s + tick * period_s_, end_s = due_s + period_s_;
