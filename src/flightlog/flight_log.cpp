@@ -137,7 +137,7 @@ FlownHeader parse_flown(const io::Table& flown) {
 FlightHeader parse_header(const io::Table& root) {
   root.schema(1);
   root.accept({"schema", "vehicle", "vehicle_sha256", "flapping_Hz", "gravity_m_s2", "ambient", "command", "mocap",
-               "imu", "power", "wings", "attitude", "changes", "flown"});
+               "imu", "power", "wings", "attitude", "policy", "changes", "flown"});
   FlightHeader h;
   h.vehicle = root.string("vehicle");
   if (h.vehicle.empty() || h.vehicle.find_first_of("/\\") != std::string::npos)
@@ -165,6 +165,10 @@ FlightHeader parse_header(const io::Table& root) {
   if (const auto attitude = root.optional_table("attitude"))
     h.attitude = {attitude->number("rate_hz", rate), attitude->number("latency_s", latency),
                   attitude->number("noise_rad", non_negative(1))};
+  if (const auto policy = root.optional_table("policy")) {
+    policy->accept({"numbers"});
+    h.policy = read_policy_numbers(*policy);
+  }
   h.changes = model::read_changes(root);
   if (const auto flown = root.optional_table("flown")) h.flown = parse_flown(*flown);
   root.finish();
@@ -252,6 +256,12 @@ std::string header_text(const FlightHeader& h) {
     number("rate_hz", h.attitude->rate_hz);
     number("latency_s", h.attitude->latency_s);
     number("noise_rad", h.attitude->noise_rad);
+  }
+  if (!h.policy.empty()) {
+    text += "\n[policy]\n";
+    std::string list;
+    for (const std::string& name : h.policy) list += (list.empty() ? "" : ", ") + io::toml_string(name);
+    line("numbers", "[" + list + "]");
   }
   text += model::changes_text(h.changes);
   if (h.flown) {
@@ -349,15 +359,15 @@ Stream parse_stream(const std::string& text, const fs::path& path, const std::ve
   return stream;
 }
 
-CommandStream parse_declared(const std::string& text, const fs::path& path, const std::vector<std::string>& inputs) {
+/// A stream whose columns besides t_s the header names.
+void parse_declared(const std::string& text, const fs::path& path, const std::vector<std::string>& declared,
+                    Column& t_s, std::vector<Column>& columns) {
   std::vector<std::string> names = {"t_s"};
-  names.insert(names.end(), inputs.begin(), inputs.end());
+  names.insert(names.end(), declared.begin(), declared.end());
   const StreamReader reader(text, path, names);
-  CommandStream command;
-  command.t_s = reader.take("t_s", kLatest);
-  reader.require_times(command.t_s);
-  for (const std::string& name : inputs) command.declared.push_back(reader.take(name, kInputLimit));
-  return command;
+  t_s = reader.take("t_s", kLatest);
+  reader.require_times(t_s);
+  for (const std::string& name : declared) columns.push_back(reader.take(name, kInputLimit));
 }
 
 CommandStream parse_command(const std::string& text, const fs::path& path) {
@@ -410,15 +420,19 @@ std::string stream_text(const Stream& stream, const std::vector<Field<Stream>>& 
   return io::csv_text(names, columns);
 }
 
+std::string declared_text(const Column& t_s, const std::vector<std::string>& declared,
+                          const std::vector<Column>& values) {
+  std::vector<std::string> names = {"t_s"};
+  std::vector<Column> columns = {t_s};
+  names.insert(names.end(), declared.begin(), declared.end());
+  columns.insert(columns.end(), values.begin(), values.end());
+  return io::csv_text(names, columns);
+}
+
 std::string command_text(const CommandStream& command, const std::vector<std::string>& inputs) {
+  if (!inputs.empty()) return declared_text(command.t_s, inputs, command.declared);
   std::vector<std::string> names;
   std::vector<Column> columns;
-  if (!inputs.empty()) {
-    names = {"t_s"}, columns = {command.t_s};
-    names.insert(names.end(), inputs.begin(), inputs.end());
-    columns.insert(columns.end(), command.declared.begin(), command.declared.end());
-    return io::csv_text(names, columns);
-  }
   add_columns(command, kCommandFields, names, columns);
   if (command.inputs) add_columns(*command.inputs, kInputFields, names, columns);
   if (command.phase_rad) {
@@ -474,6 +488,20 @@ std::optional<Stream> parse_optional(const LogFiles& files, const std::string& n
   if (found == files.end()) return std::nullopt;
   require_declared(name, folder, declared);
   return parse_stream(found->second, folder / name, fields);
+}
+
+std::vector<std::string> read_names(const io::Table& table, const char* key) {
+  constexpr std::string_view kAccepted = "names of columns, of letters, digits and _";
+  std::vector<std::string> names = table.strings(key);
+  if (names.empty()) table.fail(key, "is empty", kAccepted);
+  for (const std::string& name : names) {
+    const bool plain = std::ranges::all_of(
+        name, [](char c) { return c == '_' || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || is_digit(c); });
+    if (!plain || name.empty() || is_digit(name.front()) || name == "t_s")
+      table.fail(key, "\"" + name + "\" is no name of a column", kAccepted);
+    if (std::ranges::count(names, name) > 1) table.fail(key, "\"" + name + "\" is there twice", "each once");
+  }
+  return names;
 }
 
 }  // namespace
@@ -532,19 +560,15 @@ LogAmbient read_ambient(const io::Table& ambient) {
   return a;
 }
 
-std::vector<std::string> read_inputs(const io::Table& command) {
-  constexpr std::string_view kAccepted = "names of columns, of letters, digits and _";
-  std::vector<std::string> inputs = command.strings("inputs");
-  if (inputs.empty()) command.fail("inputs", "is empty", kAccepted);
-  for (const std::string& name : inputs) {
-    const bool plain = std::ranges::all_of(
-        name, [](char c) { return c == '_' || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || is_digit(c); });
-    if (!plain || name.empty() || is_digit(name.front()) || name == "t_s")
-      command.fail("inputs", "\"" + name + "\" is no name of an input", kAccepted);
-    if (std::ranges::count(inputs, name) > 1)
-      command.fail("inputs", "\"" + name + "\" is there twice", "each input once");
-  }
-  return inputs;
+std::vector<std::string> read_inputs(const io::Table& command) { return read_names(command, "inputs"); }
+
+std::vector<std::string> read_policy_numbers(const io::Table& policy) {
+  std::vector<std::string> numbers = read_names(policy, "numbers");
+  for (const std::string& name : numbers)
+    if (!name.starts_with("observation_") && !name.starts_with("action_"))
+      policy.fail("numbers", "\"" + name + "\" is neither seen nor done by a policy",
+                  "observation_ or action_ and a name of contract.json, as in observation_x_error");
+  return numbers;
 }
 
 double read_flapping(const io::Table& root, const std::vector<std::string>& inputs) {
@@ -577,8 +601,8 @@ FlightLog parse_flight_log(const LogFiles& files, const fs::path& folder) {
   log.header = parse_header(root);
   const FlightHeader& h = log.header;
   const std::string& command = text_of(files, kCommand, folder);
-  log.command = h.inputs.empty() ? parse_command(command, folder / kCommand)
-                                 : parse_declared(command, folder / kCommand, h.inputs);
+  if (h.inputs.empty()) log.command = parse_command(command, folder / kCommand);
+  else parse_declared(command, folder / kCommand, h.inputs, log.command.t_s, log.command.declared);
   log.mocap = parse_turned(text_of(files, kMocap, folder), folder / kMocap, kMocapFields);
   if (h.imu.rate_hz > 0) text_of(files, kImu, folder);
   log.imu = parse_optional(files, kImu, folder, h.imu.rate_hz > 0, imu_fields(h)).value_or(ImuStream{});
@@ -587,6 +611,11 @@ FlightLog parse_flight_log(const LogFiles& files, const fs::path& folder) {
   if (const auto found = files.find(kAttitude); found != files.end()) {
     require_declared(kAttitude, folder, h.attitude.has_value());
     log.attitude = parse_turned(found->second, folder / kAttitude, kAttitudeFields);
+  }
+  if (const auto found = files.find(kPolicy); found != files.end()) {
+    require_declared(kPolicy, folder, !h.policy.empty());
+    PolicyStream& policy = log.policy.emplace();
+    parse_declared(found->second, folder / kPolicy, h.policy, policy.t_s, policy.numbers);
   }
   require_overlap(log, folder);
   return log;
@@ -600,6 +629,7 @@ LogFiles flight_log_files(const FlightLog& log) {
   if (h.imu.rate_hz > 0) files[kImu] = stream_text(log.imu, imu_fields(h));
   if (log.power) files[kPower] = stream_text(*log.power, power_fields(h));
   if (log.wings) files[kWings] = stream_text(*log.wings, kWingsFields);
+  if (log.policy) files[kPolicy] = declared_text(log.policy->t_s, h.policy, log.policy->numbers);
   if (log.attitude) files[kAttitude] = stream_text(*log.attitude, kAttitudeFields);
   return files;
 }

@@ -8,6 +8,7 @@
 //   power.csv     optional, declared in [power]: t_s,battery_V,left_current_A,right_current_A
 //   attitude.csv  optional, declared in [attitude]: t_s,qw,qx,qy,qz, from a second estimator
 //   wings.csv     optional, [wings]: t_s,left_stroke_rad,left_rotation_rad,right_stroke_rad,right_rotation_rad
+//   policy.csv    optional, declared in [policy]: t_s and its numbers, for each inference of an exported policy
 //   truth.csv     only from a simulator: the full state; read_flight_log() never opens it
 //   joints.csv    only from a simulator, articulated wings: angles, rates, torques, power and work of all joints
 //
@@ -122,6 +123,8 @@ struct FlightHeader {
   std::optional<PowerHeader> power;
   std::optional<WingsHeader> wings;
   std::optional<AttitudeHeader> attitude;
+  /// Columns of policy.csv: "observation_" or "action_" and a name of contract.json. Empty: there is none.
+  std::vector<std::string> policy;
   model::Changes changes;  ///< what was done to the robot on purpose before this flight
   std::optional<FlownHeader> flown;
   bool operator==(const FlightHeader&) const = default;
@@ -172,23 +175,31 @@ struct AttitudeStream {
   bool operator==(const AttitudeStream&) const = default;
 };
 
+/// What an exported policy got and gave, before any limit; t_s is the time of the inference.
+struct PolicyStream {
+  Column t_s;
+  std::vector<Column> numbers;  ///< in the order of FlightHeader::policy
+  bool operator==(const PolicyStream&) const = default;
+};
+
 struct FlightLog {
   FlightHeader header;
   CommandStream command;
   MocapStream mocap;
   ImuStream imu;
-  std::optional<PowerStream> power;  ///< this and the next two: only where the header declares them
+  std::optional<PowerStream> power;  ///< this and the next three: only where the header declares them
   std::optional<WingsStream> wings;
   std::optional<AttitudeStream> attitude;
+  std::optional<PolicyStream> policy;
   bool operator==(const FlightLog&) const = default;
 };
 
 namespace log_file {
 inline const std::string kHeader = "flight.toml", kCommand = "command.csv", kMocap = "mocap.csv", kImu = "imu.csv",
-                         kPower = "power.csv", kWings = "wings.csv", kAttitude = "attitude.csv", kTruth = "truth.csv",
-                         kJoints = "joints.csv";
-inline const std::vector<std::string> kAll = {kHeader, kCommand,  kMocap, kImu,   kPower,
-                                              kWings,  kAttitude, kTruth, kJoints};
+                         kPower = "power.csv", kWings = "wings.csv", kAttitude = "attitude.csv", kPolicy = "policy.csv",
+                         kTruth = "truth.csv", kJoints = "joints.csv";
+inline const std::vector<std::string> kAll = {kHeader, kCommand,  kMocap,  kImu,   kPower,
+                                              kWings,  kAttitude, kPolicy, kTruth, kJoints};
 }  // namespace log_file
 
 /// Columns of truth.csv: pose, motion and wings of the flapper, and the bias of its gyro.
@@ -224,8 +235,9 @@ inline const std::vector<std::string> kMotionNames = {"t_s",
 
 LogAmbient read_ambient(const io::Table& ambient);
 
-/// Keys of flight.toml and of mappings: [command] inputs, flapping_Hz, [mocap] source, [imu] gyro, [power] currents.
+/// Keys of flight.toml and of mappings: [command] inputs, [policy] numbers, flapping_Hz, [mocap] source, [imu] gyro, [power] currents.
 std::vector<std::string> read_inputs(const io::Table& command);
+std::vector<std::string> read_policy_numbers(const io::Table& policy);
 double read_flapping(const io::Table& root, const std::vector<std::string>& inputs);
 PoseSource read_pose_source(const io::Table& mocap, bool declared_inputs);
 bool read_gyro(const io::Table& imu, bool declared_inputs);

@@ -90,6 +90,8 @@ TEST(FlightLog, ReadsBackExactly) {
                         .hand_back_s = 2.6,
                         .policy_crc32 = 4294967295U,
                         .controller_crc32 = 1};
+  flown.header.policy = {"observation_x_error", "action_added_bias"};
+  flown.policy = {{0.1, 0.2, 0.3}, {{1, 2, 3}, {0.25, 0, -1e-7}}};
   EXPECT_EQ(flightlog::parse_flight_log(flight_log_files(flown), "log"), flown);
   flightlog::FlightLog least = log;
   least.header.vehicle_sha256.clear();
@@ -154,10 +156,10 @@ TEST(FlightLog, OfDeclaredInputsIsRefusedWhereItIsFaulty) {
   const std::string inputs = R"(["left_flap", "pitch_servo", "lamp2"])";
   EXPECT_EQ(header(inputs, "[]"), "log/flight.toml:13:10: command.inputs: is empty" + names);
   EXPECT_EQ(header("lamp2", "lamp,2"),
-            "log/flight.toml:13:10: command.inputs: \"lamp,2\" is no name of an input" + names);
-  EXPECT_EQ(header("lamp2", "t_s"), "log/flight.toml:13:10: command.inputs: \"t_s\" is no name of an input" + names);
+            "log/flight.toml:13:10: command.inputs: \"lamp,2\" is no name of a column" + names);
+  EXPECT_EQ(header("lamp2", "t_s"), "log/flight.toml:13:10: command.inputs: \"t_s\" is no name of a column" + names);
   EXPECT_EQ(header("lamp2", "left_flap"),
-            "log/flight.toml:13:10: command.inputs: \"left_flap\" is there twice; accepted: each input once");
+            "log/flight.toml:13:10: command.inputs: \"left_flap\" is there twice; accepted: each once");
   EXPECT_EQ(header("[command]\ninputs = " + inputs, ""),
             "log/flight.toml: flapping_Hz: is missing; accepted: a number above 0, at most 1000");
   EXPECT_EQ(header("[command]\ninputs = " + inputs, "[command]"),
@@ -268,7 +270,7 @@ TEST(FlightLog, RefusesFaultyHeaders) {
       header("gravity_m_s2", "gravity"),
       "log/flight.toml:5:1: gravity: unknown key; accepted: ambient, attitude, changes, command, flapping_Hz, flown, "
       "gravity_m_s2, imu, "
-      "mocap, power, schema, vehicle, vehicle_sha256, wings");
+      "mocap, policy, power, schema, vehicle, vehicle_sha256, wings");
   EXPECT_EQ(header("gravity_m_s2 = 9.8", "# "),
             "log/flight.toml: gravity_m_s2: is missing; accepted: a number from 0 to 100");
   EXPECT_EQ(header("flapping_Hz = 34.0", "flapping_Hz = -34.0"),

@@ -44,7 +44,8 @@ void export_run(const std::string& folder, const std::filesystem::path& to) {
 }
 
 /// The flight as it passed the robot's processor.
-deploy::OnboardLog onboard(const std::string& folder, const flightlog::FlightLog& log) {
+deploy::OnboardLog onboard(const std::string& folder, const flightlog::FlightLog& log,
+                           const deploy::Contract& contract) {
   const flightlog::FlightHeader& h = log.header;
   if (!h.inputs.empty())
     refuse(folder, "has declared inputs, which no exported controller sets", "a log with voltages");
@@ -75,6 +76,24 @@ deploy::OnboardLog onboard(const std::string& folder, const flightlog::FlightLog
     to.start_s = c.t_s.front();
   }
   using flightlog::last_digit;
+  if (log.policy) {
+    std::vector<std::string> known;
+    for (const auto& s : contract.observation) known.push_back("observation_" + s.name);
+    for (const auto& s : contract.action) known.push_back("action_" + s.name);
+    for (std::size_t k = 0; k < h.policy.size(); ++k) {
+      const auto found = std::ranges::find(known, h.policy[k]);
+      if (found == known.end())
+        refuse(folder, "policy.numbers: \"" + h.policy[k] + "\" is no number of this policy",
+               io::joined(known) + io::did_you_mean(h.policy[k], known));
+      to.policy_numbers.push_back(static_cast<std::size_t>(found - known.begin()));
+      to.policy_steps.push_back(last_digit(log.policy->numbers[k]));
+    }
+    for (std::size_t i = 0; i < log.policy->t_s.size(); ++i) {
+      deploy::OnboardLog::Inference& row = to.inferences.emplace_back();
+      row.t_s = log.policy->t_s[i];
+      for (const flightlog::Column& numbers : log.policy->numbers) row.numbers.push_back(numbers[i]);
+    }
+  }
   to.time_step_s = std::max(last_digit(log.imu.t_s), last_digit(m.t_s));
   to.rate_step_rad_s = last_digit(log.imu.gyro_x_rad_s);
   to.force_step_m_s2 = last_digit(log.imu.accel_z_m_s2);
@@ -113,7 +132,7 @@ Json check_flown(const std::string& exported, const std::vector<std::string>& fo
         std::printf("%s: the log says that another policy flew: %u, and %s has %u\n", folder.c_str(),
                     *flown->policy_crc32, exported.c_str(), check.contract().policy_crc32);
     }
-    const deploy::Flown f = check.check(onboard(folder, log));
+    const deploy::Flown f = check.check(onboard(folder, log, check.contract()));
     std::printf("%s: %s\n", folder.c_str(), sentence(f).c_str());
     constexpr const char* kModes[] = {"hover", "stay", "task"};
     const char* mode = kModes[static_cast<std::size_t>(f.mode)];

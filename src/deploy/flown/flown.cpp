@@ -9,6 +9,7 @@
 #include "deploy/flown/replay.hpp"
 #include "io/files.hpp"
 #include "io/statistics.hpp"
+#include "io/text.hpp"
 
 namespace flappy::deploy {
 namespace {
@@ -117,10 +118,12 @@ class Search {
         mistakes_(mistakes),
         library_(std::move(library)),
         thinning_(thinning(log, contract)),
-        log_(with_mode(filled(log, thinning_))),
-        tolerance_(tolerances({})) {}
+        log_(filled(log, thinning_)),
+        tolerance_(tolerances({})),
+        policy_tolerance_(policy_tolerances()) {}
 
-  Flown run() {
+  /// `quick`: without looking for mistakes.
+  Flown run(bool quick) {
     const Volts exported = volts({}, kForever);
     Flown flown;
     flown.share = share(exported, tolerance_);
@@ -128,7 +131,7 @@ class Search {
     flown.mode = *log_.mode;
     const std::size_t first = first_difference(exported);
     flown.as_exported = (flown.share >= kExplained && first == log_.commands.size()) || flown.share >= kNearlyAll;
-    if (flown.as_exported) return flown;
+    if (flown.as_exported || quick) return flown;
     if (first < log_.commands.size()) flown.from_s = log_.commands[first].t_s;
     Candidate best = one_mistake(flown.from_s);
     flown.explained = explained(best, exported);
@@ -148,25 +151,9 @@ class Search {
  private:
   static constexpr double kForever = std::numeric_limits<double>::infinity();
 
-  /// The log; where it lacks the mode, with the one that leaves the least at first.
-  OnboardLog with_mode(OnboardLog log) const {
-    if (log.mode) return log;
-    constexpr double kFirst_s = 0.5;
-    double least = kForever;
-    std::optional<OnboardLog::Mode> best;
-    for (const auto mode : {OnboardLog::Mode::task, OnboardLog::Mode::hover, OnboardLog::Mode::stay}) {
-      log.mode = mode;
-      const Volts v = replay(library_(Build::exact), contract_, log, {}, log.start_s + kFirst_s).volts;
-      double sum = 0;
-      for (std::size_t i = 0; i < v.size(); ++i)
-        sum += std::min(
-            1.0, std::max(std::abs(v[i][0] - log.commands[i].left_V), std::abs(v[i][1] - log.commands[i].right_V)));
-      if (sum < least) least = sum, best = mode;
-    }
-    log.mode = best;
-    return log;
+  Replay played(const Wiring& w, double until_s) const {
+    return replay(library_(w.build), contract_, log_, w, until_s);
   }
-
   Volts volts(const Wiring& w, double until_s) const {
     return replay(library_(w.build), contract_, log_, w, until_s).volts;
   }
@@ -235,6 +222,52 @@ class Search {
     }
     return v.empty() ? 100 : sum / static_cast<double>(v.size());
   }
+  /// Calls `take(row, number, difference over tolerance)` for each number of the policy that the log has.
+  template <class Take>
+  void compare_policy(const std::vector<OnboardLog::Inference>& is, Take&& take) const {
+    std::size_t next = 0;
+    for (std::size_t row = 0; row < log_.inferences.size(); ++row) {
+      const OnboardLog::Inference& logged = log_.inferences[row];
+      while (next < is.size() && is[next].t_s < logged.t_s - contract_.policy_s / 2) ++next;
+      if (next == is.size()) return;
+      if (is[next].t_s > logged.t_s + contract_.policy_s / 2) continue;
+      for (std::size_t k = 0; k < logged.numbers.size(); ++k)
+        take(row, k, std::abs(is[next].numbers[k] - logged.numbers[k]) / policy_tolerance_[k]);
+    }
+  }
+  double policy_loss(const std::vector<OnboardLog::Inference>& is) const {
+    double sum = 0, count = 0;
+    compare_policy(is, [&](std::size_t, std::size_t, double d) {
+      sum += std::isfinite(d) ? std::log1p(d * d) : 100;
+      ++count;
+    });
+    return count > 0 ? sum / count : 0;
+  }
+  /// [number of the policy] what the log has lost may change it by.
+  std::vector<double> policy_tolerances() const {
+    std::vector<double> list;
+    const std::size_t seen = contract_.observation.size();
+    for (std::size_t k = 0; k < log_.policy_numbers.size(); ++k) {
+      const std::size_t i = log_.policy_numbers[k];
+      const Contract::Signal& s = i < seen ? contract_.observation[i] : contract_.action[i - seen];
+      list.push_back(log_.policy_steps[k] + 1e-5 * (s.high - s.low));
+    }
+    if (list.empty()) return list;
+    const std::vector<OnboardLog::Inference> as_logged = played({}, kForever).inferences;
+    const auto add = [&](const OnboardLog& other) {
+      const auto moved = replay(library_(Build::exact), contract_, other, {}).inferences;
+      for (std::size_t k = 0; k < list.size(); ++k) {
+        double sum = 0;
+        for (std::size_t i = 0; i < std::min(moved.size(), as_logged.size()); ++i)
+          sum += std::pow(moved[i].numbers[k] - as_logged[i].numbers[k], 2);
+        list[k] += kMargin * std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, moved.size())));
+      }
+    };
+    add(dithered(log_));
+    if (thinning_ > 1) add(thinned(log_, thinning_));
+    return list;
+  }
+
   /// First of several commands in a row that differ; the number of all: none does.
   std::size_t first_difference(const Volts& v) const {
     std::size_t row = 0;
@@ -247,7 +280,8 @@ class Search {
 
   double loss_with(Candidate& c, const Parameters& p, double until_s) const {
     c.parts.back().second = p;
-    return loss(volts(c.wiring(), until_s));
+    const Replay r = played(c.wiring(), until_s);
+    return loss(r.volts) + policy_loss(r.inferences);
   }
 
   /// Moves the parameters of a candidate's last mistake by Levenberg and Marquardt's method, which needs smooth ones.
@@ -394,6 +428,8 @@ class Search {
       flown.unexplained = "the estimate or the controller, before the policy acts";
       return;
     }
+    flown.unexplained = first_observation_that_differs();
+    if (!flown.unexplained.empty()) return;
     const double end_s = log_.hand_back_s.value_or(kForever);
     std::size_t outside = 0, differ = 0;
     for (std::size_t i = 0; i < exported.size(); ++i) {
@@ -408,12 +444,25 @@ class Search {
     flown.unexplained = "observation or action, from the policy's begin on";
   }
 
+  /// Of the observation that the log has; empty where it has none, or all is as exported.
+  std::string first_observation_that_differs() const {
+    std::size_t row = log_.inferences.size(), number = 0;
+    compare_policy(played({}, kForever).inferences, [&](std::size_t at, std::size_t k, double d) {
+      if (d <= 1 || log_.policy_numbers[k] >= contract_.observation.size() || at > row) return;
+      if (at < row || log_.policy_numbers[k] < log_.policy_numbers[number]) row = at, number = k;
+    });
+    if (row == log_.inferences.size()) return "";
+    return "the observation's " + contract_.observation[log_.policy_numbers[number]].name +
+           io::format(", from %.3f s on", log_.inferences[row].t_s);
+  }
+
   const Contract& contract_;
   const std::vector<Mistake>& mistakes_;
   const Library library_;
   const std::size_t thinning_;
   const OnboardLog log_;
   const std::vector<double> tolerance_;  ///< as exported
+  const std::vector<double> policy_tolerance_;
   std::vector<Candidate> singles_;
 };
 
@@ -432,7 +481,22 @@ const ExportedC& FlownCheck::library(Build build) const {
 }
 
 Flown FlownCheck::check(const OnboardLog& log) const {
-  return Search(contract_, mistakes_, log, [this](Build b) -> const ExportedC& { return library(b); }).run();
+  std::vector<OnboardLog> logs;
+  for (const auto mode : {OnboardLog::Mode::task, OnboardLog::Mode::hover, OnboardLog::Mode::stay}) {
+    if (log.mode && log.mode != mode) continue;
+    logs.push_back(log);
+    logs.back().mode = mode;
+  }
+  const auto run = [&](const OnboardLog& one, bool quick) {
+    return Search(contract_, mistakes_, one, [this](Build b) -> const ExportedC& { return library(b); }).run(quick);
+  };
+  if (logs.size() > 1)
+    for (const OnboardLog& one : logs)
+      if (const Flown flown = run(one, true); flown.as_exported) return flown;
+  Flown best = run(logs.front(), false);
+  for (std::size_t i = 1; i < logs.size() && !best.as_exported && best.mistakes.empty(); ++i)
+    if (Flown flown = run(logs[i], false); !flown.mistakes.empty()) best = std::move(flown);
+  return best;
 }
 
 }  // namespace flappy::deploy

@@ -21,9 +21,17 @@ struct OnboardLog {
   struct Command {
     double t_s, left_V, right_V;
   };
+  /// An inference: numbers of observation and action, which `policy_numbers` names; raw.
+  struct Inference {
+    double t_s;
+    std::vector<double> numbers;
+  };
   std::vector<Imu> imu;
   std::vector<Pose> poses;
   std::vector<Command> commands;
+  std::vector<Inference> inferences;
+  std::vector<std::size_t> policy_numbers;  ///< indices in the observation, then in the action that follows it
+  std::vector<double> policy_steps;         ///< [policy number] step that the log can tell apart
   double imu_latency_s = 0, pose_latency_s = 0;
   double imu_Hz = 0;  ///< rate at which samples reached the processor; 0: as in the contract
 

@@ -82,6 +82,7 @@ class Loop {
       for (; next != log_.commands.end() && next->t_s <= until_s && next->t_s < end_s - slack_s_; ++next)
         out.volts.push_back(drive(next->t_s));
     }
+    out.inferences = std::move(inferences_);
     return out;
   }
 
@@ -155,21 +156,28 @@ class Loop {
       else if (now_s > *log_.begin_s + *w_.hand_back_s - slack_s_) c_.set_handed_back(state(), 1);
       else c_.set_handed_back(state(), 0);
     }
-    if (begun_ && c_.handed_back(state()) == 0) act();
+    if (begun_ && c_.handed_back(state()) == 0) act(now_s);
     float input[4];
     c_.steer(state(), input);
     const Eigen::Vector4f mixed = w_.input.cast<float>() * Eigen::Vector4f(input);
     std::copy_n(mixed.data(), 4, input_);
   }
 
-  void act() {
+  void act(double now_s) {
     const auto repeat =
         static_cast<std::uint32_t>(std::max(1L, std::lround(contract_.policy_s / contract_.control_s)) * w_.every);
     if (c_.ticks(state()) % repeat == 0) {
       float action[4];
       if (!w_.history) c_.forget(state());
       c_.observe(state(), observation_.data());
-      c_.policy(observed().data(), action);
+      std::vector<float> seen = observed();
+      c_.policy(otherwise_normalised(seen).data(), action);
+      if (!log_.policy_numbers.empty()) {
+        seen.insert(seen.end(), action, action + contract_.action.size());
+        inferences_.push_back({now_s, {}});
+        for (const std::size_t i : log_.policy_numbers)
+          inferences_.back().numbers.push_back(static_cast<double>(seen[i]));
+      }
       const Eigen::Vector4f mixed = w_.action.cast<float>() * Eigen::Vector4f(action);
       waiting_.push_back({acted_ + static_cast<std::uint32_t>(w_.late), {mixed[0], mixed[1], mixed[2], mixed[3]}});
     }
@@ -178,7 +186,7 @@ class Loop {
     ++acted_;
   }
 
-  /// The observation as the policy gets it. With a mean or scale left out, one that its normalisation turns into the same.
+  /// The observation as the firmware makes it.
   std::vector<float> observed() const {
     std::vector<float> row(observation_.size());
     for (std::size_t i = 0; i < row.size(); ++i) {
@@ -187,8 +195,14 @@ class Loop {
     }
     for (const std::size_t first : errors_)
       for (std::size_t k = 0; k < 3; ++k) row[first + k] += static_cast<float>(w_.goal_m[k]);
-    for (std::size_t i = 0; i < row.size(); ++i) {
+    for (std::size_t i = 0; i < row.size(); ++i)
       if (!w_.zero.empty() && w_.zero[i] != 0) row[i] = 0;
+    return row;
+  }
+
+  /// With mean or scale left out, an observation that the policy's normalisation turns into the same numbers.
+  std::vector<float> otherwise_normalised(std::vector<float> row) const {
+    for (std::size_t i = 0; i < row.size(); ++i) {
       float& x = row[i];
       const float mean = contract_.mean[i], scale = contract_.scale[i];
       if (!w_.mean && w_.scale) x += mean;
@@ -228,6 +242,7 @@ class Loop {
   bool begun_ = false;
   std::uint32_t acted_ = 0;
   std::deque<Waiting> waiting_;
+  std::vector<OnboardLog::Inference> inferences_;
   std::uint64_t driven_ = 0;
   float input_[4] = {0, 0, 0, 0}, volts_[2] = {0, 0};
 };

@@ -10,7 +10,8 @@
 namespace flappy::deploy {
 
 struct Replay {
-  std::vector<std::array<double, 2>> volts;  ///< left, right, for each command of the log up to `until_s`
+  std::vector<std::array<double, 2>> volts;       ///< left, right, for each command of the log up to `until_s`
+  std::vector<OnboardLog::Inference> inferences;  ///< if the log has policy_numbers
 };
 
 /// `until_s`: commands later than this are left out. Not thread-safe: changes the constants of `c` while it runs.

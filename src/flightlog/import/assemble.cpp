@@ -47,7 +47,9 @@ const Channel& channel_of(const Channels& channels, const StreamMapping& s, cons
   s.table.fail(key, "\"" + name + "\" has no samples", "a channel that has some: " + listed(names));
 }
 
-bool is_optional(const StreamMapping& s) { return s.name == "power" || s.name == "wings" || s.name == "attitude"; }
+bool is_optional(const StreamMapping& s) {
+  return s.name == "power" || s.name == "wings" || s.name == "attitude" || s.name == "policy";
+}
 
 /// Whether an optional stream has no samples in the recording.
 bool left_out(const Channels& channels, const StreamMapping& s) {
@@ -517,6 +519,9 @@ void put(FlightLog& log, Stream& s, std::int64_t start_ns) {
   } else if (s.mapping.name == "attitude") {
     log.attitude = AttitudeStream{t_s, c["qw"], c["qx"], c["qy"], c["qz"]};
     if (s.mapping.measures_rate) log.header.attitude->rate_hz = rate_hz;
+  } else if (s.mapping.name == "policy") {
+    log.policy.emplace().t_s = t_s;
+    for (const std::string& name : log.header.policy) log.policy->numbers.push_back(c[name]);
   } else {
     log.wings =
         WingsStream{t_s, c["left_stroke_rad"], c["left_rotation_rad"], c["right_stroke_rad"], c["right_rotation_rad"]};
@@ -551,6 +556,7 @@ Imported assemble(const Channels& channels, const Mapping& mapping) {
     out.report.warnings.push_back(s.name + ": " + s.channel + why + ": done without");
     if (s.name == "power") out.log.header.power.reset();
     else if (s.name == "wings") out.log.header.wings.reset();
+    else if (s.name == "policy") out.log.header.policy.clear();
     else out.log.header.attitude.reset();
   }
   out.report.clocks = clocks.reports();

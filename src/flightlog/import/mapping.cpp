@@ -47,6 +47,7 @@ const std::vector<StreamKeys> kStreams = {
      false,
      false},
     {"attitude", {"qw", "qx", "qy", "qz"}, {}, {"latency_s", "noise_rad"}, true, true},
+    {"policy", {}, {}, {"numbers"}, false, false},
 };
 const Names kAngles = {"roll_rad", "pitch_rad", "yaw_rad"};
 /// In place of the pitch: acceleration in W, without gravity.
@@ -58,6 +59,7 @@ StreamKeys narrowed(StreamKeys keys, const io::Table& table, bool declared_input
     std::erase_if(names, [&](const std::string& name) { return name.find(part) != std::string::npos; });
   };
   if (keys.name == "command" && declared_inputs) keys.columns = read_inputs(table), keys.optional_columns.clear();
+  if (keys.name == "policy") keys.columns = read_policy_numbers(table);
   if (keys.name == "imu" && !read_gyro(table, declared_inputs)) drop(keys.columns, "gyro"), drop(keys.declared, "gyro");
   if (keys.name == "power" && !read_currents(table, declared_inputs))
     drop(keys.columns, "current"), drop(keys.declared, "current");
@@ -113,8 +115,8 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
   accepted.insert(accepted.end(), keys.declared.begin(), keys.declared.end());
   if (keys.has_frame) accepted.emplace_back("frame");
   if (keys.has_world) accepted.emplace_back("world");
-  if (keys.name != "command") accepted.emplace_back("rate_hz");
-  else accepted.insert(accepted.end(), {"inputs", "flown"});
+  if (keys.name == "command") accepted.insert(accepted.end(), {"inputs", "flown"});
+  else if (keys.name != "policy") accepted.emplace_back("rate_hz");
   if (keys.name == "mocap") accepted.emplace_back("source");
   if (keys.name == "imu") accepted.emplace_back("gyro");
   if (keys.name == "power") accepted.emplace_back("currents");
@@ -143,7 +145,7 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
   s.sequence = table.string_or("sequence", "");
   if (keys.has_frame) s.frd = table.choice_or("frame", "flu", {"flu", "frd"}) == "frd";
   if (keys.has_world) s.ned = table.choice_or("world", "enu", {"enu", "ned"}) == "ned";
-  s.measures_rate = keys.name != "command" && !table.has("rate_hz");
+  s.measures_rate = keys.name != "command" && keys.name != "policy" && !table.has("rate_hz");
   read_columns(keys, s);
   return s;
 }
@@ -180,6 +182,7 @@ void read_declared(const io::Table& root, FlightHeader& h) {
                   attitude->number("noise_rad", non_negative(1))};
   if (const auto wings = root.optional_table("wings"))
     h.wings = {rate_of(*wings), wings->number("noise_rad", non_negative(1))};
+  if (const auto policy = root.optional_table("policy")) h.policy = read_policy_numbers(*policy);
 }
 
 }  // namespace

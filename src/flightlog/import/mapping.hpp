@@ -60,6 +60,8 @@
 //   noise_rad
 //   [attitude]                               # optional: attitude of a second estimator; world and frame as above
 //   latency_s, noise_rad
+//   [policy]                                 # optional: what an exported policy got and gave
+//   numbers = ["observation_x_error", ...]   # names of its columns (FlightHeader::policy)
 //
 //   [dds]                                    # for flappy-record: io/dds_config.hpp
 //
