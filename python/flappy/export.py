@@ -88,7 +88,7 @@ def export(
     clip: float = 1e30,
     everywhere: bool = False,
 ) -> dict[str, Any]:
-    """Writes flappy_policy.h and, where the task has a controller, flappy_controller.h.
+    """Writes flappy_policy.h, contract.json, README.md and, where the task has a controller that can be exported, flappy_controller.h.
 
     Args:
         module: a torch.nn.Sequential from observations (n, observations) to actions (n, actions) in [-1, 1]. What it makes beyond that

@@ -4,9 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bind.hpp"
-#include "deploy/header/controller_header.hpp"
-#include "deploy/header/policy_header.hpp"
-#include "deploy/header/policy_vectors.hpp"
+#include "deploy/header/exported_files.hpp"
 #include "deploy/proof/proof.hpp"
 #include "io/files.hpp"
 #include "io/program.hpp"
@@ -55,10 +53,7 @@ class PyExport {
     flown_ = deploy::roll_out(fly, 0, kProofFlights);
     policy::PolicyVectors tests = deploy::some_of(flown_, kTestVectors);
     deploy::append(tests, deploy::corners(network_, task.observation()));
-    tests.action = deploy::evaluate(network_, tests.observation);
-    files_["flappy_policy.h"] = deploy::policy_header(fly, info, network_, tests);
-    if (fly.fleet.controller.kind != flight::kNoController)
-      files_["flappy_controller.h"] = deploy::controller_header(fly, info, deploy::record_controller(fly));
+    files_ = deploy::exported_files(fly, info, network_, std::move(tests));
   }
 
   /// Observations of flights, and the exported network's actions for them, in [-1, 1].

@@ -4,10 +4,9 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "deploy/header/contract.hpp"
 #include "deploy/header/controller_header.hpp"
+#include "deploy/header/exported_files.hpp"
 #include "deploy/header/policy_header.hpp"
-#include "deploy/header/policy_vectors.hpp"
 #include "deploy/proof/proof.hpp"
 #include "io/files.hpp"
 #include "io/program.hpp"
@@ -38,16 +37,12 @@ struct Export {
   PolicyVectors flown;
 };
 
-/// Adds a policy header with the vectors of its self-test, and the vectors of its proof.
+/// Vectors of flights with the actions that a network has to compute.
 template <class Network>
-void add_header(Export& e, const std::string& name, const learn::FinishedRun& run, const Network& network,
-                const PolicyVectors& tests) {
-  PolicyVectors own = tests;
+PolicyVectors for_proof(const Export& e, const Network& network) {
+  PolicyVectors own = deploy::some_of(e.flown, kProofVectors);
   own.action = deploy::evaluate(network, own.observation);
-  e.files[name] = deploy::policy_header(run.fly, run.info, network, own);
-  own = deploy::some_of(e.flown, kProofVectors);
-  own.action = deploy::evaluate(network, own.observation);
-  e.proofs[name] = own;
+  return own;
 }
 
 /// The largest and the root-mean-square difference of each output, as shares of its range.
@@ -109,9 +104,7 @@ void run(const Request& request, const io::Program& program) {
   Export e;
   const std::string why_not = deploy::no_controller(run.fly);
   const bool with_controller = why_not.empty();
-  if (with_controller)
-    e.files["flappy_controller.h"] = deploy::controller_header(run.fly, run.info, deploy::record_controller(run.fly));
-  else std::printf("flappy_controller.h is not written: %s\n", why_not.c_str());
+  if (!with_controller) std::printf("flappy_controller.h is not written: %s\n", why_not.c_str());
   io::make_folder(request.out);
   e.flown = deploy::roll_out(run.fly, 0, kProofFlights);
   if (!std::ranges::all_of(e.flown.action, [](float x) { return std::isfinite(x); }))
@@ -121,21 +114,19 @@ void run(const Request& request, const io::Program& program) {
   deploy::append(tests, deploy::corners(network, signals));
   Json json = {{"run", request.run}, {"out", request.out}, {"config_sha256", run.info.config_sha256}};
 
-  add_header(e, "flappy_policy.h", run, network, tests);
+  e.files = deploy::exported_files(run.fly, run.info, network, tests);
+  e.proofs["flappy_policy.h"] = for_proof(e, network);
   if (request.int8) {
     const PolicyVectors fit = deploy::some_of(deploy::roll_out(run.fly, kProofFlights, kFitFlights), kFitVectors);
     const deploy::QuantisedNetwork whole = deploy::quantise(network, fit.observation);
-    add_header(e, "flappy_policy_int8.h", run, whole, tests);
+    PolicyVectors own = tests;
+    own.action = evaluate(whole, own.observation);
+    e.files["flappy_policy_int8.h"] = deploy::policy_header(run.fly, run.info, whole, own);
+    e.proofs["flappy_policy_int8.h"] = for_proof(e, whole);
     const OutputError error = output_error(evaluate(whole, e.flown.observation), e.flown.action, network.half);
     print("8 bits differ by at most", error, run.fly.fleet.task.action());
     json["int8_error"] = json_of(error);
   }
-  deploy::ExportedCrc crc{deploy::crc_of_header(e.files["flappy_policy.h"]), {}};
-  if (with_controller) crc.controller = deploy::crc_of_header(e.files["flappy_controller.h"]);
-  PolicyVectors own = tests;
-  own.action = deploy::evaluate(network, own.observation);
-  e.files["contract.json"] = deploy::contract_json(run.fly, run.info, network, own, crc);
-  e.files["README.md"] = deploy::wiring_text(run.fly, run.info, with_controller);
   const io::TemporaryFolder work;
   if (policy::reads_torch_script()) {
     e.files["policy.pt"] = policy::torch_script(network, deploy::contract_text(run.fly, run.info));

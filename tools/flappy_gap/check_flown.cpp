@@ -5,10 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "deploy/flown/flown.hpp"
-#include "deploy/header/contract.hpp"
 #include "deploy/header/controller_header.hpp"
-#include "deploy/header/policy_header.hpp"
-#include "deploy/header/policy_vectors.hpp"
+#include "deploy/header/exported_files.hpp"
 #include "flightlog/check/digits.hpp"
 #include "flightlog/flight_log.hpp"
 #include "io/files.hpp"
@@ -32,15 +30,9 @@ void export_run(const std::string& folder, const std::filesystem::path& to) {
     throw io::InputError(folder + ": has no controller to export: " + why +
                          "; accepted: a run whose controller flappy-export writes");
   const policy::PolicyNetwork network = deploy::network_of(run.fly);
-  policy::PolicyVectors tests = deploy::corners(network, run.fly.fleet.task.observation());
-  tests.action = deploy::evaluate(network, tests.observation);
-  const std::string policy = deploy::policy_header(run.fly, run.info, network, tests),
-                    controller = deploy::controller_header(run.fly, run.info, deploy::record_controller(run.fly));
-  io::write_atomically(to / "flappy_policy.h", policy);
-  io::write_atomically(to / "flappy_controller.h", controller);
-  io::write_atomically(to / "contract.json",
-                       deploy::contract_json(run.fly, run.info, network, tests,
-                                             {deploy::crc_of_header(policy), deploy::crc_of_header(controller)}));
+  for (const auto& [name, text] :
+       deploy::exported_files(run.fly, run.info, network, deploy::corners(network, run.fly.fleet.task.observation())))
+    io::write_atomically(to / name, text);
 }
 
 /// The flight as it passed the robot's processor.

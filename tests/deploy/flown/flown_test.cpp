@@ -7,10 +7,7 @@
 #include <random>
 
 #include "deploy/flown/replay.hpp"
-#include "deploy/header/contract.hpp"
-#include "deploy/header/controller_header.hpp"
-#include "deploy/header/policy_header.hpp"
-#include "deploy/header/policy_vectors.hpp"
+#include "deploy/header/exported_files.hpp"
 #include "full.hpp"
 #include "rollout/fly_fixture.hpp"
 #include "rollout/rollout.hpp"
@@ -44,14 +41,9 @@ void write_export(const std::filesystem::path& folder, std::uint32_t seed) {
   config.actor = random_actor(config.fleet.task, seed);
   const policy::RunInfo run{"0123", "abcd", false, "escape"};
   const policy::PolicyNetwork network = network_of(config);
-  policy::PolicyVectors tests = corners(network, config.fleet.task.observation());
-  tests.action = evaluate(network, tests.observation);
-  const std::string actor = policy_header(config, run, network, tests),
-                    controller = controller_header(config, run, record_controller(config));
-  io::write_atomically(folder / "flappy_policy.h", actor);
-  io::write_atomically(folder / "flappy_controller.h", controller);
-  io::write_atomically(folder / "contract.json",
-                       contract_json(config, run, network, tests, {crc_of_header(actor), crc_of_header(controller)}));
+  for (const auto& [name, text] :
+       exported_files(config, run, network, corners(network, config.fleet.task.observation())))
+    io::write_atomically(folder / name, text);
 }
 
 /// Samples of a lively flight; commands at all times of the driver, their voltages still 0.
