@@ -27,6 +27,7 @@ constexpr std::size_t kInARow = 3;
 constexpr double kWindow_s = 0.2;
 /// Tolerance over the effect of digits that the log has lost, which is estimated from two replays.
 constexpr double kMargin = 4;
+constexpr double kStamp_s = 1e-6;
 constexpr double kBlock_s = 0.02;  ///< for which tolerances are the same
 
 /// A mistake with its parameters, or several.
@@ -168,10 +169,14 @@ class Search {
         list[i] = std::max(std::abs(v[i][0] - as_logged[i][0]), std::abs(v[i][1] - as_logged[i][1]));
       return list;
     };
-    std::vector<double> moved(as_logged.size(), 0);
+    // firmware may round times to microseconds in another way
+    OnboardLog sooner = log_;
+    sooner.imu_latency_s += kStamp_s;
+    sooner.pose_latency_s += kStamp_s;
+    std::vector<double> moved = differences(sooner);
     if (log_.rate_step_rad_s + log_.force_step_m_s2 + log_.position_step_m + log_.attitude_step > 0) {
-      moved = differences(dithered(log_));
-      for (double& m : moved) m *= kMargin;
+      const std::vector<double> digits = differences(dithered(log_));
+      for (std::size_t i = 0; i < moved.size(); ++i) moved[i] += kMargin * digits[i];
     }
     if (thinning_ > 1) {
       // what further samples lose tells what those lost, whose noise is of the same size throughout
