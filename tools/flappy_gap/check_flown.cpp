@@ -129,12 +129,12 @@ Json check_flown(const std::string& exported, const std::vector<std::string>& fo
     constexpr const char* kModes[] = {"hover", "stay", "task"};
     const char* mode = kModes[static_cast<std::size_t>(f.mode)];
     const auto& header = log.header.flown;
-    if (!header)
-      std::printf(
-          "%s: flight.toml has no [flown]: the first command is taken for the start, and the policy for never begun\n",
-          folder.c_str());
-    if (!header || header->mode.empty())
-      std::printf("%s: flown.mode is missing: taken for \"%s\"\n", folder.c_str(), mode);
+    const auto taken = [&](const std::string& what, const std::string& as) {
+      std::printf("%s: %s is missing: taken for %s\n", folder.c_str(), what.c_str(), as.c_str());
+    };
+    if (!header) taken("[flown]", "one that starts with the first command");
+    if (!header || header->mode.empty()) taken("flown.mode", "\"" + std::string(mode) + "\"");
+    if (f.begin_s && (!header || !header->begin_s)) taken("flown.begin_s", io::format("%.3f", *f.begin_s));
     Json mistakes = Json::array();
     for (const deploy::FlownMistake& m : f.mistakes)
       mistakes.push_back({{"kind", name_of(m.stage)}, {"mistake", m.id}, {"words", m.words}});

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "deploy/flown/replay.hpp"
+#include "deploy/header/contract.hpp"
 #include "io/files.hpp"
 #include "io/statistics.hpp"
 #include "io/text.hpp"
@@ -130,10 +131,12 @@ class Search {
     flown.share = share(exported, tolerance_);
     flown.tolerance_V = io::median(tolerance_);
     flown.mode = *log_.mode;
+    flown.begin_s = log_.begin_s;
     const std::size_t first = first_difference(exported);
     flown.as_exported = (flown.share >= kExplained && first == log_.commands.size()) || flown.share >= kNearlyAll;
-    if (flown.as_exported || quick) return flown;
+    if (flown.as_exported) return flown;
     if (first < log_.commands.size()) flown.from_s = log_.commands[first].t_s;
+    if (quick) return flown;
     Candidate best = one_mistake(flown.from_s);
     flown.explained = explained(best, exported);
     if (flown.explained < kExplained) {
@@ -430,7 +433,8 @@ class Search {
   /// What differs where no mistake explains it.
   void explain_nothing(const Volts& exported, Flown& flown) const {
     if (!log_.begin_s || flown.from_s < *log_.begin_s - 1e-6) {
-      flown.unexplained = "the estimate or the controller, before the policy acts";
+      flown.unexplained = log_.begin_s ? "the estimate or the controller, before the policy acts"
+                                       : "the estimate, the controller, or a policy that began at an unknown time";
       return;
     }
     flown.unexplained = first_observation_that_differs();
@@ -477,7 +481,14 @@ FlownCheck::FlownCheck(const std::filesystem::path& folder)
     : folder_(folder),
       contract_(read_contract(folder)),
       has_int8_(std::filesystem::exists(folder / "flappy_policy_int8.h")),
-      mistakes_(mistakes_of(contract_, library(Build::exact), has_int8_)) {}
+      mistakes_(mistakes_of(contract_, library(Build::exact), has_int8_)) {
+  for (const auto& [name, crc] :
+       {std::pair("flappy_policy.h", contract_.policy_crc32), {"flappy_controller.h", contract_.controller_crc32}})
+    if (const std::uint32_t is = crc_of_header(io::read_text(folder / name)); is != crc)
+      throw io::InputError((folder / "contract.json").string() + ": is of a " + name + " with CRC " +
+                           std::to_string(crc) + ", and that beside it has " + std::to_string(is) +
+                           "; accepted: all files of one flappy-export");
+}
 
 const ExportedC& FlownCheck::library(Build build) const {
   auto& found = libraries_[build];
@@ -495,9 +506,25 @@ Flown FlownCheck::check(const OnboardLog& log) const {
   const auto run = [&](const OnboardLog& one, bool quick) {
     return Search(contract_, mistakes_, one, [this](Build b) -> const ExportedC& { return library(b); }).run(quick);
   };
-  if (logs.size() > 1)
-    for (const OnboardLog& one : logs)
-      if (const Flown flown = run(one, true); flown.as_exported) return flown;
+  for (OnboardLog& one : logs) {
+    if (log.mode && log.begin_s) break;
+    Flown flown = run(one, true);
+    if (flown.as_exported) return flown;
+    if (log.begin_s) continue;
+    // a policy whose begin is not known began shortly before the first command that differs, if commands after it agree
+    constexpr int kTried = 20;
+    const double first_s = flown.from_s;
+    const double ticks = std::floor((first_s - one.start_s) / contract_.control_s + 1e-6);
+    for (int k = 0; k < kTried; ++k) {
+      OnboardLog begun = one;
+      begun.begin_s = one.start_s + (ticks - k) * contract_.control_s;
+      Flown other = run(begun, true);
+      if (other.as_exported) return other;
+      if (other.from_s < flown.from_s + kWindow_s) continue;
+      flown = std::move(other);
+      one = std::move(begun);
+    }
+  }
   Flown best = run(logs.front(), false);
   for (std::size_t i = 1; i < logs.size() && !best.as_exported && best.mistakes.empty(); ++i)
     if (Flown flown = run(logs[i], false); !flown.mistakes.empty()) best = std::move(flown);

@@ -18,10 +18,11 @@ struct FlownMistake {
 
 struct Flown {
   bool as_exported = false;
-  double share = 0;                    ///< of the commands, within tolerance as exported
-  double tolerance_V = 0;              ///< median over commands
-  double from_s = 0;                   ///< first command that differs, on the log's clock
-  OnboardLog::Mode mode{};             ///< as logged, or else as it explains the log best
+  double share = 0;         ///< of the commands, within tolerance as exported
+  double tolerance_V = 0;   ///< median over commands
+  double from_s = 0;        ///< first command that differs, on the log's clock
+  OnboardLog::Mode mode{};  ///< this and begin_s: as logged, or else as they explain the log best
+  std::optional<double> begin_s;
   std::vector<FlownMistake> mistakes;  ///< that explain it together; empty: none does
   double explained = 0;                ///< share of the commands within tolerance with these mistakes
   std::string unexplained;             ///< where nothing explains it: what differs
