@@ -105,7 +105,6 @@ void run(const Request& request, const io::Program& program) {
   const std::string why_not = deploy::no_controller(run.fly);
   const bool with_controller = why_not.empty();
   if (!with_controller) std::printf("flappy_controller.h is not written: %s\n", why_not.c_str());
-  io::make_folder(request.out);
   e.flown = deploy::roll_out(run.fly, 0, kProofFlights);
   if (!std::ranges::all_of(e.flown.action, [](float x) { return std::isfinite(x); }))
     throw io::InputError((fs::path(request.run) / "best.json").string() +
@@ -116,6 +115,7 @@ void run(const Request& request, const io::Program& program) {
 
   e.files = deploy::exported_files(run.fly, run.info, network, tests);
   e.proofs["flappy_policy.h"] = for_proof(e, network);
+  io::make_folder(request.out);
   if (request.int8) {
     const PolicyVectors fit = deploy::some_of(deploy::roll_out(run.fly, kProofFlights, kFitFlights), kFitVectors);
     const deploy::QuantisedNetwork whole = deploy::quantise(network, fit.observation);

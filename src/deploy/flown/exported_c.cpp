@@ -18,6 +18,8 @@ namespace fs = std::filesystem;
 /// Compiled after both headers. Its names stand for static inline functions, which no library shows.
 constexpr const char* kWrapper = R"(
 unsigned flown_state_bytes(void) { return (unsigned)sizeof(flappy_controller); }
+uint32_t flown_policy_crc32(void) { return FLAPPY_POLICY_CRC32; }
+uint32_t flown_controller_crc32(void) { return FLAPPY_CONTROLLER_CRC32; }
 float *flown_constants(void) { return (float *)&flappy_controller_k; }
 static flappy_quaternion flown_quaternion(const float *x) {
   flappy_quaternion q;
@@ -165,6 +167,8 @@ ExportedC::ExportedC(const fs::path& folder, Build build) {
     to = reinterpret_cast<std::remove_reference_t<decltype(to)>>(dlsym(library_, name));
   };
   take(start, "flown_start");
+  take(policy_crc32, "flown_policy_crc32");
+  take(controller_crc32, "flown_controller_crc32");
   take(hover, "flown_hover");
   take(stay, "flown_stay");
   take(begin, "flown_begin");

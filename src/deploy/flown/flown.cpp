@@ -7,7 +7,6 @@
 #include <numeric>
 
 #include "deploy/flown/replay.hpp"
-#include "deploy/header/contract.hpp"
 #include "io/files.hpp"
 #include "io/statistics.hpp"
 #include "io/text.hpp"
@@ -482,12 +481,14 @@ FlownCheck::FlownCheck(const std::filesystem::path& folder)
       contract_(read_contract(folder)),
       has_int8_(std::filesystem::exists(folder / "flappy_policy_int8.h")),
       mistakes_(mistakes_of(contract_, library(Build::exact), has_int8_)) {
-  for (const auto& [name, crc] :
-       {std::pair("flappy_policy.h", contract_.policy_crc32), {"flappy_controller.h", contract_.controller_crc32}})
-    if (const std::uint32_t is = crc_of_header(io::read_text(folder / name)); is != crc)
-      throw io::InputError((folder / "contract.json").string() + ": is of a " + name + " with CRC " +
+  const auto require = [&](const char* header, std::uint32_t crc, std::uint32_t is) {
+    if (is != crc)
+      throw io::InputError((folder / "contract.json").string() + ": is of a " + header + " with CRC " +
                            std::to_string(crc) + ", and that beside it has " + std::to_string(is) +
                            "; accepted: all files of one flappy-export");
+  };
+  require("flappy_policy.h", contract_.policy_crc32, library(Build::exact).policy_crc32());
+  require("flappy_controller.h", contract_.controller_crc32, library(Build::exact).controller_crc32());
 }
 
 const ExportedC& FlownCheck::library(Build build) const {
