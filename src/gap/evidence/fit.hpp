@@ -96,7 +96,7 @@ class Fitter {
     return law_sd(hypothesis, fit, fit.law_factor);
   }
   BasisCoefficients law_sd(const Hypothesis& hypothesis, const Fit& fit, double law_factor) const;
-  /// The same of one effect that changes the rows by `change`.
+  /// The same for one effect. `change`: [group][basis] what it adds to the prediction.
   BasisCoefficients law_sd_of(const std::string& effect, const BasisCoefficients& change, double law_factor) const;
   bool acts_by_place(const Hypothesis& hypothesis, const Fit& fit) const;
 

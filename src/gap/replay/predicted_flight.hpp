@@ -119,7 +119,7 @@ class PredictedFlight {
   virtual std::vector<std::pair<std::string, std::string>> products() const = 0;
   virtual std::vector<RegimeQuantity> regimes() const = 0;
   virtual std::vector<RegimeQuantity> inputs() const = 0;
-  /// Of a diagnosis whose first flight this is.
+  /// Rules of the diagnosis for this kind of vehicle. Those of a diagnosis' first flight hold for all of its flights.
   virtual const DiagnosisPolicy& policy() const = 0;
   /// Null for beat-averaged vehicles.
   virtual const Recording* recording() const { return nullptr; }
