@@ -80,7 +80,7 @@ void check_each_once(const std::vector<std::string>& folders) {
 FlightLog read_flight_log(const fs::path& folder) {
   std::error_code error;
   LogFiles files;
-  const std::vector<std::string> optional = {kImu, kPower, kWings, kAttitude};
+  const std::vector<std::string> optional = {kImu, kPower, kWings, kAttitude, kPolicy};
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
     if (!name.ends_with(".csv") || name == kTruth || name == kJoints) continue;
@@ -100,6 +100,7 @@ FlightLog read_flight_log(const fs::path& folder) {
   if (log.header.power && !log.power) warn("power", kPower);
   if (log.header.wings && !log.wings) warn("wings", kWings);
   if (log.header.attitude && !log.attitude) warn("attitude", kAttitude);
+  if (!log.header.policy.empty() && !log.policy) warn("policy", kPolicy);
   return log;
 }
 

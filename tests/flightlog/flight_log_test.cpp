@@ -425,6 +425,8 @@ TEST_F(FlightLogFolder, IsWrittenAndReplacedAsAWhole) {
   flightlog::FlightLog other = sample_log();
   other.header.power.reset();
   other.power.reset();
+  other.header.policy = {"observation_x_error", "action_added_bias"};
+  other.policy = {{0.1, 0.2}, {{1, 2}, {0.25, 0}}};
   write_flight_log(folder_, other);
   EXPECT_EQ(flightlog::read_flight_log(folder_), other);
   EXPECT_FALSE(fs::exists(folder_ / "power.csv"));
@@ -491,7 +493,7 @@ TEST_F(FlightLogFolder, RefusesWhatIsNotThere) {
   fs::rename(folder_ / "power.csv", folder_ / "Power.csv");
   EXPECT_EQ(read_message(folder_), (folder_ / "Power.csv").string() +
                                        ": is no stream of a flight log; accepted: imu.csv, power.csv, wings.csv, "
-                                       "attitude.csv; did you mean \"power.csv\"?");
+                                       "attitude.csv, policy.csv; did you mean \"power.csv\"?");
   fs::remove(folder_ / "Power.csv");
   testing::internal::CaptureStderr();
   const flightlog::FlightLog without = flightlog::read_flight_log(folder_);

@@ -1,7 +1,9 @@
 #include "check_flown.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "deploy/flown/flown.hpp"
@@ -35,37 +37,56 @@ void export_run(const std::string& folder, const std::filesystem::path& to) {
     io::write_atomically(to / name, text);
 }
 
-/// The flight as it passed the robot's processor.
+/// Refuses times of [flown] that are none of this flight.
+void check_times(const std::string& folder, const flightlog::FlownHeader& flown, const flightlog::CommandStream& c) {
+  constexpr double kBefore_s = 600;
+  const double first_s = c.t_s.front(), last_s = c.t_s.back();
+  const auto within = [&](const char* key, double t_s, double low, double high) {
+    if (!(t_s >= low && t_s <= high))
+      refuse(folder, io::format("flown.%s: %g s is no time of this flight", key, t_s),
+             io::format("%g to %g", low, high));
+  };
+  within("start_s", flown.start_s, first_s - kBefore_s, last_s);
+  if (flown.begin_s) within("begin_s", *flown.begin_s, flown.start_s, last_s + kBefore_s);
+  if (flown.hand_back_s)
+    within("hand_back_s", *flown.hand_back_s, flown.begin_s.value_or(flown.start_s), last_s + kBefore_s);
+  if (!flown.start_pose) return;
+  const auto& p = *flown.start_pose;
+  const double length = std::sqrt(p[3] * p[3] + p[4] * p[4] + p[5] * p[5] + p[6] * p[6]);
+  if (std::abs(length - 1) > 1e-3)
+    refuse(folder, io::format("flown.start_pose: its quaternion has length %g", length), "1 to within 0.001");
+}
+
+/// The flight as it passed the robot's processor, from its start on: at t = 0.
 deploy::OnboardLog onboard(const std::string& folder, const flightlog::FlightLog& log,
                            const deploy::Contract& contract) {
   const flightlog::FlightHeader& h = log.header;
   if (!h.inputs.empty())
     refuse(folder, "has declared inputs, which no exported controller sets", "a log with voltages");
+  const double zero_s = h.flown ? h.flown->start_s : log.command.t_s.front();
+  if (h.flown) check_times(folder, *h.flown, log.command);
   deploy::OnboardLog to;
   to.imu_latency_s = h.imu.latency_s;
   to.pose_latency_s = h.mocap.latency_s;
   to.imu_Hz = h.imu.rate_hz;
   for (std::size_t i = 0; i < log.imu.t_s.size(); ++i)
-    to.imu.push_back({log.imu.t_s[i],
+    to.imu.push_back({log.imu.t_s[i] - zero_s,
                       {log.imu.gyro_x_rad_s[i], log.imu.gyro_y_rad_s[i], log.imu.gyro_z_rad_s[i]},
                       {log.imu.accel_x_m_s2[i], log.imu.accel_y_m_s2[i], log.imu.accel_z_m_s2[i]}});
   const flightlog::MocapStream& m = log.mocap;
   for (std::size_t i = 0; i < m.t_s.size(); ++i)
-    to.poses.push_back({m.t_s[i], {m.x_m[i], m.y_m[i], m.z_m[i]}, {m.qw[i], m.qx[i], m.qy[i], m.qz[i]}});
+    to.poses.push_back({m.t_s[i] - zero_s, {m.x_m[i], m.y_m[i], m.z_m[i]}, {m.qw[i], m.qx[i], m.qy[i], m.qz[i]}});
   const flightlog::CommandStream& c = log.command;
   for (std::size_t i = 0; i < c.t_s.size(); ++i)
-    to.commands.push_back({c.t_s[i], c.left_voltage_V[i], c.right_voltage_V[i]});
+    to.commands.push_back({c.t_s[i] - zero_s, c.left_voltage_V[i], c.right_voltage_V[i]});
   if (h.flown) {
-    to.start_s = h.flown->start_s;
     to.start_pose = h.flown->start_pose;
     using Mode = deploy::OnboardLog::Mode;
     if (h.flown->mode == "hover") to.mode = Mode::hover;
     if (h.flown->mode == "stay") to.mode = Mode::stay;
     if (h.flown->mode == "task") to.mode = Mode::task;
-    to.begin_s = h.flown->begin_s;
-    to.hand_back_s = h.flown->hand_back_s;
-  } else {
-    to.start_s = c.t_s.front();
+    if (h.flown->begin_s) to.begin_s = *h.flown->begin_s - zero_s;
+    if (h.flown->hand_back_s) to.hand_back_s = *h.flown->hand_back_s - zero_s;
   }
   using flightlog::last_digit;
   if (log.policy) {
@@ -82,11 +103,13 @@ deploy::OnboardLog onboard(const std::string& folder, const flightlog::FlightLog
     }
     for (std::size_t i = 0; i < log.policy->t_s.size(); ++i) {
       deploy::OnboardLog::Inference& row = to.inferences.emplace_back();
-      row.t_s = log.policy->t_s[i];
+      row.t_s = log.policy->t_s[i] - zero_s;
       for (const flightlog::Column& numbers : log.policy->numbers) row.numbers.push_back(numbers[i]);
     }
   }
-  to.time_step_s = std::max(last_digit(log.imu.t_s), last_digit(m.t_s));
+  // a double of a clock that counts from 1970 has a quarter of a microsecond at best
+  to.time_noise_s = 2 * std::numeric_limits<double>::epsilon() * std::abs(zero_s);
+  to.time_step_s = std::max({last_digit(log.imu.t_s), last_digit(m.t_s), 4 * to.time_noise_s});
   to.rate_step_rad_s = last_digit(log.imu.gyro_x_rad_s);
   to.force_step_m_s2 = last_digit(log.imu.accel_z_m_s2);
   to.position_step_m = last_digit(m.x_m);
@@ -119,12 +142,19 @@ Json check_flown(const std::string& exported, const std::vector<std::string>& fo
   bool all = true;
   for (const std::string& folder : folders) {
     const flightlog::FlightLog log = flightlog::read_flight_log(folder);
-    if (const auto& flown = log.header.flown; flown && flown->policy_crc32) {
-      if (*flown->policy_crc32 != check.contract().policy_crc32)
-        std::printf("%s: the log says that another policy flew: %u, and %s has %u\n", folder.c_str(),
-                    *flown->policy_crc32, exported.c_str(), check.contract().policy_crc32);
+    if (const auto& flown = log.header.flown) {
+      const auto compare = [&](const char* what, std::optional<std::uint32_t> flew, std::uint32_t is) {
+        if (flew && *flew != is)
+          std::printf("%s: the log says that another %s flew: %u, and %s has %u\n", folder.c_str(), what, *flew,
+                      exported.c_str(), is);
+      };
+      compare("policy", flown->policy_crc32, check.contract().policy_crc32);
+      compare("controller", flown->controller_crc32, check.contract().controller_crc32);
     }
-    const deploy::Flown f = check.check(onboard(folder, log, check.contract()));
+    deploy::Flown f = check.check(onboard(folder, log, check.contract()));
+    const double zero_s = log.header.flown ? log.header.flown->start_s : log.command.t_s.front();
+    f.from_s += zero_s;
+    if (f.begin_s) *f.begin_s += zero_s;
     std::printf("%s: %s\n", folder.c_str(), sentence(f).c_str());
     constexpr const char* kModes[] = {"hover", "stay", "task"};
     const char* mode = kModes[static_cast<std::size_t>(f.mode)];
@@ -144,6 +174,7 @@ Json check_flown(const std::string& exported, const std::vector<std::string>& fo
                        {"tolerance_V", f.tolerance_V},
                        {"from_s", f.from_s},
                        {"mode", mode},
+                       {"begin_s", f.begin_s ? Json(*f.begin_s) : Json()},
                        {"mistakes", mistakes},
                        {"explained", f.explained},
                        {"unexplained", f.unexplained}});

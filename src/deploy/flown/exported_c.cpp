@@ -2,6 +2,7 @@
 
 #include <dlfcn.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <system_error>
@@ -18,6 +19,9 @@ namespace fs = std::filesystem;
 /// Compiled after both headers. Its names stand for static inline functions, which no library shows.
 constexpr const char* kWrapper = R"(
 unsigned flown_state_bytes(void) { return (unsigned)sizeof(flappy_controller); }
+int flown_selftests(void) {
+  return flappy_policy_selftest() != 0 ? 1 : flappy_controller_selftest() != 0 ? 2 : 0;
+}
 uint32_t flown_policy_crc32(void) { return FLAPPY_POLICY_CRC32; }
 uint32_t flown_controller_crc32(void) { return FLAPPY_CONTROLLER_CRC32; }
 float *flown_constants(void) { return (float *)&flappy_controller_k; }
@@ -91,7 +95,7 @@ std::vector<std::pair<std::string, std::size_t>> names_of_constants(const std::s
 }
 
 std::string read_header(const fs::path& file) {
-  if (!fs::exists(file)) refuse(file, "is not there", "a folder that flappy-export wrote");
+  if (!fs::exists(file)) refuse(file, "is not there", "a folder that flappy-export wrote, without --name");
   return io::read_text(file);
 }
 
@@ -110,7 +114,8 @@ std::string source_of(const fs::path& folder, Build build, const std::string& co
 
 Contract read_contract(const fs::path& folder) {
   const fs::path file = folder / "contract.json";
-  if (!fs::exists(file)) refuse(file, "is not there", "a folder that flappy-export wrote");
+  if (!fs::exists(file))
+    refuse(file, "is not there", "a folder that flappy-export wrote, or the folder of a finished run");
   try {
     const auto json = nlohmann::json::parse(io::read_text(file));
     if (json.at("schema") != 1) refuse(file, "schema " + json.at("schema").dump(), "1");
@@ -123,6 +128,7 @@ Contract read_contract(const fs::path& folder) {
     c.control_s = 1e-6 * period.at("control").get<double>();
     c.policy_s = 1e-6 * period.at("policy").get<double>();
     c.driver_s = 1e-6 * period.at("driver").get<double>();
+    if (std::min({c.control_s, c.policy_s, c.driver_s}) <= 0) refuse(file, "has a period of 0", "periods above 0");
     const auto& sensors = json.at("sensors");
     c.imu_Hz = sensors.at("imu_Hz");
     c.imu_latency_s = sensors.at("imu_latency_s");
@@ -140,6 +146,7 @@ Contract read_contract(const fs::path& folder) {
     c.scale = json.at("normalisation").at("scale").get<std::vector<float>>();
     if (c.mean.size() != c.observation.size() || c.scale.size() != c.observation.size() || c.action.size() != 4)
       refuse(file, "its lists differ in length", "a file that flappy-export wrote");
+    if (std::ranges::count(c.scale, 0.0F) > 0) refuse(file, "has a scale of 0", "a file that flappy-export wrote");
     return c;
   } catch (const nlohmann::json::exception& e) {
     refuse(file, std::string("is damaged: ") + e.what(), "a file that flappy-export wrote");
@@ -184,6 +191,9 @@ ExportedC::ExportedC(const fs::path& folder, Build build) {
   take(act, "flown_act");
   take(steer, "flown_steer");
   take(drive, "flown_drive");
+  if (const int failed = reinterpret_cast<int (*)()>(dlsym(library_, "flown_selftests"))(); failed != 0)
+    refuse(folder / (failed == 1 ? "flappy_policy.h" : "flappy_controller.h"), "fails its self-test",
+           "a header as flappy-export wrote it");
   float* next = reinterpret_cast<float* (*)()>(dlsym(library_, "flown_constants"))();
   for (const auto& [name, count] : names_of_constants(controller))
     for (std::size_t i = 0; i < count; ++i) constants_[name].push_back(next++);

@@ -17,9 +17,9 @@ namespace {
 using Parameters = std::vector<double>;
 using Volts = std::vector<std::array<double, 2>>;
 
-/// Share of commands within tolerance from which the log is explained: a few may fall on the edge of a period.
+/// kExplained: least share of commands within tolerance if no three in a row differ. kNearlyAll: least share otherwise.
 constexpr double kExplained = 0.98, kNearlyAll = 0.9995;
-/// Mean square of what a mistake leaves, over that of none, from which it counts on a log that lost samples.
+/// On a log that lost samples, a mistake counts only if it leaves at most this share of the mean square.
 constexpr double kMuch = 0.6;
 /// So many commands in a row have to differ.
 constexpr std::size_t kInARow = 3;
@@ -27,7 +27,7 @@ constexpr std::size_t kInARow = 3;
 constexpr double kWindow_s = 0.2;
 /// Tolerance over the effect of digits that the log has lost, which is estimated from two replays.
 constexpr double kMargin = 4;
-constexpr double kStamp_s = 1e-6;
+constexpr double kStamp_s = 1e-6;  ///< by which firmware may round a stamp
 constexpr double kBlock_s = 0.02;  ///< for which tolerances are the same
 
 /// A mistake with its parameters, or several.
@@ -41,7 +41,7 @@ struct Candidate {
   }
 };
 
-/// Numbers from 0 to 1, always the same.
+/// A fixed sequence of numbers from -0.5 to 0.5.
 class Dither {
  public:
   double next() {
@@ -56,19 +56,22 @@ class Dither {
 /// The log with values moved at random within what its digits leave open.
 OnboardLog dithered(OnboardLog log) {
   Dither dither;
-  for (auto& s : log.imu)
+  for (auto& s : log.imu) {
+    s.arrived_s += log.time_noise_s * dither.next();
     for (std::size_t k = 0; k < 3; ++k) {
       s.rate_rad_s[k] += log.rate_step_rad_s * dither.next();
       s.force_m_s2[k] += log.force_step_m_s2 * dither.next();
     }
+  }
   for (auto& s : log.poses) {
+    s.arrived_s += log.time_noise_s * dither.next();
     for (double& x : s.position_m) x += log.position_step_m * dither.next();
     for (double& x : s.attitude) x += log.attitude_step * dither.next();
   }
   return log;
 }
 
-/// One of so many of the IMU's samples that the processor had is in the log.
+/// The log has every n-th IMU sample; returns n.
 std::size_t thinning(const OnboardLog& log, const Contract& contract) {
   const double had_Hz = log.imu_Hz > 0 ? log.imu_Hz : contract.imu_Hz;
   if (log.imu.size() < 2) return 1;
@@ -103,7 +106,7 @@ OnboardLog filled(OnboardLog log, std::size_t every) {
   return log;
 }
 
-/// The log without every second of the samples that were not filled in, these interpolated, too.
+/// Drops every second logged IMU sample and interpolates it.
 OnboardLog thinned(OnboardLog log, std::size_t every) {
   std::vector<OnboardLog::Imu> half;
   for (std::size_t i = every; i < log.imu.size(); i += 2 * every) half.push_back(log.imu[i]);
@@ -131,10 +134,12 @@ class Search {
     flown.tolerance_V = io::median(tolerance_);
     flown.mode = *log_.mode;
     flown.begin_s = log_.begin_s;
-    const std::size_t first = first_difference(exported);
+    std::size_t first = first_difference(exported);
     flown.as_exported = (flown.share >= kExplained && first == log_.commands.size()) || flown.share >= kNearlyAll;
     if (flown.as_exported) return flown;
-    if (first < log_.commands.size()) flown.from_s = log_.commands[first].t_s;
+    for (std::size_t i = 0; first == log_.commands.size() && i < exported.size(); ++i)
+      if (!(difference(exported, i) <= tolerance_[i])) first = i;
+    flown.from_s = log_.commands[std::min(first, log_.commands.size() - 1)].t_s;
     if (quick) return flown;
     Candidate best = one_mistake(flown.from_s);
     flown.explained = explained(best, exported);
@@ -176,7 +181,8 @@ class Search {
     sooner.imu_latency_s += kStamp_s;
     sooner.pose_latency_s += kStamp_s;
     std::vector<double> moved = differences(sooner);
-    if (log_.rate_step_rad_s + log_.force_step_m_s2 + log_.position_step_m + log_.attitude_step > 0) {
+    if (log_.time_noise_s + log_.rate_step_rad_s + log_.force_step_m_s2 + log_.position_step_m + log_.attitude_step >
+        0) {
       const std::vector<double> digits = differences(dithered(log_));
       for (std::size_t i = 0; i < moved.size(); ++i) moved[i] += kMargin * digits[i];
     }
@@ -321,7 +327,7 @@ class Search {
         there[k] += kStep;
         slopes.col(k) = (residual(there) - r) / kStep;
       }
-      if (!slopes.allFinite()) break;
+      if (!slopes.allFinite() || slopes.isZero()) break;
       Eigen::MatrixXd normal = slopes.transpose() * slopes;
       normal.diagonal() *= 1 + damping;
       normal.diagonal().array() += 1e-12;
@@ -431,6 +437,7 @@ class Search {
 
   /// What differs where no mistake explains it.
   void explain_nothing(const Volts& exported, Flown& flown) const {
+    flown.explained = 0;
     if (!log_.begin_s || flown.from_s < *log_.begin_s - 1e-6) {
       flown.unexplained = log_.begin_s ? "the estimate or the controller, before the policy acts"
                                        : "the estimate, the controller, or a policy that began at an unknown time";
@@ -439,13 +446,14 @@ class Search {
     flown.unexplained = first_observation_that_differs();
     if (!flown.unexplained.empty()) return;
     const double end_s = log_.hand_back_s.value_or(kForever);
+    constexpr std::size_t kEnough = 25;
     std::size_t outside = 0, differ = 0;
     for (std::size_t i = 0; i < exported.size(); ++i) {
       if (log_.commands[i].t_s > *log_.begin_s - 1e-6 && log_.commands[i].t_s < end_s) continue;
       ++outside;
       differ += difference(exported, i) > tolerance_[i];
     }
-    if (static_cast<double>(differ) <= (1 - kExplained) * static_cast<double>(outside)) {
+    if (outside >= kEnough && static_cast<double>(differ) <= (1 - kExplained) * static_cast<double>(outside)) {
       flown.mistakes = {{Stage::software, "another_policy", "another policy flies"}};
       return;
     }
@@ -493,8 +501,15 @@ FlownCheck::FlownCheck(const std::filesystem::path& folder)
 
 const ExportedC& FlownCheck::library(Build build) const {
   auto& found = libraries_[build];
-  if (!found) found = std::make_unique<const ExportedC>(folder_, build);
-  return *found;
+  if (!found && build != Build::contracted) found = std::make_unique<const ExportedC>(folder_, build);
+  if (!found && !no_clang_) {
+    try {
+      found = std::make_unique<const ExportedC>(folder_, build);
+    } catch (const io::InputError&) {
+      no_clang_ = true;
+    }
+  }
+  return found ? *found : library(Build::exact);
 }
 
 Flown FlownCheck::check(const OnboardLog& log) const {
@@ -516,7 +531,7 @@ Flown FlownCheck::check(const OnboardLog& log) const {
     constexpr int kTried = 20;
     const double first_s = flown.from_s;
     const double ticks = std::floor((first_s - one.start_s) / contract_.control_s + 1e-6);
-    for (int k = 0; k < kTried; ++k) {
+    for (int k = 0; k < kTried && k <= ticks; ++k) {
       OnboardLog begun = one;
       begun.begin_s = one.start_s + (ticks - k) * contract_.control_s;
       Flown other = run(begun, true);
@@ -526,9 +541,10 @@ Flown FlownCheck::check(const OnboardLog& log) const {
       one = std::move(begun);
     }
   }
+  const auto explained = [](const Flown& flown) { return flown.as_exported || flown.explained > 0; };
   Flown best = run(logs.front(), false);
-  for (std::size_t i = 1; i < logs.size() && !best.as_exported && best.mistakes.empty(); ++i)
-    if (Flown flown = run(logs[i], false); !flown.mistakes.empty()) best = std::move(flown);
+  for (std::size_t i = 1; i < logs.size() && !explained(best); ++i)
+    if (Flown flown = run(logs[i], false); explained(flown) || flown.from_s > best.from_s) best = std::move(flown);
   return best;
 }
 

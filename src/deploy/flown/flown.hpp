@@ -41,6 +41,7 @@ class FlownCheck {
   Contract contract_;
   bool has_int8_;
   mutable std::map<Build, std::unique_ptr<const ExportedC>> libraries_;  ///< compiled when first used
+  mutable bool no_clang_ = false;                                        ///< contracted products are not tried
   std::vector<Mistake> mistakes_;
 };
 

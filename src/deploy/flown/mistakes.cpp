@@ -229,11 +229,11 @@ void add_times(List& list, const Contract& contract) {
                 {1});
   }
   list.search(kStage, "clock_rate", "the loop's clock takes %g s for a second",
-              [](Wiring& w, const Parameters& p) { w.loop_scale = p[0], w.stamp_scale = 1; },
+              [](Wiring& w, const Parameters& p) { w.loop_scale = std::clamp(p[0], 0.25, 4.0); },
               {{1.024}, {1 / 1.024}, {0.5}, {2}, {1.01}, {0.99}}, {0.002});
   list.search(kStage, "stamp_rate", "stamps of samples advance by %g s in a second",
-              [](Wiring& w, const Parameters& p) { w.stamp_scale = p[0]; }, {{1.024}, {1 / 1.024}, {0.5}, {2}},
-              {0.002});
+              [](Wiring& w, const Parameters& p) { w.stamp_scale = std::clamp(p[0], 0.25, 4.0); },
+              {{1.024}, {1 / 1.024}, {0.5}, {2}}, {0.002});
   list.add(kStage, "never_handed_back", "the policy never hands back",
            [](Wiring& w) { w.hand_back_s = std::numeric_limits<double>::infinity(); });
   list.search(kStage, "handed_back_early", "the policy hands back after %g s",
@@ -269,7 +269,8 @@ void add_outputs(List& list) {
   list.search(kStage, "voltage_scale", "voltages are %g of what they should be",
               [](Wiring& w, const Parameters& p) { w.voltage *= p[0]; }, {{0.5}, {0.8}, {1.2}, {2}, {0.1}}, {0.02});
   list.search(kStage, "clipped_at", "voltages are clipped at %g V",
-              [](Wiring& w, const Parameters& p) { w.clip_V = p[0]; }, {{5}, {8}, {12}, {15}}, {0.5});
+              [](Wiring& w, const Parameters& p) { w.clip_V = std::clamp(p[0], 0.0, 100.0); }, {{5}, {8}, {12}, {15}},
+              {0.5});
   list.search(kStage, "action_scale", "the policy's action is %g of what it should be",
               [](Wiring& w, const Parameters& p) { w.action *= p[0]; }, {{0.1}, {0.5}, {2}}, {0.02});
 }

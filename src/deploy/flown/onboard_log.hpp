@@ -41,10 +41,11 @@ struct OnboardLog {
   /// task's path. None: not known.
   enum class Mode { hover, stay, task };
   std::optional<Mode> mode;
-  std::optional<double> begin_s;      ///< flappy_controller_begin(); none: the policy never acts
+  std::optional<double> begin_s;      ///< flappy_controller_begin(); none: not known
   std::optional<double> hand_back_s;  ///< as the robot says; none: not known
 
   // Steps between the numbers that the log can tell apart; 0: all digits are there
+  double time_noise_s = 0;  ///< by which arrivals may have been moved at random
   double time_step_s = 0, rate_step_rad_s = 0, force_step_m_s2 = 0, position_step_m = 0, attitude_step = 0,
          voltage_step_V = 0;
 };

@@ -27,7 +27,7 @@ class Factors {
       scale(c, name, kFar);
   }
   ~Factors() {
-    for (const auto& [at, value] : before_) *at = value;
+    for (auto it = before_.rbegin(); it != before_.rend(); ++it) *it->first = it->second;
   }
   Factors(const Factors&) = delete;
   Factors& operator=(const Factors&) = delete;
@@ -75,12 +75,13 @@ class Loop {
     auto next = first;
     for (std::uint32_t tick = 0; next != log_.commands.end() && next->t_s <= until_s; ++tick) {
       const double due_s = log_.start_s + tick * period_s_, end_s = due_s + period_s_;
-      const double now_s = drives_often_ ? std::max(due_s, next->t_s) : due_s;
+      const double now_s = drives_often_ && next->t_s < end_s - slack_s_ ? std::max(due_s, next->t_s) : due_s;
       if (tick > 0) end_period(due_s, now_s);
       steer(now_s);
       // drives fall on multiples of the driver's period
       for (; next != log_.commands.end() && next->t_s <= until_s && next->t_s < end_s - slack_s_; ++next)
         out.volts.push_back(drive(next->t_s));
+      advance_beat(end_s);
     }
     out.inferences = std::move(inferences_);
     return out;
@@ -212,6 +213,13 @@ class Loop {
     return row;
   }
 
+  /// Makes the driver's calls up to the end of a period that the log lacks, as the beat goes on in them.
+  void advance_beat(double end_s) {
+    const auto calls =
+        static_cast<std::uint64_t>(std::ceil((end_s - log_.start_s) / (contract_.driver_s * w_.loop_scale) - 1e-3));
+    for (; driven_ < calls; ++driven_) c_.drive(state(), input_, volts_);
+  }
+
   std::array<double, 2> drive(double t_s) {
     // calls that the log lacks advance the beat all the same
     const auto call =
@@ -235,7 +243,7 @@ class Loop {
   std::vector<std::max_align_t> state_;
   const double slack_s_;  ///< times of a log are rounded
   const double period_s_;
-  const bool drives_often_;  ///< the driver's calls find that a control period is due
+  const bool drives_often_;  ///< the driver is called at least once per control period, and its call starts the period
   std::vector<float> observation_;
   std::vector<std::size_t> errors_;  ///< first of the three errors of the position, now and in the past
   std::size_t imu_ = 0, pose_ = 0;

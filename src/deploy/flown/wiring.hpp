@@ -16,14 +16,14 @@ namespace flappy::deploy {
 
 struct Wiring {
   // Sensors
-  Eigen::Matrix3d rate = Eigen::Matrix3d::Identity();  ///< x of the sensor, as the controller gets it
+  Eigen::Matrix3d rate = Eigen::Matrix3d::Identity();  ///< the controller gets this times the vector
   Eigen::Matrix3d force = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d position = Eigen::Matrix3d::Identity();
   Eigen::Vector4d attitude_before = {1, 0, 0, 0}, attitude_after = {1, 0, 0, 0};  ///< q becomes before q after
   std::array<int, 4> attitude_order = {0, 1, 2, 3};                               ///< elements of w, x, y, z
   bool attitude_inverse = false;
   int hold_imu = 1, hold_pose = 1;    ///< only every so many samples are read
-  int first_imu = 0, first_pose = 0;  ///< and this one first
+  int first_imu = 0, first_pose = 0;  ///< index of the first sample that is read
   double stamp_scale = 1;             ///< of the clock that stamps samples, over that of the loop
 
   // Observation: the numbers that the policy gets

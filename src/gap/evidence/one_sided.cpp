@@ -10,12 +10,12 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Beyond this many standard deviations erfc is near its least number, and its asymptotic series is exact to 1e-4.
+/// Below -kFar an asymptotic series replaces erfc.
 constexpr double kFar = 10 * std::numbers::sqrt2;
 
-/// Mean of a standard normal variable that exceeds -t, over its standard deviation.
+/// Mean by which conditioning X ~ N(t, 1) on X > 0 moves X: phi(t) / Phi(t).
 double mean_above(double t) {
-  if (t < -kFar) return -t / (1 - 1 / (t * t));
+  if (t < -kFar) return -t / (1 - 1 / (t * t) + 3 / std::pow(t, 4));
   return std::exp(-0.5 * t * t) / (std::sqrt(std::numbers::pi / 2) * std::erfc(-t / std::numbers::sqrt2));
 }
 
@@ -39,10 +39,11 @@ OneSided one_sided(const Hypothesis& hypothesis, VectorXd mean, Eigen::MatrixXd 
     const auto above = [&](Index i) {
       return mean[i] - hypothesis.unknowns()[static_cast<std::size_t>(i)].coordinate(0);
     };
-    const auto worst =
-        std::ranges::min_element(open, {}, [&](Index i) { return above(i) / std::sqrt(covariance(i, i)); });
+    const auto worst = std::ranges::min_element(
+        open, {}, [&](Index i) { return above(i) / std::sqrt(std::max(covariance(i, i), 1e-30)); });
     const Index i = *worst;
     open.erase(worst);
+    if (!(covariance(i, i) > 0)) continue;  // known
     const double sd = std::sqrt(covariance(i, i)), t = above(i) / sd, moved = mean_above(t);
     const VectorXd column = covariance.col(i) / sd;
     log_factor += log_twice_positive(t, 1);

@@ -95,8 +95,7 @@ TEST(Flown, FindsEachMistakeAgain) {
   EXPECT_EQ(right.share, 1);
   int number = 0, tried = 0, found = 0, silent = 0;
   for (const Mistake& m : mistakes_of(check.contract(), exact, false)) {
-    if (!m.starts.empty() || (m.stage != Stage::sensor && m.stage != Stage::output)) continue;
-    if (number++ % 3 != 0 && !test::full()) continue;  // each takes a third of a second
+    if (number++ % 8 != 0 && !test::full()) continue;  // each takes half a second
     std::vector<double> p = m.starts.empty() ? std::vector<double>() : m.starts.front();
     for (std::size_t k = 0; k < p.size(); ++k) p[k] += 0.7 * m.scales[k];  // not where the search begins
     Wiring wiring;
@@ -118,7 +117,7 @@ TEST(Flown, FindsEachMistakeAgain) {
     }
   }
   std::printf("%d of %d mistakes found, %d change nothing\n", found, tried, silent);
-  EXPECT_GE(found, 0.95 * tried);
+  EXPECT_GE(found, 0.9 * tried) << "a stamp rate that is off where the search begins is not found";
 }
 
 /// The flight as a log has it that kept one of two samples of the IMU.
@@ -148,6 +147,20 @@ TEST(Flown, FindsMistakesWhereEverySecondSampleIsLost) {
     ASSERT_EQ(flown.mistakes.size(), 1U) << m.id << " " << flown.unexplained;
     EXPECT_EQ(flown.mistakes[0].id, m.id);
   }
+}
+
+TEST(Flown, TakesLogsThatLackCommands) {
+  const Folder folder;
+  write_export(folder / "", 7);
+  const FlownCheck check(folder / "");
+  const ExportedC exact(folder / "", Build::exact);
+  const OnboardLog whole = flown_with(check, exact, samples(0.5), {});
+  OnboardLog thin = whole, gap = whole;
+  thin.commands.clear();
+  for (std::size_t i = 0; i < whole.commands.size(); i += 5) thin.commands.push_back(whole.commands[i]);
+  std::erase_if(gap.commands, [](const OnboardLog::Command& c) { return c.t_s > 0.1 && c.t_s < 0.25; });
+  EXPECT_EQ(check.check(thin).share, 1);
+  EXPECT_EQ(check.check(gap).share, 1);
 }
 
 // A sample that arrives 0.8 us after a control period belongs to the next one, where the log has all digits of times.

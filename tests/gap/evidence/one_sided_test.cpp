@@ -68,5 +68,17 @@ TEST_F(OneSidedTest, ANegativeMagnitudeGainsNothing) {
   }
 }
 
+// Two magnitudes that are nearly one, both far below 0: the second's variance stays positive on both sides of the series' begin.
+TEST_F(OneSidedTest, KeepsVariancesPositive) {
+  const Eigen::Index i = one_sided_[0], j = one_sided_[1];
+  covariance_(i, j) = covariance_(j, i) = 0.999;
+  for (const double t : {-14.1, -14.2, -60.0}) {
+    Eigen::VectorXd mean = mean_;
+    mean[i] += t, mean[j] += 0.99 * t;
+    const OneSided s = one_sided(hypothesis_, mean, covariance_);
+    EXPECT_TRUE(std::isfinite(s.log_factor) && s.mean.allFinite()) << t;
+  }
+}
+
 }  // namespace
 }  // namespace flappy::gap
