@@ -14,7 +14,7 @@ import shutil
 import subprocess
 import time
 
-# What the check has to answer for each mistake of the firmware: the kind, a pattern for its words, and the number in it, within NEAR.
+# Right answer of the check, by mistake of the firmware: its kind, a pattern of its words, and the number in them, which may be off by NEAR.
 ANSWERS = {
     "gyro_degrees": ("sensor", "gyro's rates are in degrees"),
     "accel_g": ("sensor", "accelerometer's values are in g"),
@@ -121,32 +121,25 @@ def check(a, log, out, name="flown"):
     return json.loads(answer.read_text())["flights"][0], float((out / f"{name}.s").read_text())
 
 
+def rewritten(log, to, change):
+    """A copy of the log; change(name of the file, rows without the head): its rows."""
+    if not to.exists():
+        shutil.copytree(log, to)
+        for file in to.glob("*.csv"):
+            head, *rows = csv.reader(file.open())
+            with file.open("w", newline="") as f:
+                csv.writer(f, lineterminator="\n").writerows([head, *change(file.name, rows)])
+    return to
+
+
 def coarse(log, to):
     """The log as a real one: five digits, and every second sample of the IMU."""
-    if to.exists():
-        return to
-    shutil.copytree(log, to)
-    for file in to.glob("*.csv"):
-        rows = list(csv.reader(file.open()))
-        keep = rows[:1] + (rows[2::2] if file.name == "imu.csv" else rows[1:])
-        with file.open("w", newline="") as f:
-            writer = csv.writer(f, lineterminator="\n")
-            writer.writerow(keep[0])
-            for row in keep[1:]:
-                writer.writerow([row[0]] + [f"{float(x):.5g}" for x in row[1:]])
-    return to
+    return rewritten(log, to, lambda name, rows: [row[:1] + [f"{float(x):.5g}" for x in row[1:]] for row in (rows[1::2] if name == "imu.csv" else rows)])
 
 
 def early(log, to):
     """The log of a robot that crashes after EARLY_S."""
-    if to.exists():
-        return to
-    shutil.copytree(log, to)
-    for file in to.glob("*.csv"):
-        rows = list(csv.reader(file.open()))
-        with file.open("w", newline="") as f:
-            csv.writer(f, lineterminator="\n").writerows(rows[:1] + [row for row in rows[1:] if float(row[0]) < EARLY_S])
-    return to
+    return rewritten(log, to, lambda _, rows: [row for row in rows if float(row[0]) < EARLY_S])
 
 
 def verdict(answer, kind, words, number=None):
@@ -175,7 +168,7 @@ def main():
     a.out.mkdir(parents=True, exist_ok=True)
     exported = export(a, a.run, a.out / "exported", "--int8")
     others = {"another_policy": export(a, a.other_run, a.out / "other"), "another_gain": with_another_gain(exported, a.out / "gain")}
-    rows = {}
+    rows, times = {}, []
     print("| mistake | full log | five digits, half the samples | first 0.28 s | answers that were not right |\n|---|---|---|---|---|")
     for mistake in a.only:
         full, thin, cut, others_said = [], [], [], []
@@ -184,27 +177,27 @@ def main():
                 out = a.out / "flights" / mistake / f"{family}_{seed}"
                 log = fly(a, family, seed, others.get(mistake, exported), "none" if mistake in others else mistake, out)
                 answer, took = check(a, log, out)
-                full.append((verdict(answer, *ANSWERS[mistake]), took))
-                if full[-1][0] not in ("right", "silent"):
+                full.append(verdict(answer, *ANSWERS[mistake]))
+                times.append(took)
+                if full[-1] not in ("right", "silent"):
                     said = answer["mistakes"][0]["words"] if answer["mistakes"] else answer["unexplained"]
                     others_said.append(f"{family}{seed}: {said}")
-                thin.append((verdict(check(a, coarse(log, out / "coarse"), out, "coarse")[0], *ANSWERS[mistake]), 0))
-                cut.append((verdict(check(a, early(log, out / "early"), out, "early")[0], *ANSWERS[mistake]), 0))
+                thin.append(verdict(check(a, coarse(log, out / "coarse"), out, "coarse")[0], *ANSWERS[mistake]))
+                cut.append(verdict(check(a, early(log, out / "early"), out, "early")[0], *ANSWERS[mistake]))
         rows[mistake] = (full, thin, cut)
 
         def share(list_):
-            counted = [v for v, _ in list_ if v != "silent"]
+            counted = [v for v in list_ if v != "silent"]
             return f"{sum(v == 'right' for v in counted)} of {len(counted)}"
 
         print(f"| {mistake} | {share(full)} | {share(thin)} | {share(cut)} | {'; '.join(others_said)} |", flush=True)
     everything = {k: [v for row in rows.values() for v in row[i]] for i, k in enumerate(("full", "thin", "first 0.28 s"))}
     for name, list_ in everything.items():
-        counted = [v for v, _ in list_ if v != "silent"]
+        counted = [v for v in list_ if v != "silent"]
         right, of_kind = sum(v == "right" for v in counted), sum(v in ("right", "kind") for v in counted)
         print(f"{name}: right {right} of {len(counted)}, kind right {of_kind}, no change beyond the digits {len(list_) - len(counted)}")
-    took = sorted(s for _, s in everything["full"])
-    if took:
-        print(f"time of a check: median {took[len(took) // 2]:.2f} s, longest {took[-1]:.2f} s")
+    if times:
+        print(f"time of a check: median {sorted(times)[len(times) // 2]:.2f} s, longest {max(times):.2f} s")
     as_exported, times, wrong = 0, [], []
     for i in range(a.effects):
         family, effect, size = a.families[i % len(a.families)], EFFECTS[i // len(a.families) % len(EFFECTS)], 1 + i // (len(EFFECTS) * len(a.families)) % 2

@@ -92,7 +92,7 @@ struct FamilyEscape {
   flightlog::FlightLog log;
 };
 
-/// What steers a robot from on board: samples go in as they arrive, the motors' voltages come out. Times are the log's.
+/// A firmware: it gets samples as they arrive, and sets the motors' voltages. Times are the log's.
 class OnBoard {
  public:
   using Pose = std::array<double, 7>;  ///< torso origin in W, m; attitude w, x, y, z, B to W

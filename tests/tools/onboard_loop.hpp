@@ -198,9 +198,9 @@ class LedFlight {
       std::ranges::copy(to.attitude, logged.attitude.begin());
     }
     said_ = program_.exchange(in);
-    const double now_s = 1e-6 * static_cast<double>(period_us_ * period_), hold_s = drive_s_;
+    const double now_s = 1e-6 * static_cast<double>(period_us_ * period_);
     for (std::uint32_t d = 0; d < said_.drive_count; ++d)
-      log_.commands.push_back({now_s + d * hold_s, said_.volts[d][0], said_.volts[d][1]});
+      log_.commands.push_back({now_s + d * drive_s_, said_.volts[d][0], said_.volts[d][1]});
     if (said_.state == kActing && !log_.begin_s) log_.begin_s = now_s;
     const float* u = said_.input;
     fleet_.set_added(0, {u[0], u[1], u[2], u[3]});

@@ -1,6 +1,6 @@
 // The onboard loop in the simulator: its flapper moves as one that the lanes fly, to the bit.
 #include "deploy/flown/flown.hpp"
-#include "deploy/header/contract.hpp"
+#include "deploy/header/exported_files.hpp"
 #include "full.hpp"
 #include "tools/own_flight.hpp"
 
@@ -92,17 +92,9 @@ TEST(Onboard, FliesOnTheBoardAsTheLanesDo) {
 
 /// The log of a loop, checked against what was exported.
 Flown checked(const Words& program) {
-  const FlyConfig config = of_nominal(escape());
   Folder exported;
-  exported.write("flappy_policy.h", escape_headers().policy);
-  exported.write("flappy_controller.h", escape_headers().controller);
-  const policy::PolicyNetwork network = network_of(config);
-  policy::PolicyVectors tests = corners(network, config.fleet.task.observation());
-  tests.action = evaluate(network, tests.observation);
-  exported.write("contract.json",
-                 contract_json(config, kRun, network, tests,
-                               {crc_of_header(escape_headers().policy), crc_of_header(escape_headers().controller)}));
-  LedFlight led(config, 0, program);
+  for (const auto& [name, text] : exported_files(escape(), kRun)) exported.write(name, text);
+  LedFlight led(of_nominal(escape()), 0, program);
   Script script;
   script.manoeuvre = 520;
   while (led.period() < 700) led.step(script);

@@ -1,6 +1,7 @@
 #include "check_flown.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -31,10 +32,7 @@ void export_run(const std::string& folder, const std::filesystem::path& to) {
   if (const std::string why = deploy::no_controller(run.fly); !why.empty())
     throw io::InputError(folder + ": has no controller to export: " + why +
                          "; accepted: a run whose controller flappy-export writes");
-  const policy::PolicyNetwork network = deploy::network_of(run.fly);
-  for (const auto& [name, text] :
-       deploy::exported_files(run.fly, run.info, network, deploy::corners(network, run.fly.fleet.task.observation())))
-    io::write_atomically(to / name, text);
+  for (const auto& [name, text] : deploy::exported_files(run.fly, run.info)) io::write_atomically(to / name, text);
 }
 
 /// Refuses times of [flown] that are none of this flight.
@@ -57,13 +55,21 @@ void check_times(const std::string& folder, const flightlog::FlownHeader& flown,
     refuse(folder, io::format("flown.start_pose: its quaternion has length %g", length), "1 to within 0.001");
 }
 
+/// Names of OnboardLog::Mode.
+constexpr std::array<const char*, 3> kModes = {"hover", "stay", "task"};
+
+/// Time of a log at which the robot's controller was started.
+double start_of(const flightlog::FlightLog& log) {
+  return log.header.flown ? log.header.flown->start_s : log.command.t_s.front();
+}
+
 /// The flight as it passed the robot's processor, from its start on: at t = 0.
 deploy::OnboardLog onboard(const std::string& folder, const flightlog::FlightLog& log,
                            const deploy::Contract& contract) {
   const flightlog::FlightHeader& h = log.header;
   if (!h.inputs.empty())
     refuse(folder, "has declared inputs, which no exported controller sets", "a log with voltages");
-  const double zero_s = h.flown ? h.flown->start_s : log.command.t_s.front();
+  const double zero_s = start_of(log);
   if (h.flown) check_times(folder, *h.flown, log.command);
   deploy::OnboardLog to;
   to.imu_latency_s = h.imu.latency_s;
@@ -81,10 +87,8 @@ deploy::OnboardLog onboard(const std::string& folder, const flightlog::FlightLog
     to.commands.push_back({c.t_s[i] - zero_s, c.left_voltage_V[i], c.right_voltage_V[i]});
   if (h.flown) {
     to.start_pose = h.flown->start_pose;
-    using Mode = deploy::OnboardLog::Mode;
-    if (h.flown->mode == "hover") to.mode = Mode::hover;
-    if (h.flown->mode == "stay") to.mode = Mode::stay;
-    if (h.flown->mode == "task") to.mode = Mode::task;
+    if (!h.flown->mode.empty())
+      to.mode = static_cast<deploy::OnboardLog::Mode>(std::ranges::find(kModes, h.flown->mode) - kModes.begin());
     if (h.flown->begin_s) to.begin_s = *h.flown->begin_s - zero_s;
     if (h.flown->hand_back_s) to.hand_back_s = *h.flown->hand_back_s - zero_s;
   }
@@ -142,23 +146,21 @@ Json check_flown(const std::string& exported, const std::vector<std::string>& fo
   bool all = true;
   for (const std::string& folder : folders) {
     const flightlog::FlightLog log = flightlog::read_flight_log(folder);
-    if (const auto& flown = log.header.flown) {
+    const auto& header = log.header.flown;
+    if (header) {
       const auto compare = [&](const char* what, std::optional<std::uint32_t> flew, std::uint32_t is) {
         if (flew && *flew != is)
           std::printf("%s: the log says that another %s flew: %u, and %s has %u\n", folder.c_str(), what, *flew,
                       exported.c_str(), is);
       };
-      compare("policy", flown->policy_crc32, check.contract().policy_crc32);
-      compare("controller", flown->controller_crc32, check.contract().controller_crc32);
+      compare("policy", header->policy_crc32, check.contract().policy_crc32);
+      compare("controller", header->controller_crc32, check.contract().controller_crc32);
     }
     deploy::Flown f = check.check(onboard(folder, log, check.contract()));
-    const double zero_s = log.header.flown ? log.header.flown->start_s : log.command.t_s.front();
-    f.from_s += zero_s;
-    if (f.begin_s) *f.begin_s += zero_s;
+    f.from_s += start_of(log);
+    if (f.begin_s) *f.begin_s += start_of(log);
     std::printf("%s: %s\n", folder.c_str(), sentence(f).c_str());
-    constexpr const char* kModes[] = {"hover", "stay", "task"};
     const char* mode = kModes[static_cast<std::size_t>(f.mode)];
-    const auto& header = log.header.flown;
     const auto taken = [&](const std::string& what, const std::string& as) {
       std::printf("%s: %s is missing: taken for %s\n", folder.c_str(), what.c_str(), as.c_str());
     };

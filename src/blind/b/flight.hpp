@@ -39,7 +39,7 @@ class Flight {
 
   /// Flies one tick; inputs are held between the pilot's periods. Returns how the robot crashed, or an empty string.
   std::string tick(const Beat& sent, bool may_tumble = false);
-  /// The same with voltages of a firmware, which gets the samples that have arrived.
+  /// Gives the firmware the samples that have arrived, and flies a tick with its voltages.
   std::string tick(OnBoard& firmware);
   double time_s() const { return static_cast<double>(ticks_) * kTick_s - trim_s_; }
   long ticks() const { return ticks_; }

@@ -14,7 +14,7 @@ namespace flappy::blind {
 /// Names of mistakes, "none" first.
 const std::vector<std::string>& firmware_mistakes();
 
-/// What the firmware knows of its robot's sensors.
+/// Latencies by which the firmware stamps samples.
 struct FirmwareSensors {
   double imu_latency_s = 0, mocap_latency_s = 0;
 };

@@ -50,7 +50,7 @@ class ExportedC {
   /// The controller's numbers by name, such as "driver_bias_V"; gains have several. They may be changed.
   const std::map<std::string, std::vector<float*>>& constants() const { return constants_; }
 
-  std::uint32_t (*policy_crc32)();  ///< of the headers' numbers
+  std::uint32_t (*policy_crc32)();  ///< FLAPPY_POLICY_CRC32; the next: FLAPPY_CONTROLLER_CRC32
   std::uint32_t (*controller_crc32)();
   // The functions of the headers; `state` has state_bytes().
   std::size_t state_bytes() const;

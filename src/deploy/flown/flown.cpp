@@ -2,9 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <numeric>
 
 #include "deploy/flown/replay.hpp"
 #include "io/files.hpp"
@@ -123,12 +121,13 @@ class Search {
         library_(std::move(library)),
         thinning_(thinning(log, contract)),
         log_(filled(log, thinning_)),
-        tolerance_(tolerances({})),
+        exported_(played({}, kForever)),
+        tolerance_(tolerances({}, exported_.volts)),
         policy_tolerance_(policy_tolerances()) {}
 
   /// `quick`: without looking for mistakes.
   Flown run(bool quick) {
-    const Volts exported = volts({}, kForever);
+    const Volts& exported = exported_.volts;
     Flown flown;
     flown.share = share(exported, tolerance_);
     flown.tolerance_V = io::median(tolerance_);
@@ -142,33 +141,31 @@ class Search {
     flown.from_s = log_.commands[std::min(first, log_.commands.size() - 1)].t_s;
     if (quick) return flown;
     Candidate best = one_mistake(flown.from_s);
-    flown.explained = explained(best, exported);
+    flown.explained = explained(best);
     if (flown.explained < kExplained) {
       const Candidate two = two_mistakes();
-      if (const double both = explained(two, exported); both > flown.explained) best = two, flown.explained = both;
+      if (const double both = explained(two); both > flown.explained) best = two, flown.explained = both;
     }
     if (flown.explained >= kExplained) {
       for (const auto& [mistake, p] : best.parts)
         flown.mistakes.push_back({mistake->stage, mistake->id, mistake->said(p)});
       return flown;
     }
-    explain_nothing(exported, flown);
+    explain_nothing(flown);
     return flown;
   }
 
  private:
-  static constexpr double kForever = std::numeric_limits<double>::infinity();
+  static constexpr double kForever = std::numeric_limits<double>::infinity(), kLost = 100;
 
   Replay played(const Wiring& w, double until_s) const {
     return replay(library_(w.build), contract_, log_, w, until_s);
   }
-  Volts volts(const Wiring& w, double until_s) const {
-    return replay(library_(w.build), contract_, log_, w, until_s).volts;
-  }
+  Volts volts(const Wiring& w, double until_s) const { return played(w, until_s).volts; }
 
-  /// By how much commands may differ under a wiring, for what the log has lost. [command], V.
-  std::vector<double> tolerances(const Wiring& w) const {
-    const Volts as_logged = volts(w, kForever);
+  /// By how much commands may differ under a wiring, for what the log has lost. [command], V. `as_logged`: the wiring's
+  /// replay of the log as it is.
+  std::vector<double> tolerances(const Wiring& w, const Volts& as_logged) const {
     const auto differences = [&](const OnboardLog& other) {
       const Volts v = replay(library_(w.build), contract_, other, w).volts;
       std::vector<double> list(v.size());
@@ -187,7 +184,7 @@ class Search {
       for (std::size_t i = 0; i < moved.size(); ++i) moved[i] += kMargin * digits[i];
     }
     if (thinning_ > 1) {
-      // what further samples lose tells what those lost, whose noise is of the same size throughout
+      // The lost samples changed the commands as much as losing half of the rest does. Their noise does not vary in time.
       double sum = 0;
       for (const double d : differences(thinned(log_, thinning_))) sum += d * d;
       const double rms = std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, moved.size())));
@@ -216,24 +213,24 @@ class Search {
     return static_cast<double>(within) / static_cast<double>(v.size());
   }
   /// Share of the commands that a candidate explains. Where samples were lost, it has to explain much of what differs.
-  double explained(const Candidate& c, const Volts& exported) const {
+  double explained(const Candidate& c) const {
     if (c.parts.empty()) return 0;
-    const Volts v = volts(c.wiring(), kForever);
+    const Wiring w = c.wiring();
+    const Volts v = volts(w, kForever);
     if (thinning_ == 1) return share(v, tolerance_);
-    return mean_square(v) > kMuch * mean_square(exported) ? 0 : share(v, tolerances(c.wiring()));
+    return mean_square(v) > kMuch * mean_square(exported_.volts) ? 0 : share(v, tolerances(w, v));
   }
   double mean_square(const Volts& v) const {
     double sum = 0;
     for (std::size_t i = 0; i < v.size(); ++i) sum += std::pow(difference(v, i), 2);
     return sum / static_cast<double>(std::max<std::size_t>(1, v.size()));
   }
+  /// Loss of a number whose difference is `d` tolerances.
+  static double loss_of(double d) { return std::isfinite(d) ? std::log1p(d * d) : kLost; }
   double loss(const Volts& v) const {
     double sum = 0;
-    for (std::size_t i = 0; i < v.size(); ++i) {
-      const double d = difference(v, i) / tolerance_[i];
-      sum += std::isfinite(d) ? std::log1p(d * d) : 100;
-    }
-    return v.empty() ? 100 : sum / static_cast<double>(v.size());
+    for (std::size_t i = 0; i < v.size(); ++i) sum += loss_of(difference(v, i) / tolerance_[i]);
+    return v.empty() ? kLost : sum / static_cast<double>(v.size());
   }
   /// Calls `take(row, number, difference over tolerance)` for each number of the policy that the log has.
   template <class Take>
@@ -251,7 +248,7 @@ class Search {
   double policy_loss(const std::vector<OnboardLog::Inference>& is) const {
     double sum = 0, count = 0;
     compare_policy(is, [&](std::size_t, std::size_t, double d) {
-      sum += std::isfinite(d) ? std::log1p(d * d) : 100;
+      sum += loss_of(d);
       ++count;
     });
     return count > 0 ? sum / count : 0;
@@ -266,7 +263,7 @@ class Search {
       list.push_back(log_.policy_steps[k] + 1e-5 * (s.high - s.low));
     }
     if (list.empty()) return list;
-    const std::vector<OnboardLog::Inference> as_logged = played({}, kForever).inferences;
+    const std::vector<OnboardLog::Inference>& as_logged = exported_.inferences;
     const auto add = [&](const OnboardLog& other) {
       const auto moved = replay(library_(Build::exact), contract_, other, {}).inferences;
       for (std::size_t k = 0; k < list.size(); ++k) {
@@ -301,11 +298,15 @@ class Search {
   void descend(Candidate& c, double until_s, int iterations) const {
     const Parameters from = c.parts.back().second;
     const auto count = static_cast<Eigen::Index>(from.size());
-    const std::vector<double>& scales = c.parts.back().first->scales;
+    const Eigen::Map<const Eigen::ArrayXd> scales(c.parts.back().first->scales.data(), count);
+    const auto parameters = [&](const Eigen::VectorXd& x) {
+      Parameters p(from.size());
+      Eigen::Map<Eigen::ArrayXd>(p.data(), count) = x.array() * scales;
+      return p;
+    };
     const auto residual = [&](const Eigen::VectorXd& x) {
       Candidate there = c;
-      for (Eigen::Index k = 0; k < count; ++k)
-        there.parts.back().second[static_cast<std::size_t>(k)] = x[k] * scales[static_cast<std::size_t>(k)];
+      there.parts.back().second = parameters(x);
       const Volts v = volts(there.wiring(), until_s);
       Eigen::VectorXd r(2 * static_cast<Eigen::Index>(v.size()));
       for (std::size_t i = 0; i < v.size(); ++i) {
@@ -314,13 +315,11 @@ class Search {
       }
       return r;
     };
-    Eigen::VectorXd x(count);
-    for (Eigen::Index k = 0; k < count; ++k)
-      x[k] = from[static_cast<std::size_t>(k)] / scales[static_cast<std::size_t>(k)];
+    Eigen::VectorXd x = Eigen::Map<const Eigen::ArrayXd>(from.data(), count) / scales;
     Eigen::VectorXd r = residual(x);
     double damping = 1e-3;
     for (int iteration = 0; iteration < iterations && r.allFinite(); ++iteration) {
-      constexpr double kStep = 1e-3;  // of a scale: outputs are floats
+      constexpr double kStep = 1e-3;  // smaller steps would show the rounding of the C's floats
       Eigen::MatrixXd slopes(r.size(), count);
       for (Eigen::Index k = 0; k < count; ++k) {
         Eigen::VectorXd there = x;
@@ -339,10 +338,7 @@ class Search {
         damping *= 100;
       }
     }
-    Parameters to(from.size());
-    for (Eigen::Index k = 0; k < count; ++k)
-      to[static_cast<std::size_t>(k)] = x[k] * scales[static_cast<std::size_t>(k)];
-    if (const double l = loss_with(c, to, until_s); l < c.loss) c.loss = l;
+    if (const double l = loss_with(c, parameters(x), until_s); l < c.loss) c.loss = l;
     else c.parts.back().second = from;
   }
 
@@ -435,8 +431,9 @@ class Search {
     return best;
   }
 
-  /// What differs where no mistake explains it.
-  void explain_nothing(const Volts& exported, Flown& flown) const {
+  /// Says which part of the software differs, after no mistake has explained it.
+  void explain_nothing(Flown& flown) const {
+    const Volts& exported = exported_.volts;
     flown.explained = 0;
     if (!log_.begin_s || flown.from_s < *log_.begin_s - 1e-6) {
       flown.unexplained = log_.begin_s ? "the estimate or the controller, before the policy acts"
@@ -460,10 +457,10 @@ class Search {
     flown.unexplained = "observation or action, from the policy's begin on";
   }
 
-  /// Of the observation that the log has; empty where it has none, or all is as exported.
+  /// Names the first logged number of the observation that differs from the replay's; empty if none does.
   std::string first_observation_that_differs() const {
     std::size_t row = log_.inferences.size(), number = 0;
-    compare_policy(played({}, kForever).inferences, [&](std::size_t at, std::size_t k, double d) {
+    compare_policy(exported_.inferences, [&](std::size_t at, std::size_t k, double d) {
       if (d <= 1 || log_.policy_numbers[k] >= contract_.observation.size() || at > row) return;
       if (at < row || log_.policy_numbers[k] < log_.policy_numbers[number]) row = at, number = k;
     });
@@ -477,6 +474,7 @@ class Search {
   const Library library_;
   const std::size_t thinning_;
   const OnboardLog log_;
+  const Replay exported_;                ///< without a mistake
   const std::vector<double> tolerance_;  ///< as exported
   const std::vector<double> policy_tolerance_;
   std::vector<Candidate> singles_;
@@ -500,16 +498,17 @@ FlownCheck::FlownCheck(const std::filesystem::path& folder)
 }
 
 const ExportedC& FlownCheck::library(Build build) const {
+  if (build == Build::contracted && no_clang_) return library(Build::exact);
   auto& found = libraries_[build];
-  if (!found && build != Build::contracted) found = std::make_unique<const ExportedC>(folder_, build);
-  if (!found && !no_clang_) {
-    try {
-      found = std::make_unique<const ExportedC>(folder_, build);
-    } catch (const io::InputError&) {
-      no_clang_ = true;
-    }
+  if (found) return *found;
+  try {
+    found = std::make_unique<const ExportedC>(folder_, build);
+  } catch (const io::InputError&) {
+    if (build != Build::contracted) throw;
+    no_clang_ = true;
+    return library(Build::exact);
   }
-  return found ? *found : library(Build::exact);
+  return *found;
 }
 
 Flown FlownCheck::check(const OnboardLog& log) const {

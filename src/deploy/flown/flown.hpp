@@ -18,7 +18,7 @@ struct FlownMistake {
 
 struct Flown {
   bool as_exported = false;
-  double share = 0;         ///< of the commands, within tolerance as exported
+  double share = 0;         ///< share of the commands that are within tolerance of the exported C
   double tolerance_V = 0;   ///< median over commands
   double from_s = 0;        ///< first command that differs, on the log's clock
   OnboardLog::Mode mode{};  ///< this and begin_s: as logged, or else as they explain the log best

@@ -158,7 +158,7 @@ void add_observations(List& list, const Contract& contract) {
   constexpr auto kStage = Stage::observation;
   const std::size_t n = contract.observation.size();
   const std::vector<Part> parts = parts_of(contract.observation);
-  // of the parts that are shown now; what was seen earlier is kept by the controller itself
+  // the present parts alone: the controller keeps the earlier observations
   const std::size_t now = n / std::max<std::size_t>(contract.history, 1);
   for (std::size_t a = 0; a < parts.size() && parts[a].first < now; ++a) {
     for (std::size_t b = a + 1; b < parts.size() && parts[b].first < now; ++b) {

@@ -20,7 +20,7 @@ struct Mistake {
   /// Changes a wiring; `p`: the parameters.
   std::function<void(Wiring& w, const std::vector<double>& p)> make;
   std::vector<std::vector<double>> starts = {};  ///< parameters from which the best ones are searched; empty: none
-  std::vector<double> scales = {};               ///< of a first step in each parameter
+  std::vector<double> scales = {};               ///< [parameter] size of the first step of a search
 
   /// Words with these parameters.
   std::string said(const std::vector<double>& p) const;

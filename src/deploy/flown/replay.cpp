@@ -213,18 +213,23 @@ class Loop {
     return row;
   }
 
+  /// Until it has been called so often since the start.
+  void call_driver(std::uint64_t calls) {
+    for (; driven_ < calls; ++driven_) c_.drive(state(), input_, volts_);
+  }
+
   /// Makes the driver's calls up to the end of a period that the log lacks, as the beat goes on in them.
   void advance_beat(double end_s) {
     const auto calls =
         static_cast<std::uint64_t>(std::ceil((end_s - log_.start_s) / (contract_.driver_s * w_.loop_scale) - 1e-3));
-    for (; driven_ < calls; ++driven_) c_.drive(state(), input_, volts_);
+    call_driver(calls);
   }
 
   std::array<double, 2> drive(double t_s) {
     // calls that the log lacks advance the beat all the same
     const auto call =
         static_cast<std::uint64_t>(std::floor((t_s - log_.start_s) / (contract_.driver_s * w_.loop_scale) + 1e-3));
-    for (; driven_ <= call; ++driven_) c_.drive(state(), input_, volts_);
+    call_driver(call + 1);
     const Eigen::Vector2d v = w_.voltage * Eigen::Vector2d(volts_[0], volts_[1]);
     return {std::clamp(v[0], -w_.clip_V, w_.clip_V), std::clamp(v[1], -w_.clip_V, w_.clip_V)};
   }

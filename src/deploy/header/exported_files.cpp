@@ -21,4 +21,9 @@ std::map<std::string, std::string> exported_files(const rollout::FlyConfig& conf
   return files;
 }
 
+std::map<std::string, std::string> exported_files(const rollout::FlyConfig& config, const policy::RunInfo& run) {
+  const policy::PolicyNetwork network = network_of(config);
+  return exported_files(config, run, network, corners(network, config.fleet.task.observation()));
+}
+
 }  // namespace flappy::deploy

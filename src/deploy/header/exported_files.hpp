@@ -13,5 +13,7 @@ namespace flappy::deploy {
 /// flappy_controller.h. `tests`: observations of the policy's self-test. io::InputError as from controller_header().
 std::map<std::string, std::string> exported_files(const rollout::FlyConfig& config, const policy::RunInfo& run,
                                                   const policy::PolicyNetwork& network, policy::PolicyVectors tests);
+/// The same for the configuration's actor, tested on corners() alone, without a flight.
+std::map<std::string, std::string> exported_files(const rollout::FlyConfig& config, const policy::RunInfo& run);
 
 }  // namespace flappy::deploy

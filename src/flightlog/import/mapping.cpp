@@ -13,6 +13,7 @@ struct StreamKeys {
   std::string name;
   Names columns, optional_columns, declared;
   bool has_frame, has_world;
+  bool has_rate = true;
 };
 
 const std::vector<StreamKeys> kStreams = {
@@ -20,6 +21,7 @@ const std::vector<StreamKeys> kStreams = {
      {"left_voltage_V", "right_voltage_V"},
      {"amplitude_V", "difference_V", "bias_V", "split_cycle", "phase_rad"},
      {},
+     false,
      false,
      false},
     {"mocap",
@@ -47,7 +49,7 @@ const std::vector<StreamKeys> kStreams = {
      false,
      false},
     {"attitude", {"qw", "qx", "qy", "qz"}, {}, {"latency_s", "noise_rad"}, true, true},
-    {"policy", {}, {}, {"numbers"}, false, false},
+    {"policy", {}, {}, {"numbers"}, false, false, false},
 };
 const Names kAngles = {"roll_rad", "pitch_rad", "yaw_rad"};
 /// In place of the pitch: acceleration in W, without gravity.
@@ -115,8 +117,8 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
   accepted.insert(accepted.end(), keys.declared.begin(), keys.declared.end());
   if (keys.has_frame) accepted.emplace_back("frame");
   if (keys.has_world) accepted.emplace_back("world");
+  if (keys.has_rate) accepted.emplace_back("rate_hz");
   if (keys.name == "command") accepted.insert(accepted.end(), {"inputs", "flown"});
-  else if (keys.name != "policy") accepted.emplace_back("rate_hz");
   if (keys.name == "mocap") accepted.emplace_back("source");
   if (keys.name == "imu") accepted.emplace_back("gyro");
   if (keys.name == "power") accepted.emplace_back("currents");
@@ -145,7 +147,7 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
   s.sequence = table.string_or("sequence", "");
   if (keys.has_frame) s.frd = table.choice_or("frame", "flu", {"flu", "frd"}) == "frd";
   if (keys.has_world) s.ned = table.choice_or("world", "enu", {"enu", "ned"}) == "ned";
-  s.measures_rate = keys.name != "command" && keys.name != "policy" && !table.has("rate_hz");
+  s.measures_rate = keys.has_rate && !table.has("rate_hz");
   read_columns(keys, s);
   return s;
 }

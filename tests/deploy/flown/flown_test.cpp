@@ -34,18 +34,6 @@ std::shared_ptr<const policy::Actor> random_actor(const flight::Task& task, std:
   return std::make_shared<const policy::Actor>(a);
 }
 
-/// What flappy-export writes, of a policy that acts for 0.35 s.
-void write_export(const std::filesystem::path& folder, std::uint32_t seed) {
-  rollout::FlyConfig config =
-      rollout::read_fly_config(source_path("configs/fly/escape.toml"), {"task.hand_back.distance_m=1e-9"});
-  config.actor = random_actor(config.fleet.task, seed);
-  const policy::RunInfo run{"0123", "abcd", false, "escape"};
-  const policy::PolicyNetwork network = network_of(config);
-  for (const auto& [name, text] :
-       exported_files(config, run, network, corners(network, config.fleet.task.observation())))
-    io::write_atomically(folder / name, text);
-}
-
 /// Samples of a lively flight; commands at all times of the driver, their voltages still 0.
 OnboardLog samples(double lasts_s) {
   rollout::FlyConfig config = rollout::read_fly_config(source_path("configs/fly/lively.toml"), {"precision=float"});
@@ -77,31 +65,45 @@ OnboardLog samples(double lasts_s) {
   return log;
 }
 
-OnboardLog flown_with(const FlownCheck& check, const ExportedC& c, OnboardLog log, const Wiring& wiring) {
-  const auto volts = replay(c, check.contract(), log, wiring).volts;
-  for (std::size_t i = 0; i < volts.size(); ++i)
-    log.commands[i].left_V = volts[i][0], log.commands[i].right_V = volts[i][1];
-  return log;
-}
+/// An exported policy that acts for 0.35 s.
+class FlownTest : public testing::Test {
+ protected:
+  FlownTest() {
+    rollout::FlyConfig config =
+        rollout::read_fly_config(source_path("configs/fly/escape.toml"), {"task.hand_back.distance_m=1e-9"});
+    config.actor = random_actor(config.fleet.task, 7);
+    for (const auto& [name, text] : exported_files(config, {"0123", "abcd", false, "escape"}))
+      folder_.write(name, text);
+    check_.emplace(folder_ / "");
+    exact_.emplace(folder_ / "", Build::exact);
+  }
 
-TEST(Flown, FindsEachMistakeAgain) {
-  const Folder folder;
-  write_export(folder / "", 7);
-  const FlownCheck check(folder / "");
-  const ExportedC exact(folder / "", Build::exact);
+  OnboardLog flown_with(OnboardLog log, const Wiring& wiring) const {
+    const auto volts = replay(*exact_, check_->contract(), log, wiring).volts;
+    for (std::size_t i = 0; i < volts.size(); ++i)
+      log.commands[i].left_V = volts[i][0], log.commands[i].right_V = volts[i][1];
+    return log;
+  }
+
+  Folder folder_;
+  std::optional<FlownCheck> check_;
+  std::optional<ExportedC> exact_;
+};
+
+TEST_F(FlownTest, FindsEachMistakeAgain) {
   const OnboardLog log = samples(0.5);
-  const Flown right = check.check(flown_with(check, exact, log, {}));
+  const Flown right = check_->check(flown_with(log, {}));
   EXPECT_TRUE(right.as_exported);
   EXPECT_EQ(right.share, 1);
   int number = 0, tried = 0, found = 0, silent = 0;
-  for (const Mistake& m : mistakes_of(check.contract(), exact, false)) {
+  for (const Mistake& m : mistakes_of(check_->contract(), *exact_, false)) {
     if (number++ % 8 != 0 && !test::full()) continue;  // each takes half a second
     std::vector<double> p = m.starts.empty() ? std::vector<double>() : m.starts.front();
     for (std::size_t k = 0; k < p.size(); ++k) p[k] += 0.7 * m.scales[k];  // not where the search begins
     Wiring wiring;
     m.make(wiring, p);
     if (wiring.build != Build::exact) continue;
-    const Flown flown = check.check(flown_with(check, exact, log, wiring));
+    const Flown flown = check_->check(flown_with(log, wiring));
     if (flown.as_exported) {
       ++silent;
       std::printf("%s changes nothing\n", m.id.c_str());
@@ -129,83 +131,67 @@ OnboardLog half_logged(OnboardLog log) {
   return log;
 }
 
-TEST(Flown, FindsMistakesWhereEverySecondSampleIsLost) {
-  const Folder folder;
-  write_export(folder / "", 7);
-  const FlownCheck check(folder / "");
-  const ExportedC exact(folder / "", Build::exact);
+TEST_F(FlownTest, FindsMistakesWhereEverySecondSampleIsLost) {
   OnboardLog log = samples(0.5);
   log.begin_s.reset();  // a random policy would make much of what was lost
-  const Flown right = check.check(half_logged(flown_with(check, exact, log, {})));
+  const Flown right = check_->check(half_logged(flown_with(log, {})));
   EXPECT_TRUE(right.as_exported) << right.share;
   EXPECT_GT(right.tolerance_V, 1e-3) << "what was lost";
-  for (const Mistake& m : mistakes_of(check.contract(), exact, false)) {
+  for (const Mistake& m : mistakes_of(check_->contract(), *exact_, false)) {
     if (m.id != "accel_sign" && m.id != "accel_sign_z") continue;
     Wiring wiring;
     m.make(wiring, {});
-    const Flown flown = check.check(half_logged(flown_with(check, exact, log, wiring)));
+    const Flown flown = check_->check(half_logged(flown_with(log, wiring)));
     ASSERT_EQ(flown.mistakes.size(), 1U) << m.id << " " << flown.unexplained;
     EXPECT_EQ(flown.mistakes[0].id, m.id);
   }
 }
 
-TEST(Flown, TakesLogsThatLackCommands) {
-  const Folder folder;
-  write_export(folder / "", 7);
-  const FlownCheck check(folder / "");
-  const ExportedC exact(folder / "", Build::exact);
-  const OnboardLog whole = flown_with(check, exact, samples(0.5), {});
+TEST_F(FlownTest, TakesLogsThatLackCommands) {
+  const OnboardLog whole = flown_with(samples(0.5), {});
   OnboardLog thin = whole, gap = whole;
   thin.commands.clear();
   for (std::size_t i = 0; i < whole.commands.size(); i += 5) thin.commands.push_back(whole.commands[i]);
   std::erase_if(gap.commands, [](const OnboardLog::Command& c) { return c.t_s > 0.1 && c.t_s < 0.25; });
-  EXPECT_EQ(check.check(thin).share, 1);
-  EXPECT_EQ(check.check(gap).share, 1);
+  EXPECT_EQ(check_->check(thin).share, 1);
+  EXPECT_EQ(check_->check(gap).share, 1);
 }
 
 // A sample that arrives 0.8 us after a control period belongs to the next one, where the log has all digits of times.
-TEST(Flown, TakesArrivalsAsPreciselyAsTheLogHasThem) {
-  const Folder folder;
-  write_export(folder / "", 7);
-  const FlownCheck check(folder / "");
-  const ExportedC exact(folder / "", Build::exact);
+TEST_F(FlownTest, TakesArrivalsAsPreciselyAsTheLogHasThem) {
   OnboardLog log = samples(0.3);
   const std::size_t at = log.imu.size() / 2;
-  const double tick_s = check.contract().control_s;
+  const double tick_s = check_->contract().control_s;
   log.imu[at].arrived_s = std::ceil(log.imu[at].arrived_s / tick_s) * tick_s + 8e-7;
   OnboardLog rounded = log;
   rounded.time_step_s = 2e-6;
-  EXPECT_NE(replay(exact, check.contract(), log, {}).volts, replay(exact, check.contract(), rounded, {}).volts);
+  EXPECT_NE(replay(*exact_, check_->contract(), log, {}).volts, replay(*exact_, check_->contract(), rounded, {}).volts);
 }
 
 // What no mistake explains, and a log that has what the policy got and gave.
-TEST(Flown, SaysWhereNothingExplainsIt) {
-  const Folder folder;
-  write_export(folder / "", 7);
-  const FlownCheck check(folder / "");
-  const ExportedC exact(folder / "", Build::exact);
+TEST_F(FlownTest, SaysWhereNothingExplainsIt) {
   OnboardLog log = samples(0.4);
-  const std::size_t seen = check.contract().observation.size();
-  for (std::size_t i = 0; i < seen + check.contract().action.size(); ++i) log.policy_numbers.push_back(i);
+  const std::size_t seen = check_->contract().observation.size();
+  for (std::size_t i = 0; i < seen + check_->contract().action.size(); ++i) log.policy_numbers.push_back(i);
   log.policy_steps.assign(log.policy_numbers.size(), 0);
   const auto logged = [&](const Wiring& wiring) {
-    OnboardLog to = flown_with(check, exact, log, wiring);
-    to.inferences = replay(exact, check.contract(), log, wiring).inferences;
+    OnboardLog to = flown_with(log, wiring);
+    to.inferences = replay(*exact_, check_->contract(), log, wiring).inferences;
     return to;
   };
   OnboardLog unknown = logged({});
   unknown.begin_s.reset(), unknown.mode.reset();
-  const Flown estimated = check.check(unknown);
+  const Flown estimated = check_->check(unknown);
   EXPECT_TRUE(estimated.as_exported);
   EXPECT_NEAR(estimated.begin_s.value_or(0), 0.2, 1e-9);
   Wiring order;  // four numbers turned round, of three parts
   for (std::size_t i = 0; i < seen; ++i) order.order.push_back(static_cast<int>(i));
   std::swap(order.order[1], order.order[7]);
   std::swap(order.order[4], order.order[9]);
-  const Flown observation = check.check(logged(order));
+  const Flown observation = check_->check(logged(order));
   EXPECT_TRUE(observation.unexplained.starts_with("the observation's y_error, from 0.2")) << observation.unexplained;
   log.policy_numbers.clear(), log.policy_steps.clear();
-  const Flown silent = check.check(logged(order));
+  const Flown silent = check_->check(logged(order));
   ASSERT_EQ(silent.mistakes.size(), 1U) << "a log that has no observation";
   EXPECT_EQ(silent.mistakes[0].id, "another_policy");
 }
