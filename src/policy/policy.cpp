@@ -1,9 +1,8 @@
 #include "policy/policy.hpp"
 
-#include <dlfcn.h>
-
 #include <algorithm>
 #include <cctype>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -11,6 +10,7 @@
 #include "io/files.hpp"
 #include "io/plugin.hpp"
 #include "io/run_program.hpp"
+#include "io/shared_library.hpp"
 #include "io/temporary_folder.hpp"
 #include "policy/torch_script.hpp"
 
@@ -71,11 +71,8 @@ std::string first_error(const fs::path& header, const std::string& complaints) {
 class Header : public Policy {
  public:
   using Step = void (*)(const float*, float*);
-  Header(void* library, int observations, int actions, Step step)
-      : Policy(observations, actions), library_(library), step_(step) {}
-  ~Header() override { dlclose(library_); }
-  Header(const Header&) = delete;
-  Header& operator=(const Header&) = delete;
+  Header(io::SharedLibrary library, int observations, int actions, Step step)
+      : Policy(observations, actions), library_(std::move(library)), step_(step) {}
 
   void act(std::size_t count, const float* observation, float* action) const override {
     for (std::size_t i = 0; i < count; ++i)
@@ -84,7 +81,7 @@ class Header : public Policy {
   }
 
  private:
-  void* library_;
+  io::SharedLibrary library_;
   Step step_;
 };
 
@@ -98,22 +95,24 @@ std::unique_ptr<const Policy> load_header(const fs::path& path, int observations
   if (!complaints.empty())
     throw io::InputError(first_error(header, complaints) + "; accepted: a C header that cc compiles");
 
-  void* loaded = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (loaded == nullptr) {
-    std::string why = dlerror();
-    if (why.starts_with(library.string() + ": ")) why.erase(0, library.string().size() + 2);
-    refuse_header(header, "cannot be loaded: " + why, "a header that defines all it calls");
+  std::optional<io::SharedLibrary> loaded;
+  try {
+    loaded.emplace(library);
+  } catch (const std::runtime_error& e) {
+    refuse_header(header, std::string("cannot be loaded: ") + e.what(), "a header that defines all it calls");
   }
-  const auto symbol = [&](const char* name) { return dlsym(loaded, (prefix + name).c_str()); };
+  const auto symbol = [&, &from = *loaded](const char* name) { return from.symbol((prefix + name).c_str()); };
   const auto number = [&](const char* name) { return *static_cast<const int*>(symbol(name)); };
-  auto policy = std::make_unique<Header>(loaded, number("_loaded_observations"), number("_loaded_actions"),
-                                         reinterpret_cast<Header::Step>(symbol("_loaded_step")));
+  const int has_observations = number("_loaded_observations"), has_actions = number("_loaded_actions");
+  const auto step = reinterpret_cast<Header::Step>(symbol("_loaded_step"));
+  const auto selftest = reinterpret_cast<int (*)()>(symbol("_loaded_selftest"));
+  auto policy = std::make_unique<Header>(std::move(*loaded), has_observations, has_actions, step);
   if (policy->observations() != observations || policy->actions() != actions)
     refuse_header(header,
                   "has " + std::to_string(policy->observations()) + " inputs and " + std::to_string(policy->actions()) +
                       " outputs",
                   std::to_string(observations) + " and " + std::to_string(actions) + ", as the task has");
-  const int failed = reinterpret_cast<int (*)()>(symbol("_loaded_selftest"))();
+  const int failed = selftest();
   if (failed != 0)
     refuse_header(header, "fails its self-test: " + std::to_string(failed), "flappy_policy_selftest() of 0");
   return policy;

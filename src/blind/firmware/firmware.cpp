@@ -1,7 +1,5 @@
 #include "blind/firmware/firmware.hpp"
 
-#include <dlfcn.h>
-
 #include <algorithm>
 #include <sstream>
 #include <system_error>
@@ -9,6 +7,7 @@
 #include "blind/firmware/embedded.hpp"
 #include "io/files.hpp"
 #include "io/run_program.hpp"
+#include "io/shared_library.hpp"
 #include "io/temporary_folder.hpp"
 
 namespace flappy::blind {
@@ -25,46 +24,48 @@ std::vector<std::string> names_in(const std::string& text) {
   return names;
 }
 
+io::SharedLibrary compiled(const fs::path& exported, const std::string& mistake) {
+  const io::TemporaryFolder work;
+  const fs::path source = work / "firmware.c", library = work / "firmware.so";
+  const fs::path policy = exported / (mistake == "int8" ? "flappy_policy_int8.h" : "flappy_policy.h");
+  for (const fs::path& header : {policy, exported / "flappy_controller.h"})
+    if (!fs::exists(header))
+      throw io::InputError(header.string() + ": is not there; accepted: a folder that flappy-export wrote" +
+                           (mistake == "int8" ? " with --int8" : ""));
+  io::write_atomically(source, "#include \"" + fs::absolute(policy).string() + "\"\n#include \"" +
+                                   fs::absolute(exported / "flappy_controller.h").string() + "\"\n" +
+                                   std::string(kFirmware.at("firmware.h")));
+  const bool contracted = mistake == "contracted";
+  std::vector<std::string> command = {contracted ? "clang" : "cc", "-O2", "-shared", "-fPIC",
+                                      "-DFIRMWARE_MISTAKE=firmware_" + mistake};
+  if (contracted) command.insert(command.end(), {"-ffp-contract=fast", "-march=native"});
+  command.insert(command.end(), {source.string(), "-o", library.string(), "-lm"});
+  try {
+    if (const io::Finished done = io::run(command); done.exit_code != 0)
+      throw io::InputError(exported.string() + ": does not compile: " + done.err.substr(0, done.err.find('\n')) +
+                           "; accepted: headers that flappy-export wrote");
+  } catch (const std::system_error& e) {
+    throw io::InputError(command.front() + ": " + e.code().message() + "; accepted: a compiler of this name in PATH");
+  }
+  try {
+    return io::SharedLibrary(library);
+  } catch (const std::runtime_error& e) {
+    throw io::InputError(exported.string() + ": cannot be loaded: " + e.what() +
+                         "; accepted: headers for this processor");
+  }
+}
+
 class Firmware final : public OnBoard {
  public:
   Firmware(const fs::path& exported, const std::string& mistake, const FirmwareSensors& sensors, double begin_s)
-      : sensors_(sensors), begin_s_(begin_s) {
-    const io::TemporaryFolder work;
-    const fs::path source = work / "firmware.c", library = work / "firmware.so";
-    const fs::path policy = exported / (mistake == "int8" ? "flappy_policy_int8.h" : "flappy_policy.h");
-    for (const fs::path& header : {policy, exported / "flappy_controller.h"})
-      if (!fs::exists(header))
-        throw io::InputError(header.string() + ": is not there; accepted: a folder that flappy-export wrote" +
-                             (mistake == "int8" ? " with --int8" : ""));
-    io::write_atomically(source, "#include \"" + fs::absolute(policy).string() + "\"\n#include \"" +
-                                     fs::absolute(exported / "flappy_controller.h").string() + "\"\n" +
-                                     std::string(kFirmware.at("firmware.h")));
-    const bool contracted = mistake == "contracted";
-    std::vector<std::string> command = {contracted ? "clang" : "cc", "-O2", "-shared", "-fPIC",
-                                        "-DFIRMWARE_MISTAKE=firmware_" + mistake};
-    if (contracted) command.insert(command.end(), {"-ffp-contract=fast", "-march=native"});
-    command.insert(command.end(), {source.string(), "-o", library.string(), "-lm"});
-    try {
-      if (const io::Finished done = io::run(command); done.exit_code != 0)
-        throw io::InputError(exported.string() + ": does not compile: " + done.err.substr(0, done.err.find('\n')) +
-                             "; accepted: headers that flappy-export wrote");
-    } catch (const std::system_error& e) {
-      throw io::InputError(command.front() + ": " + e.code().message() + "; accepted: a compiler of this name in PATH");
-    }
-    library_ = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (library_ == nullptr) throw io::InputError(std::string(dlerror()) + "; accepted: headers for this processor");
-    const auto take = [&](auto& to, const char* name) {
-      to = reinterpret_cast<std::remove_reference_t<decltype(to)>>(dlsym(library_, name));
-    };
+      : sensors_(sensors), begin_s_(begin_s), library_(compiled(exported, mistake)) {
+    const auto take = [&]<class F>(F*& to, const char* name) { to = library_.function<F>(name); };
     take(start_, "firmware_start");
     take(go_, "firmware_go");
     take(imu_, "firmware_take_imu");
     take(pose_, "firmware_take_pose");
     take(volts_, "firmware_volts");
   }
-  ~Firmware() override { dlclose(library_); }
-  Firmware(const Firmware&) = delete;
-  Firmware& operator=(const Firmware&) = delete;
 
   void start(double now_s, const Pose& pose) override {
     start_s_ = now_s;
@@ -90,9 +91,9 @@ class Firmware final : public OnBoard {
  private:
   const FirmwareSensors sensors_;
   const double begin_s_;
+  const io::SharedLibrary library_;
   double start_s_ = 0;
   bool went_ = false;
-  void* library_ = nullptr;
   void (*start_)(double, const double*);
   void (*go_)();
   void (*imu_)(double, const double*, const double*);

@@ -1,7 +1,5 @@
 #include "deploy/flown/exported_c.hpp"
 
-#include <dlfcn.h>
-
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -110,6 +108,27 @@ std::string source_of(const fs::path& folder, Build build, const std::string& co
   return read_header(folder / (build == Build::int8 ? "flappy_policy_int8.h" : "flappy_policy.h")) + text + kWrapper;
 }
 
+io::SharedLibrary compiled(const fs::path& folder, Build build, const std::string& controller) {
+  const io::TemporaryFolder work;
+  const fs::path source = work / "flown.c", library = work / "flown.so";
+  io::write_atomically(source, source_of(folder, build, controller));
+  std::vector<std::string> command = {build == Build::contracted ? "clang" : "cc", "-O1", "-shared", "-fPIC"};
+  if (build == Build::contracted) command.insert(command.end(), {"-ffp-contract=fast", "-march=native"});
+  command.insert(command.end(), {source.string(), "-o", library.string()});
+  try {
+    if (const io::Finished done = io::run(command); done.exit_code != 0)
+      refuse(folder, "does not compile: " + done.err.substr(0, done.err.find('\n')),
+             "headers that flappy-export wrote");
+  } catch (const std::system_error& e) {
+    refuse(folder, "cannot be compiled: " + command.front() + ": " + e.code().message(), "a compiler of this name");
+  }
+  try {
+    return io::SharedLibrary(library);
+  } catch (const std::runtime_error& e) {
+    refuse(folder, std::string("cannot be loaded: ") + e.what(), "headers for this processor");
+  }
+}
+
 }  // namespace
 
 Contract read_contract(const fs::path& folder) {
@@ -153,26 +172,12 @@ Contract read_contract(const fs::path& folder) {
   }
 }
 
-ExportedC::ExportedC(const fs::path& folder, Build build) {
-  const std::string controller = read_header(folder / "flappy_controller.h");
-  const io::TemporaryFolder work;
-  const fs::path source = work / "flown.c", library = work / "flown.so";
-  io::write_atomically(source, source_of(folder, build, controller));
-  std::vector<std::string> command = {build == Build::contracted ? "clang" : "cc", "-O1", "-shared", "-fPIC"};
-  if (build == Build::contracted) command.insert(command.end(), {"-ffp-contract=fast", "-march=native"});
-  command.insert(command.end(), {source.string(), "-o", library.string()});
-  try {
-    if (const io::Finished done = io::run(command); done.exit_code != 0)
-      refuse(folder, "does not compile: " + done.err.substr(0, done.err.find('\n')),
-             "headers that flappy-export wrote");
-  } catch (const std::system_error& e) {
-    refuse(folder, "cannot be compiled: " + command.front() + ": " + e.code().message(), "a compiler of this name");
-  }
-  library_ = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (library_ == nullptr) refuse(folder, std::string("cannot be loaded: ") + dlerror(), "headers for this processor");
-  const auto take = [&](auto& to, const char* name) {
-    to = reinterpret_cast<std::remove_reference_t<decltype(to)>>(dlsym(library_, name));
-  };
+ExportedC::ExportedC(const fs::path& folder, Build build)
+    : ExportedC(folder, build, read_header(folder / "flappy_controller.h")) {}
+
+ExportedC::ExportedC(const fs::path& folder, Build build, const std::string& controller)
+    : library_(compiled(folder, build, controller)) {
+  const auto take = [&]<class F>(F*& to, const char* name) { to = library_.function<F>(name); };
   take(start, "flown_start");
   take(policy_crc32, "flown_policy_crc32");
   take(controller_crc32, "flown_controller_crc32");
@@ -191,18 +196,14 @@ ExportedC::ExportedC(const fs::path& folder, Build build) {
   take(act, "flown_act");
   take(steer, "flown_steer");
   take(drive, "flown_drive");
-  if (const int failed = reinterpret_cast<int (*)()>(dlsym(library_, "flown_selftests"))(); failed != 0)
+  if (const int failed = library_.function<int()>("flown_selftests")(); failed != 0)
     refuse(folder / (failed == 1 ? "flappy_policy.h" : "flappy_controller.h"), "fails its self-test",
            "a header as flappy-export wrote it");
-  float* next = reinterpret_cast<float* (*)()>(dlsym(library_, "flown_constants"))();
+  float* next = library_.function<float*()>("flown_constants")();
   for (const auto& [name, count] : names_of_constants(controller))
     for (std::size_t i = 0; i < count; ++i) constants_[name].push_back(next++);
 }
 
-ExportedC::~ExportedC() { dlclose(library_); }
-
-std::size_t ExportedC::state_bytes() const {
-  return reinterpret_cast<unsigned (*)()>(dlsym(library_, "flown_state_bytes"))();
-}
+std::size_t ExportedC::state_bytes() const { return library_.function<unsigned()>("flown_state_bytes")(); }
 
 }  // namespace flappy::deploy

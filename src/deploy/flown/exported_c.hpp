@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "io/shared_library.hpp"
+
 namespace flappy::deploy {
 
 /// How the headers are compiled.
@@ -43,7 +45,6 @@ class ExportedC {
   using Pose = std::array<float, 7>;  ///< position in m, attitude as w, x, y, z
   /// io::InputError where a header is missing or does not compile, or the compiler is missing.
   ExportedC(const std::filesystem::path& folder, Build build);
-  ~ExportedC();
   ExportedC(const ExportedC&) = delete;
   ExportedC& operator=(const ExportedC&) = delete;
 
@@ -72,7 +73,8 @@ class ExportedC {
   void (*drive)(void* state, const float* input, float* volts);  ///< left, right; with this input
 
  private:
-  void* library_ = nullptr;
+  ExportedC(const std::filesystem::path& folder, Build build, const std::string& controller);
+  const io::SharedLibrary library_;
   std::map<std::string, std::vector<float*>> constants_;
 };
 

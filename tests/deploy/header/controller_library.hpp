@@ -1,10 +1,12 @@
 // An exported controller, compiled on the spot, as the tests call it.
 #pragma once
 
-#include <dlfcn.h>
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "io/run_program.hpp"
+#include "io/shared_library.hpp"
 #include "rollout/fly_fixture.hpp"
 
 namespace flappy::deploy {
@@ -94,19 +96,15 @@ class ControllerLibrary {
     options.insert(options.end(), {"-std=gnu99", "-shared", "-fPIC", "-w", source, "-o", library});
     const io::Finished finished = io::run(options);
     if (finished.exit_code != 0) throw std::runtime_error(finished.err);
-    library_ = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (library_ == nullptr) throw std::runtime_error(dlerror());
+    library_.emplace(library);
   }
-  ~ControllerLibrary() { dlclose(library_); }
-  ControllerLibrary(const ControllerLibrary&) = delete;
-  ControllerLibrary& operator=(const ControllerLibrary&) = delete;
 
   const std::string& name() const { return name_; }
   template <class F>
   F* function(const char* name) const {
-    return reinterpret_cast<F*>(dlsym(library_, name));
+    return library_->function<F>(name);
   }
-  std::uint32_t number(const char* name) const { return *static_cast<const std::uint32_t*>(dlsym(library_, name)); }
+  std::uint32_t number(const char* name) const { return *static_cast<const std::uint32_t*>(library_->symbol(name)); }
 
  private:
   static std::string join(const std::vector<std::string>& words) {
@@ -116,7 +114,7 @@ class ControllerLibrary {
   }
   flight::Folder folder_;
   std::string name_;
-  void* library_ = nullptr;
+  std::optional<io::SharedLibrary> library_;
 };
 
 /// One controller in a library.
