@@ -11,9 +11,9 @@ from . import _core
 
 
 class Policy:
-    """What acts upon observations: a run folder of `flappy-train`, a C header (.h), which is compiled, or TorchScript (.pt).
+    """What acts upon observations: a run folder of `flappy-train`, a C header (.h), which is compiled, ONNX (.onnx) or TorchScript (.pt).
 
-    TorchScript is read by the torch of this Python, which is imported for it. `policy(observation)`: float32 (n, observations) or
+    These two are read by the onnxruntime or torch of this Python, which is imported for it. `policy(observation)`: float32 (n, observations) or
     (observations,), raw and in SI units, to float32 of as many rows: what is added to the controller's output or, without one, set: V
     and fractions of a beat. `env.unwrapped.to_action(...)` makes an action of it.
 
@@ -24,6 +24,12 @@ class Policy:
     def __init__(self, path: str | Path) -> None:
         path = Path(path)
         self._script: Any = None
+        self._session: Any = None
+        if path.suffix == ".onnx":
+            from onnxruntime import InferenceSession
+
+            self._session = InferenceSession(str(path), providers=["CPUExecutionProvider"])
+            return
         if path.suffix == ".pt":
             from torch import jit
 
@@ -42,8 +48,11 @@ class Policy:
     def __call__(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """Acts."""
         rows = np.atleast_2d(np.asarray(observation, np.float32))
-        if self._script is None:
-            action: NDArray[np.float32] = self._own.act(rows)
+        action: NDArray[np.float32]
+        if self._session is not None:
+            action = self._session.run(None, {self._session.get_inputs()[0].name: rows})[0]
+        elif self._script is None:
+            action = self._own.act(rows)
         else:
             import torch
 

@@ -270,6 +270,27 @@ def test_a_header_acts(tmp_path):
         policy(np.zeros(4))
 
 
+def test_an_onnx_file_acts(tmp_path):
+    pytest.importorskip("onnxruntime")
+
+    def field(number: int, value: int | str | bytes) -> bytes:  # of protobuf's wire format, for numbers and sizes below 128
+        if isinstance(value, int):
+            return bytes([number << 3, value])
+        value = value.encode() if isinstance(value, str) else value
+        return bytes([number << 3 | 2, len(value)]) + value
+
+    def side(name: str) -> bytes:  # float[n][3]
+        shape = field(1, field(2, "n")) + field(1, field(1, 3))
+        return field(1, name) + field(2, field(1, field(1, 1) + field(2, shape)))
+
+    negative = field(1, "observation") + field(2, "action") + field(4, "Neg")
+    graph = field(1, negative) + field(2, "policy") + field(11, side("observation")) + field(12, side("action"))
+    (tmp_path / "p.onnx").write_bytes(field(1, 8) + field(8, field(2, 17)) + field(7, graph))
+    policy = flappy.Policy(tmp_path / "p.onnx")
+    assert policy(np.array([1, 2, 3], np.float32)).tolist() == [-1, -2, -3]
+    assert policy(np.zeros((2, 3))).shape == (2, 3)
+
+
 def test_diagnosis_and_identification_refuse(tmp_path):
     with pytest.raises(flappy.InputError, match="nowhere"):
         flappy.diagnose("vehicles/hummingbird_nominal.toml", [str(tmp_path / "nowhere")])

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <nlohmann/json.hpp>
 
+#include "io/refuse.hpp"
 #include "io/schema.hpp"
 #include "io/sha256.hpp"
 #include "learn/train_config.hpp"
@@ -12,11 +13,8 @@ namespace flappy::learn {
 namespace {
 
 namespace fs = std::filesystem;
+using io::refuse;
 using Json = nlohmann::ordered_json;
-
-[[noreturn]] void refuse(const fs::path& path, const std::string& what, const std::string& accepted) {
-  throw io::InputError(path.string() + ": " + what + "; accepted: " + accepted);
-}
 
 /// Calls `read` with the file's JSON. Turns JSON errors into an io::InputError of one line.
 template <class Read>

@@ -5,16 +5,14 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "io/refuse.hpp"
 #include "io/schema.hpp"
 
 namespace flappy::policy {
 namespace {
 
+using io::refuse;
 using Json = nlohmann::ordered_json;
-
-[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& what, const std::string& accepted) {
-  throw io::InputError(path.string() + ": " + what + "; accepted: " + accepted);
-}
 
 }  // namespace
 

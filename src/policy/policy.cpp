@@ -9,15 +9,18 @@
 
 #include "io/files.hpp"
 #include "io/plugin.hpp"
+#include "io/refuse.hpp"
 #include "io/run_program.hpp"
 #include "io/shared_library.hpp"
 #include "io/temporary_folder.hpp"
+#include "policy/onnx.hpp"
 #include "policy/torch_script.hpp"
 
 namespace flappy::policy {
 namespace {
 
 namespace fs = std::filesystem;
+using io::refuse;
 
 /// C code that is compiled after the header. It wraps the header's names, so that they may be static, inline or macros.
 constexpr const char* kWrapper = R"(#if !defined FLAPPY_POLICY_OBS || !defined FLAPPY_POLICY_ACT
@@ -27,10 +30,6 @@ const int flappy_loaded_observations = FLAPPY_POLICY_OBS, flappy_loaded_actions 
 void flappy_loaded_step(const float *observation, float *action) { flappy_policy_step(observation, action); }
 int flappy_loaded_selftest(void) { return flappy_policy_selftest(); }
 )";
-
-[[noreturn]] void refuse_header(const fs::path& header, const std::string& what, const std::string& accepted) {
-  throw io::InputError(header.string() + ": " + what + "; accepted: " + accepted);
-}
 
 bool is_of_name(char c) { return c == '_' || std::isalnum(static_cast<unsigned char>(c)) != 0; }
 
@@ -54,7 +53,7 @@ std::string compile(const fs::path& header, const fs::path& source, const fs::pa
                                            source.string(), "-o", library.string(), "-lm"});
     return finished.exit_code == 0 ? "" : finished.err + "\n";
   } catch (const std::system_error& e) {
-    refuse_header(header, "cannot be compiled: cc: " + e.code().message(), "a C compiler of this name in PATH");
+    refuse(header, "cannot be compiled: cc: " + e.code().message(), "a C compiler of this name in PATH");
   }
 }
 
@@ -99,7 +98,7 @@ std::unique_ptr<const Policy> load_header(const fs::path& path, int observations
   try {
     loaded.emplace(library);
   } catch (const std::runtime_error& e) {
-    refuse_header(header, std::string("cannot be loaded: ") + e.what(), "a header that defines all it calls");
+    refuse(header, std::string("cannot be loaded: ") + e.what(), "a header that defines all it calls");
   }
   const auto symbol = [&, &from = *loaded](const char* name) { return from.symbol((prefix + name).c_str()); };
   const auto number = [&](const char* name) { return *static_cast<const int*>(symbol(name)); };
@@ -108,13 +107,12 @@ std::unique_ptr<const Policy> load_header(const fs::path& path, int observations
   const auto selftest = reinterpret_cast<int (*)()>(symbol("_loaded_selftest"));
   auto policy = std::make_unique<Header>(std::move(*loaded), has_observations, has_actions, step);
   if (policy->observations() != observations || policy->actions() != actions)
-    refuse_header(header,
-                  "has " + std::to_string(policy->observations()) + " inputs and " + std::to_string(policy->actions()) +
-                      " outputs",
-                  std::to_string(observations) + " and " + std::to_string(actions) + ", as the task has");
+    refuse(header,
+           "has " + std::to_string(policy->observations()) + " inputs and " + std::to_string(policy->actions()) +
+               " outputs",
+           std::to_string(observations) + " and " + std::to_string(actions) + ", as the task has");
   const int failed = selftest();
-  if (failed != 0)
-    refuse_header(header, "fails its self-test: " + std::to_string(failed), "flappy_policy_selftest() of 0");
+  if (failed != 0) refuse(header, "fails its self-test: " + std::to_string(failed), "flappy_policy_selftest() of 0");
   return policy;
 }
 
@@ -146,8 +144,14 @@ std::string with_prefix(std::string_view text, std::string_view prefix) {
 
 std::unique_ptr<const Policy> load_policy(const fs::path& path, int observations, int actions) {
   if (path.extension() == ".pt") return load_torch_script(path, observations, actions);
+  if (path.extension() == ".onnx") return load_onnx(path, observations, actions);
   if (path.extension() == ".h") return load_header(path, observations, actions);
-  refuse_header(path, "is no policy", "a TorchScript file (.pt) or a C header (.h)");
+  refuse(path, "is no policy", "a TorchScript file (.pt), an ONNX file (.onnx) or a C header (.h)");
+}
+
+bool is_policy_file(const fs::path& path) {
+  const fs::path kind = path.extension();
+  return kind == ".pt" || kind == ".onnx" || kind == ".h";
 }
 
 bool reads_torch_script() { return io::has_plugin(kPlugin); }
@@ -160,8 +164,8 @@ std::string torch_script(const PolicyNetwork& network, const std::string& contra
 std::unique_ptr<const Policy> load_torch_script(const fs::path& path, int observations, int actions) {
   if (reads_torch_script()) return torch().load(path, observations, actions);
   io::read_text(path);
-  refuse_header(path, "cannot be read by this build, which has no LibTorch",
-                "a C header (.h), or a build with libtorch-dev installed");
+  refuse(path, "cannot be read by this build, which has no LibTorch",
+         "a C header (.h), or a build with libtorch-dev installed");
 }
 
 }  // namespace flappy::policy

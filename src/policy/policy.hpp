@@ -1,4 +1,4 @@
-// Policies in files of other formats: TorchScript, or an exported C header that is compiled when it is loaded.
+// Policies in files of other formats: TorchScript, ONNX, or an exported C header that is compiled when it is loaded.
 #pragma once
 
 #include <cstddef>
@@ -27,14 +27,19 @@ class Policy {
   int observations_, actions_;
 };
 
-/// Loads a TorchScript file (.pt) whose forward(float[n][observations]) gives float[n][actions], or a C header (.h)
-/// that defines
+/// Loads a TorchScript file (.pt) whose forward(float[n][observations]) gives float[n][actions], an ONNX file (.onnx,
+/// load_onnx()) or a C header (.h) that defines
 ///   FLAPPY_POLICY_OBS, FLAPPY_POLICY_ACT
 ///   void flappy_policy_step(const float obs[FLAPPY_POLICY_OBS], float action[FLAPPY_POLICY_ACT])
 ///   int flappy_policy_selftest(void)    0: passed; it is run on loading
-/// or these names with another prefix than "flappy". Throws io::InputError, one line, if the file is of neither kind,
+/// or these names with another prefix than "flappy". Throws io::InputError, one line, if the file is of no such kind,
 /// has other sizes, does not compile or fails its self-test.
 std::unique_ptr<const Policy> load_policy(const std::filesystem::path& path, int observations, int actions);
+
+/// Whether load_policy() reads files with this one's ending.
+bool is_policy_file(const std::filesystem::path& path);
+/// Those and actors, for messages.
+inline constexpr const char* kPolicyFiles = "an actor (.json), TorchScript (.pt), ONNX (.onnx) or a C header (.h)";
 
 inline constexpr std::string_view kPrefix = "flappy";
 

@@ -98,10 +98,10 @@ TEST(HeaderPolicy, NeedsACompiler) {
 
 TEST(Policy, SaysWhatItReads) {
   const Folder folder;
-  const std::string name = folder.write("p.onnx", "");
+  const std::string name = folder.write("p.tflite", "");
   EXPECT_EQ(message([&] { policy::load_policy(name, 3, 2); }),
-            name + ": is no policy; accepted: a TorchScript file (.pt) or a C header (.h)");
-  for (const char* gone : {"gone.h", "gone.pt"})
+            name + ": is no policy; accepted: a TorchScript file (.pt), an ONNX file (.onnx) or a C header (.h)");
+  for (const char* gone : {"gone.h", "gone.pt", "gone.onnx"})
     EXPECT_EQ(message([&] { policy::load_policy(folder / gone, 3, 2); }),
               std::string(folder / gone) + ": cannot be read: No such file or directory");
 }

@@ -70,7 +70,7 @@ expect_keys(${WORK}/escapes.json escapes=NUMBER success_rate=NUMBER success_low=
 if(NOT EXISTS ${WORK}/escapes/escape_2/imu.csv)
   message(SEND_ERROR "no escape_2/imu.csv")
 endif()
-expect_refused("${WORK}/note.txt: is no policy; accepted: an actor (.json), TorchScript (.pt) or a C header (.h)"
+expect_refused("${WORK}/note.txt: is no policy; accepted: an actor (.json), TorchScript (.pt), ONNX (.onnx) or a C header (.h)"
   ${escape} --policy ${WORK}/note.txt)
 expect_refused("${SOURCE}/configs/fly/hover.toml: is nothing that this robot can fly; accepted: a PID at 500 Hz, a task with a goal that stands still and a success"
   ${escape} --policy ${WORK}/policy.h --config ${SOURCE}/configs/fly/hover.toml)

@@ -140,7 +140,7 @@ expect_equal("stopped" "${stopped}" ON)
 
 # ---- what is refused
 
-set(kinds "a run folder, an actor (.json), TorchScript (.pt) or a C header (.h)")
+set(kinds "a run folder, an actor (.json), TorchScript (.pt), ONNX (.onnx) or a C header (.h)")
 expect_refused("${WORK}/none.h: cannot be read: No such file or directory" ${WORK}/none.h)
 file(MAKE_DIRECTORY ${WORK}/empty)
 expect_refused("${WORK}/empty: holds no config/fly.toml; accepted: ${kinds}" ${WORK}/empty)

@@ -30,6 +30,15 @@ if(TORCH)
 else()
   expect_match("stdout" "${out}" "policy.pt is not written: this build has no LibTorch\n")
 endif()
+if(ONNX)
+  list(APPEND expected policy.onnx)
+else()
+  expect_match("stdout" "${out}" "policy.onnx is not written: this build has no ONNX library\n")
+endif()
+if(RUNTIME)
+  expect_match("stdout" "${out}" "onnxruntime [0-9.]+ differs by at most, % of an output's range: amplitude [0-9.e-]+ ")
+endif()
+list(SORT expected)
 expect_equal("files" "${left}" "${expected}")
 
 # the same bytes again, elsewhere, of a run that lies elsewhere and was not trained anew; no date, no path
@@ -56,6 +65,12 @@ endfunction()
 flown(of_run ${WORK}/run)
 flown(of_header ${WORK}/out/flappy_policy.h --config ${WORK}/run/config/fly.toml)
 expect_equal("flights of the header" "${of_header}" "${of_run}")
+if(RUNTIME)  # sums in another order: the same success, not the same bits
+  flown(of_onnx ${WORK}/out/policy.onnx --config ${WORK}/run/config/fly.toml)
+  string(REGEX REPLACE " .*" "" rate_of_run "${of_run}")
+  string(REGEX REPLACE " .*" "" rate_of_onnx "${of_onnx}")
+  expect_equal("success of policy.onnx" "${rate_of_onnx}" "${rate_of_run}")
+endif()
 
 # ---- two policies in one program: each with a prefix of its own
 

@@ -54,14 +54,13 @@ double angle(double cosine) { return std::acos(std::max(-1.0, cosine)); }
 
 }  // namespace
 
-EscapeRules read_escape_rules(const fs::path& policy, const fs::path& config_file) {
-  const std::string kind = policy.extension().string();
-  io::read_text(policy);  // throws an error with the file's name
-  if (kind != ".json" && kind != ".pt" && kind != ".h")
-    throw io::InputError(policy.string() +
-                         ": is no policy; accepted: an actor (.json), TorchScript (.pt) or a C header (.h)");
+EscapeRules read_escape_rules(const fs::path& policy_file, const fs::path& config_file) {
+  const std::string kind = policy_file.extension().string();
+  io::read_text(policy_file);  // throws an error with the file's name
+  if (kind != ".json" && !policy::is_policy_file(policy_file))
+    throw io::InputError(policy_file.string() + ": is no policy; accepted: " + policy::kPolicyFiles);
   std::vector<std::string> overrides;
-  if (kind == ".json") overrides.push_back("actor=" + io::toml_string(fs::absolute(policy).string()));
+  if (kind == ".json") overrides.push_back("actor=" + io::toml_string(fs::absolute(policy_file).string()));
   const rollout::FlyConfig config = rollout::read_fly_config(config_file, overrides);
   const flight::FleetOptions& fleet = config.fleet;
   const bool sees_wings = fleet.task.parts >> static_cast<int>(flight::Part::wings) & 1;
@@ -71,7 +70,7 @@ EscapeRules read_escape_rules(const fs::path& policy, const fs::path& config_fil
                          ": is nothing that this robot can fly; accepted: a PID at 500 Hz, a task with a goal "
                          "that stands still and a success");
   const flight::FlightConstants k = flight::flight_constants(fleet);
-  return {fleet.task, k.task, k.controller.of<flight::PidController>(), policy_of(policy, config)};
+  return {fleet.task, k.task, k.controller.of<flight::PidController>(), policy_of(policy_file, config)};
 }
 
 EscapeRules hover_rules(EscapeRules r) {

@@ -9,9 +9,9 @@
 
 namespace flappy::blind {
 
-/// `policy`: an actor, TorchScript or a C header. `config`: the configuration of flappy-fly that it was trained with. Throws InputError
+/// `policy_file`: one of policy::kPolicyFiles. `config`: the configuration of flappy-fly that it was trained with. Throws InputError
 /// if the policy cannot be read, or a blind robot cannot fly the configuration.
-EscapeRules read_escape_rules(const std::filesystem::path& policy, const std::filesystem::path& config);
+EscapeRules read_escape_rules(const std::filesystem::path& policy_file, const std::filesystem::path& config);
 
 /// Replaces the escape by hover at its goal without a policy, to be judged by the bounds that hold after the escape.
 EscapeRules hover_rules(EscapeRules rules);

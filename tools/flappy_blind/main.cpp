@@ -182,7 +182,7 @@ int main(int argc, char** argv) {
   io::Command escape = program.app().command("escape", "flies a policy's manoeuvre many times over");
   blind::EscapeOptions escapes{.robot = {}, .policy = {}, .config = io::config_path("fly/escape.toml")};
   blind::add_robot_options(escape, escapes.robot);
-  escape.option("--policy", escapes.policy, "an actor (.json), TorchScript (.pt) or a C header (.h)").required();
+  escape.option("--policy", escapes.policy, policy::kPolicyFiles).required();
   escape.option("--config", escapes.config, "task and controller that it was trained with").shows_default();
   escape.option("--draw", escapes.draw, "which of the seed's robots: that of fly, in its --json")
       .range(std::uint64_t{0}, blind::kTries - 1)

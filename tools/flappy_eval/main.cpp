@@ -31,7 +31,7 @@ using Number = std::optional<double>;
 constexpr std::size_t kNominalFlights = 20;
 constexpr double kHummingbird_s = 0.25;  // duration of the bird's escape, from the study of the manoeuvre
 constexpr double kOptimum_s = 0.248;     // direct optimisation on the exact physics, without noise
-constexpr const char* kPolicies = "a run folder, an actor (.json), TorchScript (.pt) or a C header (.h)";
+const std::string kPolicies = std::string("a run folder, ") + policy::kPolicyFiles;
 
 struct Request {
   std::string policy, config, vehicle, task, stream = "test";
@@ -396,7 +396,7 @@ void evaluate(Request request, io::Program& program) {
   std::error_code ignored;
   if (!fs::is_directory(path, ignored)) {
     io::read_text(path);  // throws where the file is missing
-    if (kind != ".json" && kind != ".pt" && kind != ".h")
+    if (kind != ".json" && !policy::is_policy_file(path))
       throw io::InputError(request.policy + ": is no policy; accepted: " + kPolicies);
   }
   FlyConfig config = read_config(request);
@@ -408,7 +408,7 @@ void evaluate(Request request, io::Program& program) {
   if (program.writes()) config.watch = server::telemetry_of(config.dds, config.fleet.sensors);
   const flight::Task& task = config.fleet.task;
   std::unique_ptr<const policy::Policy> policy;
-  if (kind == ".pt" || kind == ".h")
+  if (policy::is_policy_file(path))
     policy = policy::load_policy(path, static_cast<int>(task.observation().size()), task.actions());
   if (request.effects) {
     io::stop_on_interrupt();

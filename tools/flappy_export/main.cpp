@@ -1,4 +1,4 @@
-// flappy-export: exports a finished run as TorchScript and as C headers that test themselves.
+// flappy-export: exports a finished run as TorchScript, as ONNX, and as C headers that test themselves.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -7,11 +7,14 @@
 #include "deploy/header/controller_header.hpp"
 #include "deploy/header/exported_files.hpp"
 #include "deploy/header/policy_header.hpp"
+#include "deploy/proof/file_proof.hpp"
 #include "deploy/proof/proof.hpp"
 #include "io/files.hpp"
 #include "io/program.hpp"
+#include "io/sha256.hpp"
 #include "io/temporary_folder.hpp"
 #include "learn/run_folder.hpp"
+#include "policy/onnx.hpp"
 #include "policy/torch_script.hpp"
 
 namespace flappy::exports {
@@ -22,8 +25,8 @@ using Json = nlohmann::ordered_json;
 using policy::PolicyVectors;
 
 /// Numbers of flights and vectors: for test vectors and proofs of the headers, and for the fit of 8-bit scales.
-constexpr std::size_t kProofFlights = 64, kFitFlights = 512;
-constexpr std::size_t kTestVectors = 24, kProofVectors = 1000, kFitVectors = 10000;
+constexpr std::size_t kProofFlights = 64, kFitFlights = 512, kComparedFlights = 256;
+constexpr std::size_t kTestVectors = 24, kProofVectors = 1000, kFitVectors = 10000, kComparedVectors = 4000;
 
 struct Request {
   std::string run, out, name{policy::kPrefix};
@@ -81,10 +84,65 @@ void write_all(const fs::path& folder, const std::string& prefix, const std::map
     written.back()->write(text);
   }
   for (const auto& file : written) file->commit();
-  for (const std::string& name :
-       {prefix + "_policy.h", prefix + "_policy_int8.h", prefix + "_controller.h", std::string("policy.pt")})
+  for (const std::string& name : {prefix + "_policy.h", prefix + "_policy_int8.h", prefix + "_controller.h",
+                                  std::string("policy.pt"), std::string("policy.onnx")})
     if (!files.contains(name)) fs::remove(folder / name);
   io::sync_folder(folder);
+}
+
+/// One line of JSON: the signals' names, or their units.
+std::string list_of(const std::vector<flight::Signal>& signals, std::string flight::Signal::*text) {
+  Json all = Json::array();
+  for (const flight::Signal& s : signals) all.push_back(s.*text);
+  return all.dump();
+}
+
+/// Adds policy.pt and policy.onnx, and tries them out: sums are in another order, so last bits differ.
+void write_for_runtimes(Export& e, const Request& request, const learn::FinishedRun& run,
+                        const policy::PolicyNetwork& network, const io::TemporaryFolder& work, Json& json) {
+  constexpr double kMaxError = 1e-5;  // of an output's range
+  const auto observation = run.fly.fleet.task.observation(), action = run.fly.fleet.task.action();
+  policy::PolicyVectors vectors;
+  if (request.prove) vectors = deploy::some_of(deploy::roll_out(run.fly, 0, kComparedFlights), kComparedVectors);
+  std::vector<deploy::Agreement> rows;
+  const auto try_out = [&](const std::string& name, const std::string& runtime, const char* key) {
+    io::write_atomically(work / name, e.files[name]);
+    const auto policy = policy::load_policy(work / name, network.inputs(), network.outputs());
+    std::vector<float> acts(e.flown.action.size());
+    policy->act(e.flown.rows(), e.flown.observation.data(), acts.data());
+    const OutputError error = output_error(acts, e.flown.action, network.half);
+    print((runtime + " differs by at most").c_str(), error, action);
+    json[key] = json_of(error);
+    if (*std::ranges::max_element(error.largest) > kMaxError)
+      throw std::runtime_error(runtime + " does not act as the actor does");
+    if (request.prove)
+      rows.push_back(deploy::compare(name, runtime, *policy, run.fly, network, vectors, kProofFlights));
+  };
+  if (policy::reads_torch_script()) {
+    e.files["policy.pt"] = policy::torch_script(network, deploy::contract_text(run.fly, run.info));
+    try_out("policy.pt", "TorchScript", "torch_script_error");
+  } else {
+    std::printf("policy.pt is not written: this build has no LibTorch\n");
+  }
+  if (policy::writes_onnx()) {
+    e.files["policy.onnx"] =
+        policy::onnx_model(network, {{"task", run.info.task},
+                                     {"opset", std::to_string(policy::kOnnxOpset)},
+                                     {"observation", list_of(observation, &flight::Signal::name)},
+                                     {"observation_unit", list_of(observation, &flight::Signal::unit)},
+                                     {"action", list_of(action, &flight::Signal::name)},
+                                     {"action_unit", list_of(action, &flight::Signal::unit)},
+                                     {"contract_json_sha256", io::sha256(e.files["contract.json"])},
+                                     {"config_sha256", run.info.config_sha256}});
+    if (const std::string version = policy::onnxruntime_version(); !version.empty())
+      try_out("policy.onnx", "onnxruntime " + version, "onnx_error");
+    else std::printf("policy.onnx, of opset %d, is not tried out: python3 has no onnxruntime\n", policy::kOnnxOpset);
+  } else {
+    std::printf("policy.onnx is not written: this build has no ONNX library\n");
+  }
+  if (rows.empty()) return;
+  std::printf("%s", table_of(rows).c_str());
+  json["agreement"] = json_of(rows);
 }
 
 void run(const Request& request, const io::Program& program) {
@@ -128,20 +186,7 @@ void run(const Request& request, const io::Program& program) {
     json["int8_error"] = json_of(error);
   }
   const io::TemporaryFolder work;
-  if (policy::reads_torch_script()) {
-    e.files["policy.pt"] = policy::torch_script(network, deploy::contract_text(run.fly, run.info));
-    io::write_atomically(work / "policy.pt", e.files["policy.pt"]);
-    std::vector<float> action(e.flown.action.size());
-    policy::load_policy(work / "policy.pt", network.inputs(), network.outputs())
-        ->act(e.flown.rows(), e.flown.observation.data(), action.data());
-    const OutputError error = output_error(action, e.flown.action, network.half);
-    print("TorchScript differs by at most", error, run.fly.fleet.task.action());
-    json["torch_script_error"] = json_of(error);
-    if (*std::ranges::max_element(error.largest) > 1e-5)
-      throw std::runtime_error("TorchScript does not act as the actor does");
-  } else {
-    std::printf("policy.pt is not written: this build has no LibTorch\n");
-  }
+  write_for_runtimes(e, request, run, network, work, json);
 
   const auto measure = [&](const std::string& name, const fs::path& folder, const char* header) {
     if (!request.prove) return;
@@ -180,8 +225,10 @@ void run(const Request& request, const io::Program& program) {
 
 int main(int argc, char** argv) {
   using namespace flappy;
-  io::Program program("flappy-export", "Exports a finished run as TorchScript and as C headers that prove themselves.",
-                      {std::string("TorchScript ") + (policy::reads_torch_script() ? "yes" : "no")});
+  io::Program program("flappy-export",
+                      "Exports a finished run as TorchScript, as ONNX and as C headers that prove themselves.",
+                      {std::string("TorchScript ") + (policy::reads_torch_script() ? "yes" : "no"),
+                       std::string("ONNX ") + (policy::writes_onnx() ? "yes" : "no")});
   exports::Request r;
   program.app().option("run", r.run, "run folder that flappy-train left").required();
   program.app().option("--out", r.out, "folder for what is exported").required();

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "io/files.hpp"
+#include "io/refuse.hpp"
 #include "io/run_program.hpp"
 #include "io/temporary_folder.hpp"
 
@@ -13,6 +14,7 @@ namespace flappy::deploy {
 namespace {
 
 namespace fs = std::filesystem;
+using io::refuse;
 
 /// Compiled after both headers. Its names stand for static inline functions, which no library shows.
 constexpr const char* kWrapper = R"(
@@ -86,10 +88,6 @@ std::vector<std::pair<std::string, std::size_t>> names_of_constants(const std::s
     names.emplace_back(line.substr(comment + 3, end - comment - 3), count);
   }
   return names;
-}
-
-[[noreturn]] void refuse(const fs::path& file, const std::string& what, const std::string& accepted) {
-  throw io::InputError(file.string() + ": " + what + "; accepted: " + accepted);
 }
 
 std::string read_header(const fs::path& file) {

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "deploy/proof/file_proof.hpp"
 #include "deploy/proof/proof.hpp"
 
 namespace flappy::deploy {
@@ -86,6 +87,41 @@ std::string table_of(const std::vector<Footprint>& rows) {
     lines.push_back(line);
   }
   return text_of(lines, 3) + "stack: without the frames of the compiler's own arithmetic (libgcc)\n";
+}
+
+std::string table_of(const std::vector<Agreement>& rows) {
+  std::vector<Line> lines = {
+      {{"file", "runtime", "differ", "of", "ulp: median", "99 %", "largest", "of range", "flights", "alike", "apart m"},
+       ""}};
+  for (const auto& row : rows) {
+    if (row.why_not.empty())
+      lines.push_back(
+          {{row.file, row.runtime, std::to_string(row.differing), std::to_string(row.outputs),
+            short_number(row.median_ulp), short_number(row.percentile_99_ulp), short_number(row.largest_ulp),
+            short_number(row.largest_ulp_of_range), std::to_string(row.flights), std::to_string(row.ended_alike),
+            short_number(row.largest_distance_m)},
+           ""});
+    else lines.push_back({{row.file, row.runtime}, row.why_not});
+  }
+  return text_of(lines, 2);
+}
+
+nlohmann::ordered_json json_of(const std::vector<Agreement>& rows) {
+  auto all = nlohmann::ordered_json::array();
+  for (const auto& row : rows)
+    all.push_back({{"file", row.file},
+                   {"runtime", row.runtime},
+                   {"why_not", row.why_not},
+                   {"outputs", row.outputs},
+                   {"differing", row.differing},
+                   {"median_ulp", row.median_ulp},
+                   {"percentile_99_ulp", row.percentile_99_ulp},
+                   {"largest_ulp", row.largest_ulp},
+                   {"largest_ulp_of_range", row.largest_ulp_of_range},
+                   {"flights", row.flights},
+                   {"ended_alike", row.ended_alike},
+                   {"largest_distance_m", row.largest_distance_m}});
+  return all;
 }
 
 nlohmann::ordered_json json_of(const std::vector<Parity>& rows) {

@@ -9,6 +9,7 @@
 
 #include "deploy/header/controller_header.hpp"
 #include "deploy/header/policy_vectors.hpp"
+#include "deploy/proof/file_proof.hpp"
 #include "full.hpp"
 #include "io/run_program.hpp"
 #include "policy/policy.hpp"
@@ -289,6 +290,50 @@ TEST(TorchScriptExport, ActsAsTheLanesWithinRounding) {
   }
 }
 #endif
+
+/// Acts as a network does.
+class OfNetwork : public policy::Policy {
+ public:
+  explicit OfNetwork(policy::PolicyNetwork n) : Policy(n.inputs(), n.outputs()), network_(std::move(n)) {}
+  void act(std::size_t count, const float* observation, float* action) const override {
+    const std::vector<float> seen(observation, observation + count * static_cast<std::size_t>(observations()));
+    std::ranges::copy(evaluate(network_, seen), action);
+  }
+
+ private:
+  policy::PolicyNetwork network_;
+};
+
+TEST(FileProof, CountsFloatsBetween) {
+  EXPECT_EQ(ulp_between(1, 1), 0);
+  EXPECT_EQ(ulp_between(1, std::nextafter(1.0F, 2.0F)), 1);
+  EXPECT_EQ(ulp_between(-0.0F, 0), 0);
+  EXPECT_EQ(ulp_between(-1e-45F, 1e-45F), 2);  // the smallest floats on both sides of 0
+  EXPECT_EQ(ulp_between(1, 2), 1 << 23);
+  EXPECT_EQ(ulp_between(NAN, 1), INFINITY);
+}
+
+/// The same network flies the same to the bit; with its first output off by a hundredth of the range, it does not.
+TEST(FileProof, ComparesOutputsAndFlights) {
+  const rollout::FlyConfig config = escape({8}, Activation::relu);
+  const policy::PolicyNetwork network = network_of(config);
+  const policy::PolicyVectors vectors = some_of(roll_out(config, 0, 8), 100);
+  const Agreement same = compare("p", "r", OfNetwork(network), config, network, vectors, 8);
+  EXPECT_EQ(same.outputs, 400u);
+  EXPECT_EQ(same.differing, 0u);
+  EXPECT_EQ(same.largest_ulp + same.largest_ulp_of_range + same.largest_distance_m, 0);
+  EXPECT_EQ(same.ended_alike, 8u);
+  policy::PolicyNetwork off = network;
+  off.middle[0] += 0.02F * off.half[0];
+  const Agreement other = compare("p", "r", OfNetwork(off), config, network, vectors, 8);
+  EXPECT_EQ(other.differing, 100u);
+  EXPECT_EQ(other.median_ulp, 0);  // of all four outputs
+  EXPECT_GT(other.percentile_99_ulp, 1000);
+  // 1 % of the range are 2 % of its half, which are up to 2^24 ulp
+  EXPECT_GT(other.largest_ulp_of_range, 0.02 * (1 << 23));
+  EXPECT_LT(other.largest_ulp_of_range, 0.0201 * (1 << 24));
+  EXPECT_GT(other.largest_distance_m, 1e-4);
+}
 
 /// Two outputs that are voltages: in 32 bits to the bit, in 8 bits near, in TorchScript within rounding.
 TEST(PolicyHeader, SetsVoltagesAsTheLanesDo) {
