@@ -115,8 +115,12 @@ void write_for_runtimes(Export& e, const Request& request, const learn::Finished
     json[key] = json_of(error);
     if (*std::ranges::max_element(error.largest) > kMaxError)
       throw std::runtime_error(runtime + " does not act as the actor does");
-    if (request.prove)
-      rows.push_back(deploy::compare(name, runtime, *policy, run.fly, network, vectors, kProofFlights));
+    if (!request.prove) return;
+    deploy::Agreement& row = rows.emplace_back(deploy::compare(name, runtime, *policy, network.half, vectors));
+    const deploy::BesideActor flown = deploy::fly_beside(run.fly, *policy, kProofFlights);
+    row.flights = kProofFlights;
+    row.ended_alike = flown.ended_alike;
+    row.largest_distance_m = flown.largest_distance_m;
   };
   if (policy::reads_torch_script()) {
     e.files["policy.pt"] = policy::torch_script(network, deploy::contract_text(run.fly, run.info));

@@ -1,15 +1,3 @@
-/* Driver. Within a beat of fraction t in [0, 1):
-     V = A cos(pi t / s) + V_0              for t < s
-     V = A cos(pi (t - 1) / (1 - s)) + V_0  after
-     left:  A = V_amp + V_d, s = 0.5 - d_sigma      right: A = V_amp - V_d, s = 0.5 + d_sigma */
-static inline float flappy_voltage(float side, const flappy_wing_beat *u, float fraction, float limit) {
-  const float s = 0.5F - side * u->split_cycle;
-  const float t = fraction < 0.0F ? fraction + 1.0F : fraction;
-  const float x = t < s ? t / s : (t - 1.0F) / (1.0F - s);
-  const float amplitude = flappy_fma(side, u->difference_V, u->amplitude_V);
-  return flappy_within(flappy_fma(amplitude, flappy_cos_pi(x), u->bias_V), limit);
-}
-
 /* Of the beat, in [-1/2, 1/2). */
 static inline float flappy_beat_fraction(uint32_t phase) { return (float)(int32_t)phase * 0x1p-32F; }
 
@@ -179,15 +167,27 @@ static inline int flappy_controller_pose(flappy_controller *c, uint32_t taken_us
   return 1;
 }
 
-/* End of a control period: estimate, set point, hand-back. Returns whether it is handed back. */
-static inline int flappy_controller_tick(flappy_controller *c, uint32_t now_us) {
+/* Set point and hand-back at the end of a control period. */
+static inline int flappy_controller_advance(flappy_controller *c) {
   flappy_setpoint ref;
-  c->now_us = now_us;
-  flappy_controller_estimate(c);
   ++c->tick;
   ref = flappy_controller_reference(c, &c->segment);
   if (flappy_controller_arrived(c, &ref, (float)c->tick * flappy_controller_k.period_s)) c->handed_back = 1;
   return c->handed_back;
+}
+
+/* End of a control period: estimate, set point, hand-back. Returns whether it is handed back. */
+static inline int flappy_controller_tick(flappy_controller *c, uint32_t now_us) {
+  c->now_us = now_us;
+  flappy_controller_estimate(c);
+  return flappy_controller_advance(c);
+}
+
+/* The same where the autopilot around it estimates: no sample is passed then. */
+static inline int flappy_controller_tick_with(flappy_controller *c, uint32_t now_us, const flappy_motion *estimate) {
+  c->now_us = now_us;
+  c->estimate = *estimate;
+  return flappy_controller_advance(c);
 }
 
 static inline float *flappy_put(float *row, flappy_vector v) {
@@ -285,6 +285,33 @@ static inline void flappy_controller_steer(flappy_controller *c) {
   c->input.split_cycle = u.split_cycle + (0.0F + (c->handed_back ? 0.0F : c->added[3]));
 }
 
+#if FLAPPY_CONTROLLER_INPUTS > 0
+/* After flappy_controller_steer(): the robot's inputs for a control period; their places are FLAPPY_CONTROLLER_INPUT_<name>. */
+static inline void flappy_controller_inputs(const flappy_controller *c, float inputs[FLAPPY_CONTROLLER_INPUTS]) {
+  const flappy_wing_beat *u = &c->input;
+  uint32_t i;
+  for (i = 0; i < FLAPPY_CONTROLLER_INPUTS; ++i) {
+    const float *k = flappy_controller_mix + 7 * i; /* neutral, of each of the four, lowest, highest */
+    float sum = flappy_fma(k[1], u->amplitude_V, k[0]);
+    sum = flappy_fma(k[2], u->difference_V, sum);
+    sum = flappy_fma(k[3], u->bias_V, sum);
+    sum = flappy_fma(k[4], u->split_cycle, sum);
+    inputs[i] = flappy_clamp(sum, k[5], k[6]);
+  }
+}
+#else
+/* Driver. Within a beat of fraction t in [0, 1):
+     V = A cos(pi t / s) + V_0              for t < s
+     V = A cos(pi (t - 1) / (1 - s)) + V_0  after
+     left:  A = V_amp + V_d, s = 0.5 - d_sigma      right: A = V_amp - V_d, s = 0.5 + d_sigma */
+static inline float flappy_voltage(float side, const flappy_wing_beat *u, float fraction, float limit) {
+  const float s = 0.5F - side * u->split_cycle;
+  const float t = fraction < 0.0F ? fraction + 1.0F : fraction;
+  const float x = t < s ? t / s : (t - 1.0F) / (1.0F - s);
+  const float amplitude = flappy_fma(side, u->difference_V, u->amplitude_V);
+  return flappy_within(flappy_fma(amplitude, flappy_cos_pi(x), u->bias_V), limit);
+}
+
 /* Every FLAPPY_CONTROLLER_DRIVE_US: voltages that hold until the next call. */
 static inline void flappy_controller_drive(flappy_controller *c, float *left_V, float *right_V) {
   const flappy_controller_constants *k = &flappy_controller_k;
@@ -298,3 +325,4 @@ static inline void flappy_controller_drive(flappy_controller *c, float *left_V, 
   *right_V = flappy_voltage(-1.0F, &u, fraction, k->right_limit_V);
   c->phase += FLAPPY_CONTROLLER_PHASE_STEP;
 }
+#endif

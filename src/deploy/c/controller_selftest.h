@@ -9,6 +9,9 @@ static inline uint32_t flappy_controller_crc(void) {
   uint32_t crc = flappy_crc32(0, (const float *)&flappy_controller_k, (uint32_t)(sizeof flappy_controller_k / sizeof(float)));
   crc = flappy_crc32(crc, flappy_controller_path, 24 * FLAPPY_CONTROLLER_SEGMENTS);
   crc = flappy_controller_crc_words(crc, flappy_controller_path_start, FLAPPY_CONTROLLER_SEGMENTS);
+#if FLAPPY_CONTROLLER_INPUTS > 0
+  crc = flappy_crc32(crc, flappy_controller_mix, 7 * FLAPPY_CONTROLLER_INPUTS);
+#endif
   crc = flappy_crc32(crc, flappy_controller_test_state, FLAPPY_CONTROLLER_TEST_STATE);
   crc = flappy_controller_crc_words(crc, flappy_controller_test_clock, FLAPPY_CONTROLLER_TEST_CLOCK);
   crc = flappy_crc32(crc, flappy_controller_test_ring, 6 * FLAPPY_CONTROLLER_TEST_RING);
@@ -19,7 +22,7 @@ static inline uint32_t flappy_controller_crc(void) {
   crc = flappy_controller_crc_words(crc, flappy_controller_test_frames_us, 3 * FLAPPY_CONTROLLER_TEST_FRAMES);
   crc = flappy_crc32(crc, flappy_controller_test_periods, 21 * FLAPPY_CONTROLLER_TEST_PERIODS);
   crc = flappy_controller_crc_words(crc, flappy_controller_test_handed_back, FLAPPY_CONTROLLER_TEST_PERIODS);
-  return flappy_crc32(crc, flappy_controller_test_voltages, 2 * FLAPPY_CONTROLLER_TEST_UPDATES);
+  return flappy_crc32(crc, flappy_controller_test_driven, FLAPPY_CONTROLLER_TEST_WIDTH * FLAPPY_CONTROLLER_TEST_UPDATES);
 }
 
 static inline flappy_vector flappy_vector_from(const float *x) { return flappy_vector_of(x[0], x[1], x[2]); }
@@ -81,10 +84,14 @@ static inline float flappy_controller_test_fly(flappy_controller *c) {
     flappy_controller_steer(c);
     for (i = 0; i < 4; ++i) error = flappy_controller_largest(error, is[i], *should_be++);
     for (; drive_us < end_us && update < FLAPPY_CONTROLLER_TEST_UPDATES; drive_us += FLAPPY_CONTROLLER_DRIVE_US, ++update) {
-      float left_V, right_V;
-      flappy_controller_drive(c, &left_V, &right_V);
-      error = flappy_controller_largest(error, left_V, flappy_controller_test_voltages[2 * update]);
-      error = flappy_controller_largest(error, right_V, flappy_controller_test_voltages[2 * update + 1]);
+      float driven[FLAPPY_CONTROLLER_TEST_WIDTH];
+#if FLAPPY_CONTROLLER_INPUTS > 0
+      flappy_controller_inputs(c, driven);
+#else
+      flappy_controller_drive(c, &driven[0], &driven[1]);
+#endif
+      for (i = 0; i < FLAPPY_CONTROLLER_TEST_WIDTH; ++i)
+        error = flappy_controller_largest(error, driven[i], flappy_controller_test_driven[FLAPPY_CONTROLLER_TEST_WIDTH * update + i]);
     }
     for (; imu < FLAPPY_CONTROLLER_TEST_IMU; ++imu) {
       const int32_t *us = flappy_controller_test_imu_us + 2 * imu; /* taken, arrived */

@@ -102,6 +102,9 @@ std::string source_of(const fs::path& folder, Build build, const std::string& co
   const std::size_t at = text.find(constant);
   if (at == std::string::npos)
     refuse(folder / "flappy_controller.h", "has no constants", "a header that flappy-export wrote");
+  if (text.find("#define FLAPPY_CONTROLLER_INPUTS 0") == std::string::npos)
+    refuse(folder / "flappy_controller.h", "drives no motors, but inputs of a robot",
+           "an export for a vehicle with motors");
   text.replace(at, constant.size(), "static flappy_controller_constants flappy_controller_k");
   return read_header(folder / (build == Build::int8 ? "flappy_policy_int8.h" : "flappy_policy.h")) + text + kWrapper;
 }

@@ -188,11 +188,19 @@ std::string wiring_text(const FlyConfig& config, const policy::RunInfo& run, boo
            "W.\n"
         << "4. `flappy_controller_start()` with the pose; then, every " << p.control_us << " us, in this order:\n"
         << "   - if `flappy_controller_policy_due()`: `_observe()`, `flappy_policy_step()`, `_act()`\n"
-        << "   - `_steer()`, and from then on `_drive()` every " << p.driver_us << " us: the motors' voltages\n"
+        << (model::mixed_inputs(config.vehicle).empty()
+                ? "   - `_steer()`, and from then on `_drive()` every " + std::to_string(p.driver_us) +
+                      " us: the motors' voltages\n"
+                : "   - `_steer()`, then `_inputs()`: the robot's inputs\n")
         << "   - at the end of the period `_imu()` and `_pose()` with all that has arrived, oldest first, then "
            "`_tick()`\n"
-        << "5. `flappy_controller_hover()` until the trim is learnt, then `flappy_controller_begin()`: the policy "
-           "acts.\n"
+        << (config.fleet.controller.kind == flight::kNoController
+                ? "5. There is no feedback controller: who flies until `flappy_controller_begin()` and after the "
+                  "hand-back is "
+                  "yours.\n"
+                : "5. `flappy_controller_hover()` until the trim is learnt, then `flappy_controller_begin()`: the "
+                  "policy "
+                  "acts.\n")
         << "6. Log what the sensors said and the voltages that were set, with their times: `flappy-gap check --flown`\n"
         << "   says whether the robot flew this, or which mistake of its firmware explains what it did.\n";
   } else {

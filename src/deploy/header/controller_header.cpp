@@ -1,8 +1,10 @@
 #include "deploy/header/controller_header.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <sstream>
+#include <type_traits>
 #include <utility>
 
 #include "deploy/embedded.hpp"
@@ -10,6 +12,7 @@
 #include "flight/constants.hpp"
 #include "flight/schedule.hpp"
 #include "io/files.hpp"
+#include "model/jointed.hpp"
 
 namespace flappy::deploy {
 namespace {
@@ -62,8 +65,22 @@ class Constants {
   std::uint32_t crc_ = 0;
 };
 
+/// In place of a feedback controller where there is none.
+struct NoFeedback {
+  static constexpr const char* kName = "none";
+  static constexpr const char* kSource = "controller_none";
+};
+
+flight::LoopConstants<double> loop_of(const flight::FlightConstants& all, NoFeedback) {
+  return {1, 1, all.period_s, 1 / all.period_s, all.estimator.gravity_m_s2};
+}
 template <class C>
-Members feedback_of(const flight::FlightConstants& all) {
+flight::LoopConstants<double> loop_of(const flight::FlightConstants& all, C) {
+  return all.controller.of<C>();
+}
+
+template <class C>
+Members exported_feedback_of(const flight::FlightConstants& all) {
   Members list;
   const auto k = flight::rounded<float>(all.controller.of<C>());
   C::exported(k, [&](const char* name, const auto& numbers) {
@@ -76,9 +93,15 @@ Members feedback_of(const flight::FlightConstants& all) {
 }
 
 template <class C>
+Members feedback_of(const flight::FlightConstants& all) {
+  if constexpr (std::is_same_v<C, NoFeedback>) return {{"none", {0}}};
+  else return exported_feedback_of<C>(all);
+}
+
+template <class C>
 void add_constants(const rollout::FlyConfig& config, Constants& to) {
   const flight::FlightConstants all = flight::flight_constants(config.fleet);
-  const flight::LoopConstants<float> k = flight::rounded<float, flight::LoopConstants>(all.controller.of<C>());
+  const auto k = flight::rounded<float, flight::LoopConstants>(loop_of(all, C{}));
   const auto f = flight::rounded<float>(all.estimator);
   const auto task = flight::rounded<float>(all.task);
   const auto start = flight::rounded<float>(flight::start_covariance(config.fleet.sensors));
@@ -142,6 +165,14 @@ void add_path(const flight::Task& task, Constants& to) {
   to.add("path_start", "FLAPPY_CONTROLLER_SEGMENTS", starts);
 }
 
+void add_mix(const std::vector<model::BeatAveraged::Input>& inputs, Constants& to) {
+  std::vector<float> numbers;
+  for (const model::BeatAveraged::Input& i : inputs)
+    for (const double x : {i.neutral, i.mix[0], i.mix[1], i.mix[2], i.mix[3], i.low, i.high})
+      numbers.push_back(static_cast<float>(x));
+  if (!inputs.empty()) to.add("mix", "7 * FLAPPY_CONTROLLER_INPUTS", numbers);
+}
+
 void add_trace(const ControllerTrace& t, Constants& to) {
   std::vector<float> numbers = t.estimator;
   const auto append = [&](const auto& list) { numbers.insert(numbers.end(), std::begin(list), std::end(list)); };
@@ -181,8 +212,8 @@ void add_trace(const ControllerTrace& t, Constants& to) {
   }
   put("test_periods", "21 * FLAPPY_CONTROLLER_TEST_PERIODS");
   put_times("test_handed_back", "FLAPPY_CONTROLLER_TEST_PERIODS");
-  for (const auto& u : t.updates) append(std::vector{u.left_V, u.right_V});
-  put("test_voltages", "2 * FLAPPY_CONTROLLER_TEST_UPDATES");
+  for (const auto& driven : t.updates) append(driven);
+  put("test_driven", "FLAPPY_CONTROLLER_TEST_WIDTH * FLAPPY_CONTROLLER_TEST_UPDATES");
 }
 
 std::string milliseconds(double s) { return io::shortest_digits(std::round(s * 1e9) / 1e6) + " ms"; }
@@ -196,9 +227,14 @@ std::string about(const rollout::FlyConfig& config, const policy::RunInfo& run, 
        << "nothing else is needed.\n\n"
        << contract_text(config, run) << "\nEvery control period:\n"
        << "  1. flappy_controller_observe() where flappy_controller_policy_due(), the policy, flappy_controller_act()\n"
-       << "  2. flappy_controller_steer(), then flappy_controller_drive() every " << periods.driver_us << " us\n"
+       << (model::mixed_inputs(config.vehicle).empty()
+               ? "  2. flappy_controller_steer(), then flappy_controller_drive() every " +
+                     std::to_string(periods.driver_us) + " us\n"
+               : "  2. flappy_controller_steer(), then flappy_controller_inputs()\n")
        << "  3. flappy_controller_imu() and flappy_controller_pose() with what has arrived, oldest first\n"
-       << "  4. flappy_controller_tick() at its end\n"
+       << "  4. flappy_controller_tick() at its end; or, in place of 3 and 4, flappy_controller_tick_with() the "
+          "estimate\n"
+       << "     of the autopilot around it\n"
        << "Times are microseconds of one clock that may wrap; no more than 2^31 of them may pass between two ticks.\n"
        << "flappy_controller_start() comes first, then flappy_controller_hover() until the trim is learnt, then\n"
        << "flappy_controller_begin(). What a sample holds is at the function that takes it.\n\n"
@@ -221,9 +257,6 @@ std::string about(const rollout::FlyConfig& config, const policy::RunInfo& run, 
 std::string no_controller(const rollout::FlyConfig& config) {
   const flight::Task& task = config.fleet.task;
   if (task.sets_voltages()) return "the policy sets the motors' voltages by itself";
-  if (config.vehicle.beat_averaged) return "the vehicle is beat-averaged, and has an autopilot of its own";
-  if (config.vehicle.jointed) return "the vehicle's wings have no motors to be set by it";
-  if (config.fleet.controller.kind == flight::kNoController) return "the policy flies by itself";
   if (task.parts >> static_cast<int>(flight::Part::wings) & 1)
     return "the policy sees the wings, which it has no sensor for";
   if (task.constants.hand_back.touching > 0 || task.constants.hand_back.rests > 0)
@@ -237,7 +270,9 @@ std::string controller_header(const rollout::FlyConfig& config, const policy::Ru
   if (const std::string why_not = no_controller(config); !why_not.empty())
     throw io::InputError("controller: cannot be exported: " + why_not + "; accepted: a task that leaves it to fly");
   Constants constants;
-  std::string source, accepted;
+  std::string source = NoFeedback::kSource, accepted;
+  if (o.controller.kind == flight::kNoController) add_constants<NoFeedback>(config, constants);
+  else source.clear();
   for (int kind = 0; kind < flight::kControllers; ++kind)
     flight::with_controller(kind, [&]<class C>(C) {
       if constexpr (requires { C::kSource; }) {
@@ -253,11 +288,13 @@ std::string controller_header(const rollout::FlyConfig& config, const policy::Ru
   const Periods periods = periods_of(config);
   const flight::Schedule schedule(o.sensors, o.batch.step_s,
                                   static_cast<int>(std::lround(1 / (o.control_hz * o.batch.step_s))));
+  const auto inputs = model::mixed_inputs(config.vehicle);
   const auto phase_step = static_cast<std::uint32_t>(
-      std::llround(config.vehicle.driver.flapping_Hz * config.vehicle.driver.hold_s * 0x1p32));
+      inputs.empty() ? std::llround(config.vehicle.driver.flapping_Hz * config.vehicle.driver.hold_s * 0x1p32) : 0);
   const auto number = [](auto n) { return std::to_string(n) + "U"; };
 
   add_path(o.task, constants);
+  add_mix(inputs, constants);
   const std::string numbers = constants.take();
   add_trace(trace, constants);
   const std::string test_numbers = constants.take();
@@ -285,6 +322,13 @@ std::string controller_header(const rollout::FlyConfig& config, const policy::Ru
   define("FRAMES", number(schedule.queue_slots()) + " /* poses that may wait for the IMU */");
   define("AHEAD_US", number(schedule.ring_slots() * periods.control_us) + " /* no further does it extrapolate */");
   define("SEGMENTS", number(o.task.path.size()));
+  define("INPUTS",
+         std::to_string(inputs.size()) + " /* of the robot; 0: the driver sets the voltages of two motors */");
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    std::string name = "INPUT_" + inputs[i].name;
+    std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    define(name.c_str(), std::to_string(i));
+  }
   define("CRC32", number(constants.crc()));
   define("TEST_STATE", number(trace.estimator.size() + trace.estimate.size() + trace.feedback.size()));
   define("TEST_CLOCK", "7U");
@@ -293,6 +337,7 @@ std::string controller_header(const rollout::FlyConfig& config, const policy::Ru
   define("TEST_FRAMES", number(trace.frames.size()));
   define("TEST_PERIODS", number(trace.periods.size()));
   define("TEST_UPDATES", number(trace.updates.size()));
+  define("TEST_WIDTH", number(trace.updates.front().size()));
   text << kControllerCodes << "\n"
        << kEmbedded.at("arithmetic.h") << "\n"
        << kEmbedded.at("controller_types.h") << "\n"

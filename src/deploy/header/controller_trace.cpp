@@ -5,7 +5,9 @@
 #include <cstddef>
 
 #include "flight/flight_block.hpp"
+#include "model/jointed.hpp"
 #include "rollout/rollout.hpp"
+#include "sim/storage.hpp"
 
 namespace flappy::deploy {
 namespace {
@@ -100,6 +102,7 @@ ControllerTrace record_controller(const rollout::FlyConfig& given, int periods, 
       flight::with_controller(o.controller.kind, [&]<class C>(C) {
         t.feedback = rows(fleet, offsetof(FlightBlock<float>, controller), model::kRows<C::template Memory>);
       });
+      if (t.feedback.empty()) t.feedback = {0};  // the only number where there is no controller
       t.tick = fleet.tick(0);
       t.phase = fleet.snapshot(0).phase;
       t.handed_back = fleet.handed_back(0);
@@ -135,6 +138,11 @@ ControllerTrace record_controller(const rollout::FlyConfig& given, int periods, 
     copy(std::initializer_list<double>{u.amplitude_V, u.difference_V, u.bias_V, u.split_cycle}, p.input);
     std::ranges::copy(rows(fleet, offsetof(FlightBlock<float>, estimate), flight::kEstimateRows), p.estimate);
     p.handed_back = fleet.handed_back(0);
+    if (!model::mixed_inputs(config.vehicle).empty()) {
+      copy(sim::storage_of(fleet.batch()).inputs_of(0),
+           t.updates.emplace_back(model::mixed_inputs(config.vehicle).size()).data());
+      continue;
+    }
     for (const rollout::DriverUpdate& update : rollout::driver_updates(fleet, 0)) {
       if (t.updates.empty()) t.first_update_us = whole_us(static_cast<double>(update.step) * o.batch.step_s) - zero_us;
       t.updates.push_back({static_cast<float>(update.left_V), static_cast<float>(update.right_V)});

@@ -27,20 +27,17 @@ struct ControllerTrace {
     float estimate[13];        // rows of Estimate at the period's end
     std::int32_t handed_back;  // whether the policy had handed back at its end
   };
-  struct Update {
-    float left_V, right_V;
-  };
   // the state before the first period
   std::vector<float> estimator, estimate, feedback;  // rows of Estimator, Estimate and the controller
   std::uint32_t tick = 0, phase = 0;
   std::int32_t handed_back = 0;
   std::int32_t horizon_us = 0, present_us = 0, last_imu_us = 0;
   std::vector<Increment> ring;       // arrived increments, oldest first: after the horizon, and always the newest
-  std::int32_t first_update_us = 0;  // time of the driver's first update
+  std::int32_t first_update_us = 0;  // time of the first update
   std::vector<Imu> imu;
   std::vector<Frame> frames;
   std::vector<Period> periods;
-  std::vector<Update> updates;
+  std::vector<std::vector<float>> updates;  ///< voltages left and right, or the robot's inputs
 };
 
 /// Records the nominal vehicle under its actor. As on board, the estimate decides the hand-back, and the IMU's latency

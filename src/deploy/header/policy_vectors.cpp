@@ -1,6 +1,8 @@
 #include "deploy/header/policy_vectors.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include "rollout/rollout.hpp"
 
@@ -84,6 +86,37 @@ policy::PolicyVectors roll_out(const rollout::FlyConfig& given, std::size_t firs
   policy::PolicyVectors all{static_cast<int>(inputs), task.actions(), {}, {}};
   for (const policy::PolicyVectors& v : each) append(all, v);
   return all;
+}
+
+BesideActor fly_beside(const rollout::FlyConfig& given, const policy::Policy& policy, std::size_t count) {
+  BesideActor found;
+  rollout::FlyConfig config = given;
+  config.fleet.first_flapper = kRolloutFlappers;
+  config.excitation = {};
+  rollout::Rollout<float> of_actor(config, count);
+  config.actor.reset();
+  rollout::Rollout<float> of_file(config, count, &policy);
+  std::vector<bool> over(count, false);
+  while (!of_actor.over()) {
+    of_actor.step();
+    of_file.step();
+    for (std::size_t i = 0; i < count; ++i) {
+      if (over[i]) continue;
+      const auto& one = of_actor.fleet();
+      const auto& other = of_file.fleet();
+      const auto state = [i](const flight::Fleet<float>& fleet) {
+        return std::pair(fleet.ended(i), fleet.handed_back(i));
+      };
+      const flight::Motion a = one.truth(i), b = other.truth(i);
+      found.largest_distance_m = std::max(
+          found.largest_distance_m, std::hypot(a.position_m[0] - b.position_m[0], a.position_m[1] - b.position_m[1],
+                                               a.position_m[2] - b.position_m[2]));
+      over[i] = state(one) != std::pair(std::uint32_t{0}, false) || state(other) != std::pair(std::uint32_t{0}, false);
+      if (over[i] && state(one) == state(other)) ++found.ended_alike;
+    }
+  }
+  found.ended_alike += static_cast<std::size_t>(std::ranges::count(over, false));
+  return found;
 }
 
 policy::PolicyVectors some_of(const policy::PolicyVectors& all, std::size_t count) {

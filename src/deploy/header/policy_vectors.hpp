@@ -1,6 +1,7 @@
 // The network of a trained actor for export, and vectors of what it sees and does in flight.
 #pragma once
 
+#include "policy/policy.hpp"
 #include "policy/policy_network.hpp"
 #include "rollout/fly_config.hpp"
 
@@ -18,6 +19,14 @@ inline constexpr std::uint32_t kRolloutFlappers = std::uint32_t{3} << 30;
 /// Flies `count` randomised vehicles by the actor, from number `first` on, in single precision, until hand-back or end,
 /// and returns their observations and actions.
 policy::PolicyVectors roll_out(const rollout::FlyConfig& given, std::size_t first, std::size_t count);
+
+/// Flights of the same vehicles under the actor and under a policy, until one of the two hands back or ends.
+struct BesideActor {
+  std::size_t ended_alike = 0;  ///< in the same control period, for the same reason
+  double largest_distance_m = 0;
+};
+/// Flies the first `count` vehicles of roll_out() twice.
+BesideActor fly_beside(const rollout::FlyConfig& given, const policy::Policy& policy, std::size_t count);
 
 /// At most `count` rows, evenly spaced.
 policy::PolicyVectors some_of(const policy::PolicyVectors& all, std::size_t count);

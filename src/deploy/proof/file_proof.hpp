@@ -8,26 +8,22 @@
 
 #include "policy/policy.hpp"
 #include "policy/policy_network.hpp"
-#include "rollout/fly_config.hpp"
 
 namespace flappy::deploy {
 
 struct Agreement {
   std::string file, runtime;
-  std::string why_not;  ///< why it could not be tried out
   /// Outputs of the same observations. A difference in units in the last place (ulp) of the actor's output; in those of
   /// half the output's range, which do not grow where an output crosses 0.
   std::size_t outputs = 0, differing = 0;
   double median_ulp = 0, percentile_99_ulp = 0, largest_ulp = 0, largest_ulp_of_range = 0;
-  /// Flights of the same vehicles, each under its own actions, until one of the two hands back or ends.
-  std::size_t flights = 0, ended_alike = 0;  ///< alike: in the same control period, for the same reason
+  std::size_t flights = 0, ended_alike = 0;  ///< as fly_beside() (policy_vectors.hpp) finds them
   double largest_distance_m = 0;
 };
 
-/// Compares outputs, of `vectors` with the network's actions, and `flights` flights of the vehicles of roll_out().
+/// Compares outputs alone. `half`: of each output's range; `vectors`: with the actor's actions.
 Agreement compare(const std::string& file, const std::string& runtime, const policy::Policy& policy,
-                  const rollout::FlyConfig& config, const policy::PolicyNetwork& network,
-                  const policy::PolicyVectors& vectors, std::size_t flights);
+                  const std::vector<float>& half, const policy::PolicyVectors& vectors);
 
 /// Number of floats from `a` to `b`; infinite where one is NaN.
 double ulp_between(float a, float b);

@@ -14,7 +14,9 @@
 #include "deploy/proof/board.hpp"
 #include "flight/flight_block.hpp"
 #include "full.hpp"
+#include "model/jointed.hpp"
 #include "rollout/rollout.hpp"
+#include "sim/storage.hpp"
 
 namespace flappy::deploy {
 namespace {
@@ -148,15 +150,18 @@ Seen fly_beside(const FlyConfig& config, std::size_t count, int periods, bool fe
       const std::vector<float> input = {static_cast<float>(u.amplitude_V), static_cast<float>(u.difference_V),
                                         static_cast<float>(u.bias_V), static_cast<float>(u.split_cycle)};
       seen.updates += static_cast<int>(updates.size());
-      std::vector<float> volts;
+      std::vector<float> driven;  // voltages of the motors, or the robot's inputs
       for (const auto& d : updates)
-        volts.insert(volts.end(), {static_cast<float>(d.left_V), static_cast<float>(d.right_V)});
+        driven.insert(driven.end(), {static_cast<float>(d.left_V), static_cast<float>(d.right_V)});
+      if (!model::mixed_inputs(config.vehicle).empty())
+        for (driven.clear(); const double x : sim::storage_of(fleet.batch()).inputs_of(i))
+          driven.push_back(static_cast<float>(x));
       for (std::size_t l = 0; l < all.size(); ++l) {
         ControllerUnit& c = units[l][i];
         const auto where = [&] {
           return all[l]->name() + ", flapper " + std::to_string(i) + ", period " + std::to_string(period);
         };
-        std::vector<float> row(observed), is(4), left_right;
+        std::vector<float> row(observed), is(4), is_driven;
         c.observe(c.at(), row.data());
         const auto fail = [&](const char* what, const auto& result) {
           EXPECT_TRUE(result) << what << " of " << where();
@@ -166,12 +171,13 @@ Seen fly_beside(const FlyConfig& config, std::size_t count, int periods, bool fe
         c.act(c.at(), adds.data());
         c.steer(c.at(), is.data());
         if (fail("input", same_bits(is, input))) return seen;
-        for (std::size_t d = 0; d < updates.size(); ++d) {
-          float v[2];
-          c.drive(c.at(), v);
-          left_right.insert(left_right.end(), {v[0], v[1]});
+        const std::size_t calls = model::mixed_inputs(config.vehicle).empty() ? updates.size() : 1;
+        for (std::size_t d = 0; d < calls; ++d) {
+          std::vector<float> held(driven.size() / calls);
+          c.drive(c.at(), held.data());
+          is_driven.insert(is_driven.end(), held.begin(), held.end());
         }
-        if (fail("voltages", same_bits(left_right, volts))) return seen;
+        if (fail("voltages or inputs", same_bits(is_driven, driven))) return seen;
         for (const Sample& s : imu[i])
           if (s.arrived_us <= end_us)
             EXPECT_TRUE(c.imu(c.at(), zero_us + static_cast<std::uint32_t>(s.taken_us), s.x.data()));
@@ -227,6 +233,12 @@ TEST(ControllerHeader, HandsBackWhereItArrives) {
 }
 
 TEST(ControllerHeader, SeesEveryPart) { fly_beside(config_of("escape", {kEveryPart}), 4, 250); }
+
+/// A robot that is known by its mean forces, under the policy alone and under the PID.
+TEST(ControllerHeader, SetsTheInputsOfABeatAveragedRobot) {
+  fly_beside(config_of("flapper_dash"), 4, 600);
+  fly_beside(config_of("flapper_nimble", {"precision=\"float\""}), 4, 300, true);
+}
 
 /// Turns on its way.
 const std::string kTurns =
@@ -361,22 +373,25 @@ TEST(ControllerHeader, CatchesEveryFlippedBit) {
 TEST(ControllerHeader, CompilesWithoutAWarning) {
   if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const flight::Folder folder;
-  const std::string header = folder.write("flappy_controller.h", escape_header());
   const std::string use =
       "#include \"flappy_controller.h\"\n#include \"flappy_controller.h\"\n"
       "int use(flappy_controller *c, float *obs);\n"
       "int use(flappy_controller *c, float *obs) { flappy_controller_observe(c, obs); return "
       "flappy_controller_selftest(); }\n";
-  for (const std::string suffix : {"c", "cpp"}) {
-    const std::string source = folder.write("use." + suffix, use);
-    for (const std::string compiler : {suffix == "c" ? "gcc" : "g++", suffix == "c" ? "clang" : "clang++"})
-      for (const char* level : {"-O0", "-O3"}) {
-        const io::Finished f = io::run({compiler, suffix == "c" ? "-std=c99" : "-std=c++17", level, "-Wall", "-Wextra",
-                                        "-Wpedantic", "-Wconversion", "-Wfloat-equal", "-Wdouble-promotion", "-Wshadow",
-                                        "-Werror", "-c", source, "-o", folder / "use.o"});
-        EXPECT_EQ(f.exit_code, 0) << compiler << level << f.err;
-      }
-  }
+  const FlyConfig flapper = config_of("flapper_dash");
+  for (const std::string& header : {escape_header(), controller_header(flapper, kRun, record_controller(flapper))})
+    for (const std::string suffix : {"c", "cpp"}) {
+      folder.write("flappy_controller.h", header);
+      const std::string source = folder.write("use." + suffix, use);
+      for (const std::string compiler : {suffix == "c" ? "gcc" : "g++", suffix == "c" ? "clang" : "clang++"})
+        for (const char* level : {"-O0", "-O3"}) {
+          const io::Finished f =
+              io::run({compiler, suffix == "c" ? "-std=c99" : "-std=c++17", level, "-Wall", "-Wextra", "-Wpedantic",
+                       "-Wconversion", "-Wfloat-equal", "-Wdouble-promotion", "-Wshadow", "-Werror", "-c", source, "-o",
+                       folder / "use.o"});
+          EXPECT_EQ(f.exit_code, 0) << compiler << level << f.err;
+        }
+    }
 }
 
 TEST(ControllerHeader, IsTheSameFromAnyNumberOfThreads) {

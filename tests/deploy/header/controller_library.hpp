@@ -44,7 +44,11 @@ void w_steer(flappy_controller *c, float *input) {
   flappy_controller_steer(c);
   W_COPY(input, (const float *)&c->input, 4);
 }
+#if FLAPPY_CONTROLLER_INPUTS > 0
+void w_drive(flappy_controller *c, float *inputs) { flappy_controller_inputs(c, inputs); }
+#else
 void w_drive(flappy_controller *c, float *volts) { flappy_controller_drive(c, volts, volts + 1); }
+#endif
 int w_imu(flappy_controller *c, uint32_t us, const float *x) {
   return flappy_controller_imu(c, us, flappy_vector_from(x), flappy_vector_from(x + 3));
 }
@@ -82,7 +86,7 @@ uint32_t w_constants(uint32_t which, uint32_t **words) {
   W_LIST(10, flappy_controller_test_frames_us)
   W_LIST(11, flappy_controller_test_periods)
   W_LIST(12, flappy_controller_test_handed_back)
-  W_LIST(13, flappy_controller_test_voltages)
+  W_LIST(13, flappy_controller_test_driven)
   return 0;
 }
 )";

@@ -318,21 +318,22 @@ TEST(FileProof, ComparesOutputsAndFlights) {
   const rollout::FlyConfig config = escape({8}, Activation::relu);
   const policy::PolicyNetwork network = network_of(config);
   const policy::PolicyVectors vectors = some_of(roll_out(config, 0, 8), 100);
-  const Agreement same = compare("p", "r", OfNetwork(network), config, network, vectors, 8);
+  const Agreement same = compare("p", "r", OfNetwork(network), network.half, vectors);
+  const BesideActor same_flights = fly_beside(config, OfNetwork(network), 8);
   EXPECT_EQ(same.outputs, 400u);
   EXPECT_EQ(same.differing, 0u);
-  EXPECT_EQ(same.largest_ulp + same.largest_ulp_of_range + same.largest_distance_m, 0);
-  EXPECT_EQ(same.ended_alike, 8u);
+  EXPECT_EQ(same.largest_ulp + same.largest_ulp_of_range + same_flights.largest_distance_m, 0);
+  EXPECT_EQ(same_flights.ended_alike, 8u);
   policy::PolicyNetwork off = network;
   off.middle[0] += 0.02F * off.half[0];
-  const Agreement other = compare("p", "r", OfNetwork(off), config, network, vectors, 8);
+  const Agreement other = compare("p", "r", OfNetwork(off), network.half, vectors);
   EXPECT_EQ(other.differing, 100u);
   EXPECT_EQ(other.median_ulp, 0);  // of all four outputs
   EXPECT_GT(other.percentile_99_ulp, 1000);
   // 1 % of the range are 2 % of its half, which are up to 2^24 ulp
   EXPECT_GT(other.largest_ulp_of_range, 0.02 * (1 << 23));
   EXPECT_LT(other.largest_ulp_of_range, 0.0201 * (1 << 24));
-  EXPECT_GT(other.largest_distance_m, 1e-4);
+  EXPECT_GT(fly_beside(config, OfNetwork(off), 8).largest_distance_m, 1e-4);
 }
 
 /// Two outputs that are voltages: in 32 bits to the bit, in 8 bits near, in TorchScript within rounding.
@@ -382,7 +383,7 @@ TEST(PolicyHeader, SaysWhatARobotThatIsKnownByTheBeatMixes) {
   EXPECT_TRUE(text.find("pitch_servo = 0.5 + -1 bias, within 0 to 1\n") != std::string::npos) << text;
   EXPECT_TRUE(text.find("amplitude              1       0.2 to 1") != std::string::npos) << text;  // it has no unit
   EXPECT_TRUE(contract_macros("P_", config, {}).find("#define P_FLAPPING_HZ 0x1.d66666p+3") != std::string::npos);
-  EXPECT_EQ(no_controller(config), "the vehicle is beat-averaged, and has an autopilot of its own");
+  EXPECT_EQ(no_controller(config), "");
 }
 
 TEST(PolicyHeader, SaysWhatItCannotExport) {

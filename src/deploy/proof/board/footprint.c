@@ -20,7 +20,11 @@ static int flappy_controller_period(float *obs, float *added) {
   flappy_controller_observe(&controller, obs);
   flappy_controller_act(&controller, added);
   flappy_controller_steer(&controller);
+#if FLAPPY_CONTROLLER_INPUTS > 0
+  flappy_controller_inputs(&controller, added);
+#else
   flappy_controller_drive(&controller, &added[0], &added[1]);
+#endif
   return flappy_controller_policy_due(&controller);
 }
 #endif
