@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "deploy/firmware/firmware.hpp"
 #include "deploy/header/controller_header.hpp"
 #include "deploy/header/exported_files.hpp"
 #include "deploy/header/policy_header.hpp"
@@ -29,7 +30,7 @@ constexpr std::size_t kProofFlights = 64, kFitFlights = 512, kComparedFlights = 
 constexpr std::size_t kTestVectors = 24, kProofVectors = 1000, kFitVectors = 10000, kComparedVectors = 4000;
 
 struct Request {
-  std::string run, out, name{policy::kPrefix};
+  std::string run, out, name{policy::kPrefix}, firmware;
   bool int8 = false, prove = false;
 };
 
@@ -80,6 +81,7 @@ Json json_of(const OutputError& e) { return {{"largest", e.largest}, {"rms", e.r
 void write_all(const fs::path& folder, const std::string& prefix, const std::map<std::string, std::string>& files) {
   std::vector<std::unique_ptr<io::AtomicFile>> written;
   for (const auto& [name, text] : files) {
+    io::make_folder((folder / name).parent_path());
     written.push_back(std::make_unique<io::AtomicFile>(folder / name));
     written.back()->write(text);
   }
@@ -156,6 +158,8 @@ void run(const Request& request, const io::Program& program) {
   if (!is_name)
     throw io::InputError("--name: \"" + request.name +
                          "\" begins no name; accepted: small letters, digits and _, a letter first, at most 40");
+  if (!request.firmware.empty() && request.name != policy::kPrefix)
+    throw io::InputError("--name: the firmware's app knows names of flappy_ alone; accepted: --for without --name");
   const learn::FinishedRun run = learn::read_finished_run(request.run);
   const policy::PolicyNetwork network = deploy::network_of(run.fly);
   if (request.int8 && (network.layer_norm || network.linear || network.hidden > policy::Activation::tanh))
@@ -177,6 +181,12 @@ void run(const Request& request, const io::Program& program) {
 
   e.files = deploy::exported_files(run.fly, run.info, network, tests);
   e.proofs["flappy_policy.h"] = for_proof(e, network);
+  if (!request.firmware.empty()) {
+    for (const auto& [path, text] : deploy::firmware_files(request.firmware, run.fly))
+      e.files[request.firmware + "/" + path] = text;
+    for (const char* header : {"flappy_policy.h", "flappy_controller.h"})
+      e.files[request.firmware + "/src/" + header] = e.files.at(header);
+  }
   io::make_folder(request.out);
   if (request.int8) {
     const PolicyVectors fit = deploy::some_of(deploy::roll_out(run.fly, kProofFlights, kFitFlights), kFitVectors);
@@ -216,7 +226,8 @@ void run(const Request& request, const io::Program& program) {
   if (with_controller) measure("flappy_controller.h", work / "flappy_policy", "flappy_controller.h");
   std::map<std::string, std::string> files;
   for (const auto& [name, text] : e.files)
-    if (name.ends_with(".h")) files[policy::with_prefix(name, request.name)] = policy::with_prefix(text, request.name);
+    if (name.ends_with(".h") && request.firmware.empty())
+      files[policy::with_prefix(name, request.name)] = policy::with_prefix(text, request.name);
     else files[name] = name == "README.md" ? policy::with_prefix(text, request.name) : text;
   write_all(request.out, request.name, files);
   for (const auto& [name, text] : files)
@@ -240,6 +251,10 @@ int main(int argc, char** argv) {
   program.app()
       .option("--name", r.name, "what names in C, and of headers, begin with: two policies in one program need two")
       .shows_default();
+  program.app()
+      .option("--for", r.firmware,
+              "an app of this firmware, too, in a folder of its name: crazyflie (a Flapper Nimble+)")
+      .one_of({std::begin(deploy::kFirmwares), std::end(deploy::kFirmwares)});
   program.app().flag("--prove", r.prove,
                      "prove it on every compiler at hand and on a Cortex-M4F, and measure what microcontrollers need");
   return program.run(argc, argv, [&] { exports::run(r, program); });

@@ -322,6 +322,9 @@ std::string controller_header(const rollout::FlyConfig& config, const policy::Ru
   define("FRAMES", number(schedule.queue_slots()) + " /* poses that may wait for the IMU */");
   define("AHEAD_US", number(schedule.ring_slots() * periods.control_us) + " /* no further does it extrapolate */");
   define("SEGMENTS", number(o.task.path.size()));
+  const double lasts_s = std::min({o.task.constants.limits.time_s, config.duration_s, 2000.0});
+  define("LASTS_US", number(std::lround(lasts_s * 1e6)) + " /* the task's time */");
+  define("FEEDBACK", o.controller.kind == flight::kNoController ? "0" : "1");
   define("INPUTS",
          std::to_string(inputs.size()) + " /* of the robot; 0: the driver sets the voltages of two motors */");
   for (std::size_t i = 0; i < inputs.size(); ++i) {

@@ -1,0 +1,188 @@
+#include "deploy/firmware/firmware.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <vector>
+
+#include "deploy/embedded.hpp"
+#include "io/files.hpp"
+#include "model/derive.hpp"
+#include "model/jointed.hpp"
+
+namespace flappy::deploy {
+namespace {
+
+using Input = model::BeatAveraged::Input;
+
+/// An input of a Flapper, its channel of the log, and the values that control_t can carry to it
+/// (power_distribution_flapper.c): flapperConfig.maxThrust of 60000 with half of int16_t for roll, 0.4 of int16_t about
+/// the middle, int16_t about the middle.
+struct Channel {
+  const char* input;
+  const char* logged;
+  double low, high;
+};
+constexpr double kFull = 65535, kInt16 = 32767;
+constexpr std::array<Channel, 4> kFlapper = {
+    {{"left_flap", "motor.m2", 0, 60000 / kFull},
+     {"right_flap", "motor.m4", 0, 60000 / kFull},
+     {"pitch_servo", "motor.m1", 0.5 - 0.4 * kInt16 / kFull, 0.5 + 0.4 * kInt16 / kFull},
+     {"yaw_servo", "motor.m3", 0.5 - kInt16 / kFull, 0.5 + kInt16 / kFull}}};
+
+/// Lowest and highest value of an input that the task's actions can ask for.
+std::array<double, 2> reach_of(const Input& input, const flight::Task& task) {
+  double low = input.neutral, high = input.neutral;
+  for (std::size_t k = 0; k < input.mix.size(); ++k) {
+    const double a = input.mix[k] * task.constants.action_low[k], b = input.mix[k] * task.constants.action_high[k];
+    low += std::min(a, b);
+    high += std::max(a, b);
+  }
+  return {std::max(low, input.low), std::min(high, input.high)};
+}
+
+void check(const rollout::FlyConfig& config) {
+  const std::vector<Input> inputs = model::mixed_inputs(config.vehicle);
+  std::string has, wants;
+  for (const Input& input : inputs) has += (has.empty() ? "" : ", ") + input.name;
+  for (const Channel& c : kFlapper) wants += (wants.empty() ? "" : ", ") + std::string(c.input);
+  const bool fits = inputs.size() == kFlapper.size() && std::ranges::all_of(kFlapper, [&](const Channel& c) {
+                      return std::ranges::find(inputs, c.input, &Input::name) != inputs.end();
+                    });
+  if (!fits)
+    throw io::InputError("--for crazyflie: the vehicle has " + (has.empty() ? "two motors" : "the inputs " + has) +
+                         "; accepted: a vehicle with " + wants + ", such as flapper_nimble" +
+                         (has.empty() ? "; for two motors, tools/onboard is a main loop" : ""));
+  if (config.fleet.controller.kind != flight::kNoController) return;  // feedback and policy add up, and are clipped
+  for (const Channel& c : kFlapper) {
+    constexpr double kDigits = 1e-4;
+    const auto [low, high] = reach_of(*std::ranges::find(inputs, c.input, &Input::name), config.fleet.task);
+    if (low >= c.low - kDigits && high <= c.high + kDigits) continue;
+    throw io::InputError("--for crazyflie: the task's actions move " + std::string(c.input) + " from " +
+                         io::shortest_digits(std::round(low * 1000) / 1000) + " to " +
+                         io::shortest_digits(std::round(high * 1000) / 1000) +
+                         "; accepted: " + io::shortest_digits(std::ceil(c.low * 1000) / 1000) + " to " +
+                         io::shortest_digits(std::floor(c.high * 1000) / 1000) +
+                         ", which the firmware can set: train with a smaller task.action");
+  }
+}
+
+struct Logged {
+  std::string column, variable, scale;
+};
+
+/// Columns of the mapping's streams and the variables of the card's log.
+const std::vector<Logged> kMocap = {{"x_m", "stateEstimate.x", ""}, {"y_m", "stateEstimate.y", ""},
+                                    {"z_m", "stateEstimate.z", ""}, {"qw", "stateEstimate.qw", ""},
+                                    {"qx", "stateEstimate.qx", ""}, {"qy", "stateEstimate.qy", ""},
+                                    {"qz", "stateEstimate.qz", ""}};
+const std::vector<Logged> kImu = {{"gyro_x_rad_s", "gyro.x", "0.017453292519943295"},
+                                  {"gyro_y_rad_s", "gyro.y", "0.017453292519943295"},
+                                  {"gyro_z_rad_s", "gyro.z", "0.017453292519943295"},
+                                  {"accel_x_m_s2", "acc.x", "9.81"},
+                                  {"accel_y_m_s2", "acc.y", "9.81"},
+                                  {"accel_z_m_s2", "acc.z", "9.81"}};
+
+/// A stream's columns and scales.
+std::string columns_of(const std::string& stream, const std::vector<Logged>& columns) {
+  std::string text = "[" + stream + ".columns]\n", scales;
+  for (const Logged& c : columns) {
+    text += c.column + " = \"" + c.variable + "\"\n";
+    if (!c.scale.empty()) scales += c.column + " = " + c.scale + "\n";
+  }
+  return text + (scales.empty() ? "" : "[" + stream + ".scale]\n" + scales);
+}
+
+/// What the policy got and gave, in the order of the firmware's log variables o0, o1, ... and a0, ...
+std::vector<Logged> policy_of(const flight::Task& task) {
+  std::vector<Logged> all;
+  const auto observation = task.observation(), action = task.action();
+  for (std::size_t i = 0; i < observation.size(); ++i)
+    all.push_back({"observation_" + observation[i].name, "flappy.o" + std::to_string(i), ""});
+  for (std::size_t i = 0; i < action.size(); ++i)
+    all.push_back({"action_" + action[i].name, "flappy.a" + std::to_string(i), ""});
+  return all;
+}
+
+std::vector<Logged> commands() {
+  std::vector<Logged> all;
+  for (const Channel& c : kFlapper) all.push_back({c.input, c.logged, "1.5259021896692422e-05"});
+  return all;
+}
+
+std::string log_header(const flight::Task& task) {
+  std::string text = "/* What the policy got and gave, in the order of contract.json. */\n";
+  for (std::size_t i = 0; i < task.observation().size(); ++i) {
+    const std::string k = std::to_string(i);
+    text += "LOG_ADD(LOG_FLOAT, o" + k + ", &guest.observation[" + k + "])\n";
+  }
+  for (int i = 0; i < task.actions(); ++i) {
+    const std::string k = std::to_string(i);
+    text += "LOG_ADD(LOG_FLOAT, a" + k + ", &guest.action[" + k + "])\n";
+  }
+  return text;
+}
+
+/// config.txt of the microSD card: docs/.../micro-sd-card-deck of the firmware.
+std::string card(const rollout::FlyConfig& config) {
+  const long rate_Hz = std::min(500L, std::lround(1 / (config.fleet.task.action_repeat / config.fleet.control_hz)) * 2);
+  std::string text = "1\n2048\nlog\n0\non:fixedFrequency\n" + std::to_string(std::max(100L, rate_Hz)) + "\n1\n";
+  for (const auto& list : {commands(), kMocap, kImu, policy_of(config.fleet.task)})
+    for (const Logged& c : list) text += c.variable + "\n";
+  return text + "pm.vbat\nflappy.state\nflappy.flags\n";
+}
+
+std::string mapping(const rollout::FlyConfig& config) {
+  std::string inputs, numbers;
+  for (const Channel& c : kFlapper) inputs += (inputs.empty() ? "\"" : ", \"") + std::string(c.input) + "\"";
+  const std::vector<Logged> policy = policy_of(config.fleet.task);
+  for (const Logged& c : policy) numbers += (numbers.empty() ? "\"" : ", \"") + c.column + "\"";
+  return "# The log of this app on the microSD card: flappy-gap import log00 --mapping mapping.toml --out FLIGHT.\n"
+         "# Vehicle file, air and noise are yours to check; all keys are in docs/reference/import.md.\n"
+         "schema = 1\nvehicle = \"" +
+         config.vehicle.name + ".toml\"\nflapping_Hz = " + io::shortest_digits(model::beats_Hz(config.vehicle)) +
+         "\ngravity_m_s2 = 9.81\n\n[ambient]\nair_density_kg_m3 = 1.2\nground_z_m = 0.0\nceiling_z_m = 1000.0\nwalls = "
+         "[]\n\n"
+         "[command]\nchannel = \"fixedFrequency\"\ninputs = [" +
+         inputs + "]\n" + columns_of("command", commands()) +
+         "[command.flown]  # the wings beat\nfield = \"motor.m2\"\nabove = 0.0\n\n"
+         "[mocap]  # the firmware's own estimate\nsource = \"estimate\"\nchannel = \"fixedFrequency\"\nlatency_s = "
+         "0.0\n"
+         "position_noise_m = 2e-3\nattitude_noise_rad = 0.03\n" +
+         columns_of("mocap", kMocap) +
+         "\n[imu]\nchannel = \"fixedFrequency\"\nlatency_s = 0.0\nbandwidth_hz = 80.0\nposition_m = [0.0, 0.0, 0.0]\n"
+         "gyro_noise_rad_s = 0.5\ngyro_bias_sd_rad_s = [0.02, 0.02, 0.02]\naccel_noise_m_s2 = 10.0\n" +
+         columns_of("imu", kImu) +
+         "\n[power]\nchannel = \"fixedFrequency\"\ncurrents = false\nbattery_nominal_V = 7.4\nlatency_s = 0.0\n"
+         "voltage_noise_V = 0.04\n[power.columns]\nbattery_V = \"pm.vbat\"\n\n"
+         "[policy]  # what it got and gave\nchannel = \"fixedFrequency\"\nnumbers = [" +
+         numbers + "]\n" + columns_of("policy", policy);
+}
+
+}  // namespace
+
+std::map<std::string, std::string> firmware_files(const std::string& firmware, const rollout::FlyConfig& config) {
+  check(config);
+  const std::string source = "flappy_" + firmware;
+  return {
+      {"Makefile",
+       "# make, then make cload. CRAZYFLIE_BASE: a clone of the firmware with its submodules.\n"
+       "CRAZYFLIE_BASE ?= $(HOME)/crazyflie-firmware\nOOT_CONFIG := $(PWD)/app-config\n"
+       "include $(CRAZYFLIE_BASE)/tools/make/oot.mk\n"},
+      {"app-config",
+       "CONFIG_APP_ENABLE=y\nCONFIG_APP_PRIORITY=1\nCONFIG_APP_STACKSIZE=350\nCONFIG_CONTROLLER_OOT=y\n"
+       "CONFIG_PLATFORM_FLAPPER=y\nCONFIG_ESTIMATOR_AUTO_SELECT=y\nCONFIG_MOTORS_ESC_PROTOCOL_STANDARD_PWM=y\n"
+       "CONFIG_CONTROLLER_PID_FILTER_ALL=y\nCONFIG_DECK_FORCE=\"bcUSD:bcLedRing:bcFlapperDeck\"\n"
+       "CONFIG_DECK_FLAPPER=y\nCONFIG_DECK_USD=y\nCONFIG_DECK_LEDRING=y\n"},
+      {"Kbuild", "obj-y += src/\n"},
+      {"src/Kbuild", "obj-y += " + source + ".o\n"},
+      {"src/" + source + ".c", std::string(kEmbedded.at(source + ".c"))},
+      {"src/flappy_guest.h", std::string(kEmbedded.at("flappy_guest.h"))},
+      {"src/flappy_log.h", log_header(config.fleet.task)},
+      {"config.txt", card(config)},
+      {"mapping.toml", mapping(config)},
+  };
+}
+
+}  // namespace flappy::deploy
