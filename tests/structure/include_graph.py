@@ -29,7 +29,7 @@ ROOMS = {
     "learn": ROLLOUT | {"learn/lanes"},
     "deploy": {"io"},
     "deploy/header": ROLLOUT | {"deploy"},
-    "deploy/firmware": ROLLOUT | {"deploy"},
+    "deploy/firmware": ROLLOUT | {"deploy", "deploy/header"},
     "deploy/proof": {"io", "policy", "deploy"},
     "identify": BASE | {"flightlog"},
     "gap/result": {"io", "flightlog/check"},

@@ -7,43 +7,6 @@
 namespace flappy::deploy {
 namespace {
 
-/// Without a trim one of the flappers turns by 0.41 rad at first: until period 132 it is not at its place.
-Script with_settling() {
-  Script s;
-  s.manoeuvre = 700;
-  s.periods = 1300;
-  return s;
-}
-
-void fly_as_the_lanes(const FlyConfig& config, std::uint32_t flapper, const Words& program,
-                      const Script& script = with_settling()) {
-  OwnFlight own(config, flapper);
-  LedFlight led(config, flapper, program);
-  for (const loop_output& said : led.before()) {
-    ASSERT_EQ(said.state, kWaiting);
-    for (std::uint32_t d = 0; d < said.drive_count; ++d) ASSERT_EQ(said.volts[d][0], 0);
-  }
-  int acted = 0;
-  while (led.period() < script.periods) {
-    const int period = led.period();
-    if (period == script.manoeuvre) own.begin();
-    ASSERT_TRUE(led.step(script)) << "voltages of period " << period;
-    own.fleet().step();
-    const auto is = led.fleet().snapshot(0), should_be = own.fleet().snapshot(0);
-    ASSERT_EQ(is.phase, should_be.phase);
-    for (std::size_t r = 0; r < is.body.size(); ++r)
-      ASSERT_EQ(std::bit_cast<std::uint32_t>(is.body[r]), std::bit_cast<std::uint32_t>(should_be.body[r]))
-          << "row " << r << " of the body, period " << period << ", flapper " << flapper << ": " << is.body[r]
-          << ", not " << should_be.body[r];
-    acted += led.said().state == kActing;
-  }
-  EXPECT_EQ(acted, 175);
-  EXPECT_EQ(led.said().state, kReturned);
-  EXPECT_EQ(led.said().flags, kHandedBack);
-  EXPECT_EQ(led.program().finish(), 0);
-  if (!config.randomisation) EXPECT_LT(led.distance_m(0), 0.05) << "of the goal";
-}
-
 TEST(Onboard, FliesAsTheLanesDo) {
   const FlyConfig config = escape(), nominal = of_nominal(config);
   fly_as_the_lanes(nominal, 0, escape_loop());

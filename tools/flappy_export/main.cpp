@@ -89,6 +89,10 @@ void write_all(const fs::path& folder, const std::string& prefix, const std::map
   for (const std::string& name : {prefix + "_policy.h", prefix + "_policy_int8.h", prefix + "_controller.h",
                                   std::string("policy.pt"), std::string("policy.onnx")})
     if (!files.contains(name)) fs::remove(folder / name);
+  // an app with headers of another run could be flashed by mistake
+  for (const std::string at : {"crazyflie/src/", "px4/src/modules/flappy_control/"})
+    for (const char* name : {"flappy_policy.h", "flappy_controller.h"})
+      if (!files.contains(at + name)) fs::remove(folder / (at + name));
   io::sync_folder(folder);
 }
 
@@ -182,10 +186,8 @@ void run(const Request& request, const io::Program& program) {
   e.files = deploy::exported_files(run.fly, run.info, network, tests);
   e.proofs["flappy_policy.h"] = for_proof(e, network);
   if (!request.firmware.empty()) {
-    for (const auto& [path, text] : deploy::firmware_files(request.firmware, run.fly))
+    for (const auto& [path, text] : deploy::firmware_files(request.firmware, run.fly, e.files))
       e.files[request.firmware + "/" + path] = text;
-    for (const char* header : {"flappy_policy.h", "flappy_controller.h"})
-      e.files[request.firmware + "/src/" + header] = e.files.at(header);
   }
   io::make_folder(request.out);
   if (request.int8) {
@@ -253,7 +255,7 @@ int main(int argc, char** argv) {
       .shows_default();
   program.app()
       .option("--for", r.firmware,
-              "an app of this firmware, too, in a folder of its name: crazyflie (a Flapper Nimble+)")
+              "sources of an app for this firmware, too: crazyflie (a Flapper Nimble+) or px4 (two motors)")
       .one_of({std::begin(deploy::kFirmwares), std::end(deploy::kFirmwares)});
   program.app().flag("--prove", r.prove,
                      "prove it on every compiler at hand and on a Cortex-M4F, and measure what microcontrollers need");

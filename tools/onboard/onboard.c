@@ -138,14 +138,14 @@ static void begin_manoeuvre(onboard *o, uint32_t now_us) {
 }
 
 static void let_policy_act(onboard *o) {
-  float obs[FLAPPY_POLICY_OBS], action[FLAPPY_POLICY_ACT];
   if (!flappy_controller_policy_due(&o->controller)) return;
-  flappy_controller_observe(&o->controller, obs);
-  if (flappy_policy_step(obs, action) != 0) {
+  flappy_controller_observe(&o->controller, o->observation);
+  ++o->inferences;
+  if (flappy_policy_step(o->observation, o->action) != 0) {
     drop_policy(o, ONBOARD_POLICY_REFUSED);
     return;
   }
-  flappy_controller_act(&o->controller, action);
+  flappy_controller_act(&o->controller, o->action);
 }
 
 void onboard_tick(onboard *o, uint32_t now_us) {

@@ -133,6 +133,8 @@ typedef struct {
   uint32_t act_us;            /* time at which the policy began to act */
   onboard_pose_sample pose;   /* the last good sample */
   int has_imu, has_pose;
+  uint32_t inferences; /* of the policy; what it got and gave at the last one */
+  float observation[FLAPPY_POLICY_OBS], action[FLAPPY_POLICY_ACT];
 } onboard;
 
 /* Runs the self-tests of both headers. `now_us`: time at which the first tick is due. */

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "deploy/embedded.hpp"
+#include "deploy/header/controller_header.hpp"
 #include "io/files.hpp"
 #include "model/derive.hpp"
 #include "model/jointed.hpp"
@@ -42,7 +43,7 @@ std::array<double, 2> reach_of(const Input& input, const flight::Task& task) {
   return {std::max(low, input.low), std::min(high, input.high)};
 }
 
-void check(const rollout::FlyConfig& config) {
+void check_flapper(const rollout::FlyConfig& config) {
   const std::vector<Input> inputs = model::mixed_inputs(config.vehicle);
   std::string has, wants;
   for (const Input& input : inputs) has += (has.empty() ? "" : ", ") + input.name;
@@ -94,15 +95,21 @@ std::string columns_of(const std::string& stream, const std::vector<Logged>& col
   return text + (scales.empty() ? "" : "[" + stream + ".scale]\n" + scales);
 }
 
-/// What the policy got and gave, in the order of the firmware's log variables o0, o1, ... and a0, ...
-std::vector<Logged> policy_of(const flight::Task& task) {
+/// What the policy got and gave, and what the log calls it.
+std::vector<Logged> policy_of(const flight::Task& task, const auto& observation_at, const auto& action_at) {
   std::vector<Logged> all;
   const auto observation = task.observation(), action = task.action();
   for (std::size_t i = 0; i < observation.size(); ++i)
-    all.push_back({"observation_" + observation[i].name, "flappy.o" + std::to_string(i), ""});
-  for (std::size_t i = 0; i < action.size(); ++i)
-    all.push_back({"action_" + action[i].name, "flappy.a" + std::to_string(i), ""});
+    all.push_back({"observation_" + observation[i].name, observation_at(i), ""});
+  for (std::size_t i = 0; i < action.size(); ++i) all.push_back({"action_" + action[i].name, action_at(i), ""});
   return all;
+}
+
+/// As flappy_log.h names them.
+std::vector<Logged> policy_on_card(const flight::Task& task) {
+  return policy_of(
+      task, [](std::size_t i) { return "flappy.o" + std::to_string(i); },
+      [](std::size_t i) { return "flappy.a" + std::to_string(i); });
 }
 
 std::vector<Logged> commands() {
@@ -128,16 +135,22 @@ std::string log_header(const flight::Task& task) {
 std::string card(const rollout::FlyConfig& config) {
   const long rate_Hz = std::min(500L, std::lround(1 / (config.fleet.task.action_repeat / config.fleet.control_hz)) * 2);
   std::string text = "1\n2048\nlog\n0\non:fixedFrequency\n" + std::to_string(std::max(100L, rate_Hz)) + "\n1\n";
-  for (const auto& list : {commands(), kMocap, kImu, policy_of(config.fleet.task)})
+  for (const auto& list : {commands(), kMocap, kImu, policy_on_card(config.fleet.task)})
     for (const Logged& c : list) text += c.variable + "\n";
   return text + "pm.vbat\nflappy.state\nflappy.flags\n";
 }
 
-std::string mapping(const rollout::FlyConfig& config) {
-  std::string inputs, numbers;
-  for (const Channel& c : kFlapper) inputs += (inputs.empty() ? "\"" : ", \"") + std::string(c.input) + "\"";
-  const std::vector<Logged> policy = policy_of(config.fleet.task);
+/// The stream of what the policy got and gave.
+std::string policy_stream(const std::string& channel, const std::vector<Logged>& policy) {
+  std::string numbers;
   for (const Logged& c : policy) numbers += (numbers.empty() ? "\"" : ", \"") + c.column + "\"";
+  return "\n[policy]  # what it got and gave\nchannel = \"" + channel + "\"\nnumbers = [" + numbers + "]\n" +
+         columns_of("policy", policy);
+}
+
+std::string mapping(const rollout::FlyConfig& config) {
+  std::string inputs;
+  for (const Channel& c : kFlapper) inputs += (inputs.empty() ? "\"" : ", \"") + std::string(c.input) + "\"";
   return "# The log of this app on the microSD card: flappy-gap import log00 --mapping mapping.toml --out FLIGHT.\n"
          "# Vehicle file, air and noise are yours to check; all keys are in docs/reference/import.md.\n"
          "schema = 1\nvehicle = \"" +
@@ -155,16 +168,12 @@ std::string mapping(const rollout::FlyConfig& config) {
          "gyro_noise_rad_s = 0.5\ngyro_bias_sd_rad_s = [0.02, 0.02, 0.02]\naccel_noise_m_s2 = 10.0\n" +
          columns_of("imu", kImu) +
          "\n[power]\nchannel = \"fixedFrequency\"\ncurrents = false\nbattery_nominal_V = 7.4\nlatency_s = 0.0\n"
-         "voltage_noise_V = 0.04\n[power.columns]\nbattery_V = \"pm.vbat\"\n\n"
-         "[policy]  # what it got and gave\nchannel = \"fixedFrequency\"\nnumbers = [" +
-         numbers + "]\n" + columns_of("policy", policy);
+         "voltage_noise_V = 0.04\n[power.columns]\nbattery_V = \"pm.vbat\"\n" +
+         policy_stream("fixedFrequency", policy_on_card(config.fleet.task));
 }
 
-}  // namespace
-
-std::map<std::string, std::string> firmware_files(const std::string& firmware, const rollout::FlyConfig& config) {
-  check(config);
-  const std::string source = "flappy_" + firmware;
+std::map<std::string, std::string> crazyflie_files(const rollout::FlyConfig& config) {
+  check_flapper(config);
   return {
       {"Makefile",
        "# make, then make cload. CRAZYFLIE_BASE: a clone of the firmware with its submodules.\n"
@@ -176,13 +185,64 @@ std::map<std::string, std::string> firmware_files(const std::string& firmware, c
        "CONFIG_CONTROLLER_PID_FILTER_ALL=y\nCONFIG_DECK_FORCE=\"bcUSD:bcLedRing:bcFlapperDeck\"\n"
        "CONFIG_DECK_FLAPPER=y\nCONFIG_DECK_USD=y\nCONFIG_DECK_LEDRING=y\n"},
       {"Kbuild", "obj-y += src/\n"},
-      {"src/Kbuild", "obj-y += " + source + ".o\n"},
-      {"src/" + source + ".c", std::string(kEmbedded.at(source + ".c"))},
+      {"src/Kbuild", "obj-y += flappy_crazyflie.o\n"},
+      {"src/flappy_crazyflie.c", std::string(kEmbedded.at("flappy_crazyflie.c"))},
       {"src/flappy_guest.h", std::string(kEmbedded.at("flappy_guest.h"))},
       {"src/flappy_log.h", log_header(config.fleet.task)},
       {"config.txt", card(config)},
       {"mapping.toml", mapping(config)},
   };
+}
+
+/// px4.toml for this vehicle and policy.
+std::string px4_mapping(const rollout::FlyConfig& config) {
+  std::string text(kEmbedded.at("px4.toml"));
+  const auto replace = [&](const std::string& key, const std::string& value) {
+    const std::size_t begin = text.find("\n" + key + " = ") + 1;
+    text.replace(begin, text.find('\n', begin) - begin, key + " = " + value);
+  };
+  replace("vehicle", "\"" + config.vehicle.name + ".toml\"");
+  replace("flapping_Hz", io::shortest_digits(config.vehicle.driver.flapping_Hz));
+  const std::size_t inputs = config.fleet.task.observation().size();
+  const auto data = [](std::size_t i) { return "data[" + std::to_string(i) + "]"; };
+  return text + policy_stream("debug_array",
+                              policy_of(config.fleet.task, data, [&](std::size_t i) { return data(inputs + i); }));
+}
+
+std::map<std::string, std::string> px4_files(const rollout::FlyConfig& config) {
+  constexpr std::size_t kDebugArray = 58;
+  if (!model::mixed_inputs(config.vehicle).empty())
+    throw io::InputError("--for px4: the vehicle has inputs in place of two motors; accepted: a vehicle with motors");
+  if (const std::string why_not = no_controller(config); !why_not.empty())
+    throw io::InputError("--for px4: " + why_not + "; accepted: a task that leaves the controller to fly");
+  if (const std::size_t n = config.fleet.task.observation().size() + 4; n > kDebugArray)
+    throw io::InputError("--for px4: the policy gets and gives " + std::to_string(n) +
+                         " numbers; accepted: at most 58, which its log holds");
+  const std::string at = "src/modules/flappy_control/";
+  return {
+      {"src/CMakeLists.txt", "set(config_module_list_external modules/flappy_control PARENT_SCOPE)\n"},
+      {at + "CMakeLists.txt",
+       "px4_add_module(\n  MODULE modules__flappy_control\n  MAIN flappy_control\n"
+       "  SRCS flappy_px4.cpp onboard.c\n  DEPENDS px4_work_queue\n  EXTERNAL\n)\n"},
+      {at + "flappy_px4.cpp", std::string(kEmbedded.at("flappy_px4.cc"))},
+      {at + "onboard.h", std::string(kEmbedded.at("onboard.h"))},
+      {at + "onboard.c", std::string(kEmbedded.at("onboard.c"))},
+      {"logger_topics.txt",
+       "actuator_motors 0\nsensor_combined 0\nvehicle_visual_odometry 0\nbattery_status 0\nactuator_armed 0\n"
+       "debug_array 0\n"},
+      {"mapping.toml", px4_mapping(config)},
+  };
+}
+
+}  // namespace
+
+std::map<std::string, std::string> firmware_files(const std::string& firmware, const rollout::FlyConfig& config,
+                                                  const std::map<std::string, std::string>& headers) {
+  const bool px4 = firmware == "px4";
+  std::map<std::string, std::string> files = px4 ? px4_files(config) : crazyflie_files(config);
+  for (const char* header : {"flappy_policy.h", "flappy_controller.h"})
+    files[(px4 ? "src/modules/flappy_control/" : "src/") + std::string(header)] = headers.at(header);
+  return files;
 }
 
 }  // namespace flappy::deploy

@@ -9,11 +9,12 @@
 namespace flappy::deploy {
 
 /// Names of the firmwares that firmware_files() knows.
-inline constexpr const char* kFirmwares[] = {"crazyflie"};
+inline constexpr const char* kFirmwares[] = {"crazyflie", "px4"};
 
-/// [path below the app's folder] text of an out-of-tree app for `firmware`, its log's configuration and mapping, and a
-/// README; the headers are not among them. io::InputError where the vehicle has other inputs than the firmware, or the
-/// task's actions move one further than it can.
-std::map<std::string, std::string> firmware_files(const std::string& firmware, const rollout::FlyConfig& config);
+/// [path below the app's folder] text of an out-of-tree app for `firmware`, its log's configuration and mapping; `headers`
+/// are flappy_policy.h and flappy_controller.h. io::InputError where the vehicle is none for this firmware, or the task's
+/// actions move an input further than it can.
+std::map<std::string, std::string> firmware_files(const std::string& firmware, const rollout::FlyConfig& config,
+                                                  const std::map<std::string, std::string>& headers);
 
 }  // namespace flappy::deploy

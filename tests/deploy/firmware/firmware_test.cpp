@@ -65,16 +65,18 @@ FlyConfig dash(const Words& overrides = {}) {
   return c;
 }
 
+std::map<std::string, std::string> headers_of(const FlyConfig& config) {
+  return exported_files(config, {std::string(64, 'a'), "0123456789ab", false, "a task"});
+}
+
 /// The app and its firmware, compiled in a folder as the exporter leaves it.
 class App {
  public:
   explicit App(const FlyConfig& config) {
-    for (const auto& [path, text] : firmware_files("crazyflie", config)) {
+    for (const auto& [path, text] : firmware_files("crazyflie", config, headers_of(config))) {
       std::filesystem::create_directories(std::filesystem::path(folder_ / path).parent_path());
       folder_.write(path, text);
     }
-    for (const auto& [name, text] : exported_files(config, {std::string(64, 'a'), "0123456789ab", false, "a task"}))
-      folder_.write("src/" + name, text);
     for (const char* name : {"FreeRTOS.h", "app.h", "controller.h", "controller_pid.h", "log.h", "param.h",
                              "stabilizer_types.h", "supervisor.h", "task.h", "usec_time.h"})
       folder_.write(std::string("src/") + name, "#include \"crazyflie_stub.h\"\n");
@@ -238,13 +240,14 @@ TEST(CrazyflieApp, EndsAtItsTimeAndAtALateStep) {
 }
 
 TEST(CrazyflieApp, RefusesWhatTheFirmwareCannotSet) {
-  EXPECT_EQ(message([] { firmware_files("crazyflie", dash({"task.action.bias_V=[-0.4,0.4]"})); }),
+  EXPECT_EQ(message([] { firmware_files("crazyflie", dash({"task.action.bias_V=[-0.4,0.4]"}), {}); }),
             "--for crazyflie: the task's actions move pitch_servo from 0.1 to 0.9; accepted: 0.301 to 0.699, which the "
             "firmware can set: train with a smaller task.action");
-  EXPECT_EQ(
-      message([] { firmware_files("crazyflie", rollout::read_fly_config(source_path("configs/fly/escape.toml"))); }),
-      "--for crazyflie: the vehicle has two motors; accepted: a vehicle with left_flap, right_flap, pitch_servo, "
-      "yaw_servo, such as flapper_nimble; for two motors, tools/onboard is a main loop");
+  EXPECT_EQ(message([] {
+              firmware_files("crazyflie", rollout::read_fly_config(source_path("configs/fly/escape.toml")), {});
+            }),
+            "--for crazyflie: the vehicle has two motors; accepted: a vehicle with left_flap, right_flap, pitch_servo, "
+            "yaw_servo, such as flapper_nimble; for two motors, tools/onboard is a main loop");
 }
 
 }  // namespace
