@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "deploy/flown/flown.hpp"
+#include "deploy/flown/inferences.hpp"
 #include "deploy/header/controller_header.hpp"
 #include "deploy/header/exported_files.hpp"
 #include "flightlog/check/digits.hpp"
@@ -63,6 +64,56 @@ double start_of(const flightlog::FlightLog& log) {
   return log.header.flown ? log.header.flown->start_s : log.command.t_s.front();
 }
 
+/// Adds what the log has of what the policy got and gave.
+void add_inferences(deploy::OnboardLog& to, const std::string& folder, const flightlog::FlightLog& log,
+                    const deploy::Contract& contract) {
+  const flightlog::FlightHeader& h = log.header;
+  const double zero_s = start_of(log);
+  if (!log.policy) return;
+  std::vector<std::string> known;
+  for (const auto& s : contract.observation) known.push_back("observation_" + s.name);
+  for (const auto& s : contract.action) known.push_back("action_" + s.name);
+  for (std::size_t k = 0; k < h.policy.size(); ++k) {
+    const auto found = std::ranges::find(known, h.policy[k]);
+    if (found == known.end())
+      refuse(folder, "policy.numbers: \"" + h.policy[k] + "\" is no number of this policy",
+             io::joined(known) + io::did_you_mean(h.policy[k], known));
+    to.policy_numbers.push_back(static_cast<std::size_t>(found - known.begin()));
+    to.policy_steps.push_back(flightlog::last_digit(log.policy->numbers[k]));
+  }
+  for (std::size_t i = 0; i < log.policy->t_s.size(); ++i) {
+    deploy::OnboardLog::Inference& row = to.inferences.emplace_back();
+    row.t_s = log.policy->t_s[i] - zero_s;
+    for (const flightlog::Column& numbers : log.policy->numbers) row.numbers.push_back(numbers[i]);
+  }
+}
+
+/// The inputs as they were set at or after each inference, up to the next.
+std::vector<deploy::LoggedInput> logged_inputs(const flightlog::FlightLog& log, const deploy::OnboardLog& onboard) {
+  std::vector<deploy::LoggedInput> all;
+  const std::vector<double>& t_s = log.command.t_s;
+  for (std::size_t k = 0; k < log.header.inputs.size(); ++k) {
+    deploy::LoggedInput& input = all.emplace_back(deploy::LoggedInput{log.header.inputs[k], {}});
+    for (const deploy::OnboardLog::Inference& row : onboard.inferences) {
+      const auto after = std::ranges::lower_bound(t_s, row.t_s + start_of(log) - 1e-6);
+      const auto at = std::min<std::ptrdiff_t>(after - t_s.begin(), static_cast<std::ptrdiff_t>(t_s.size()) - 1);
+      input.value.push_back(log.command.declared[k][static_cast<std::size_t>(at)]);
+    }
+  }
+  return all;
+}
+
+/// What a person reads of a robot with inputs.
+std::string sentence(const deploy::Inferences& f) {
+  std::string text = io::format("%zu of %zu inferences are the exported policy's", f.same, f.rows);
+  if (f.same < f.rows)
+    text += io::format(" (%s differs by up to %.1f %% of its range)", f.output.c_str(), 100 * f.largest);
+  for (const auto& i : f.inputs)
+    text += io::format("; %s follows it in %.1f %%", i.name.c_str(), 100 * i.share) +
+            (i.share < 0.95 ? io::format(" (set %+.3g off, median)", i.offset) : "");
+  return (f.as_exported() ? "the robot flew what was exported: " : "the robot did not fly what was exported: ") + text;
+}
+
 /// The flight as it passed the robot's processor, from its start on: at t = 0.
 deploy::OnboardLog onboard(const std::string& folder, const flightlog::FlightLog& log,
                            const deploy::Contract& contract) {
@@ -93,24 +144,7 @@ deploy::OnboardLog onboard(const std::string& folder, const flightlog::FlightLog
     if (h.flown->hand_back_s) to.hand_back_s = *h.flown->hand_back_s - zero_s;
   }
   using flightlog::last_digit;
-  if (log.policy) {
-    std::vector<std::string> known;
-    for (const auto& s : contract.observation) known.push_back("observation_" + s.name);
-    for (const auto& s : contract.action) known.push_back("action_" + s.name);
-    for (std::size_t k = 0; k < h.policy.size(); ++k) {
-      const auto found = std::ranges::find(known, h.policy[k]);
-      if (found == known.end())
-        refuse(folder, "policy.numbers: \"" + h.policy[k] + "\" is no number of this policy",
-               io::joined(known) + io::did_you_mean(h.policy[k], known));
-      to.policy_numbers.push_back(static_cast<std::size_t>(found - known.begin()));
-      to.policy_steps.push_back(last_digit(log.policy->numbers[k]));
-    }
-    for (std::size_t i = 0; i < log.policy->t_s.size(); ++i) {
-      deploy::OnboardLog::Inference& row = to.inferences.emplace_back();
-      row.t_s = log.policy->t_s[i] - zero_s;
-      for (const flightlog::Column& numbers : log.policy->numbers) row.numbers.push_back(numbers[i]);
-    }
-  }
+  add_inferences(to, folder, log, contract);
   // a double of a clock that counts from 1970 has a quarter of a microsecond at best
   to.time_noise_s = 2 * std::numeric_limits<double>::epsilon() * std::abs(zero_s);
   to.time_step_s = std::max({last_digit(log.imu.t_s), last_digit(m.t_s), 4 * to.time_noise_s});
@@ -155,6 +189,24 @@ Json check_flown(const std::string& exported, const std::vector<std::string>& fo
       };
       compare("policy", header->policy_crc32, check.contract().policy_crc32);
       compare("controller", header->controller_crc32, check.contract().controller_crc32);
+    }
+    if (!check.contract().inputs.empty()) {
+      if (log.header.inputs.empty())
+        refuse(folder, "has voltages, and the export is for a robot with inputs", "a log with declared inputs");
+      deploy::OnboardLog got;
+      add_inferences(got, folder, log, check.contract());
+      const deploy::Inferences f =
+          deploy::check_inferences(check.folder(), check.contract(), got, logged_inputs(log, got));
+      std::printf("%s: %s\n", folder.c_str(), sentence(f).c_str());
+      Json inputs = Json::array();
+      for (const auto& i : f.inputs) inputs.push_back({{"name", i.name}, {"share", i.share}, {"offset", i.offset}});
+      flights.push_back({{"folder", folder},
+                         {"as_exported", f.as_exported()},
+                         {"inferences", f.rows},
+                         {"same", f.same},
+                         {"inputs", inputs}});
+      all = all && f.as_exported();
+      continue;
     }
     deploy::Flown f = check.check(onboard(folder, log, check.contract()));
     f.from_s += start_of(log);

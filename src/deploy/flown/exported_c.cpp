@@ -71,7 +71,11 @@ void flown_drive(flappy_controller *c, const float *input, float *volts) {
   c->input.difference_V = input[1];
   c->input.bias_V = input[2];
   c->input.split_cycle = input[3];
+#if FLAPPY_CONTROLLER_INPUTS > 0
+  flappy_controller_inputs(c, volts);
+#else
   flappy_controller_drive(c, volts, volts + 1);
+#endif
 }
 )";
 
@@ -102,9 +106,6 @@ std::string source_of(const fs::path& folder, Build build, const std::string& co
   const std::size_t at = text.find(constant);
   if (at == std::string::npos)
     refuse(folder / "flappy_controller.h", "has no constants", "a header that flappy-export wrote");
-  if (text.find("#define FLAPPY_CONTROLLER_INPUTS 0") == std::string::npos)
-    refuse(folder / "flappy_controller.h", "drives no motors, but inputs of a robot",
-           "an export for a vehicle with motors");
   text.replace(at, constant.size(), "static flappy_controller_constants flappy_controller_k");
   return read_header(folder / (build == Build::int8 ? "flappy_policy_int8.h" : "flappy_policy.h")) + text + kWrapper;
 }
@@ -155,6 +156,8 @@ Contract read_contract(const fs::path& folder) {
     c.mocap_Hz = sensors.at("mocap_Hz");
     c.mocap_latency_s = sensors.at("mocap_latency_s");
     c.history = json.at("history");
+    for (const auto& i : json.at("inputs"))
+      c.inputs.push_back({i.at("name"), i.at("neutral"), i.at("low"), i.at("high"), i.at("mix")});
     const auto signals = [](const nlohmann::json& list) {
       std::vector<Contract::Signal> to;
       for (const auto& s : list) to.push_back({s.at("name"), s.at("unit"), s.at("low"), s.at("high")});

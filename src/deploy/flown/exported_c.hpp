@@ -26,12 +26,19 @@ struct Contract {
     std::string name, unit;
     double low = 0, high = 0;
   };
+  /// Input of a robot without motors: neutral and mix times the four actions, within low to high.
+  struct Input {
+    std::string name;
+    double neutral = 0, low = 0, high = 0;
+    std::array<double, 4> mix{};
+  };
   std::string task;
   std::uint32_t policy_crc32 = 0, controller_crc32 = 0;
   double control_s = 0, policy_s = 0, driver_s = 0;
   double imu_Hz = 0, mocap_Hz = 0, imu_latency_s = 0, mocap_latency_s = 0;
   std::uint32_t history = 1;
   std::vector<Signal> observation, action;
+  std::vector<Input> inputs;       ///< empty: two motors
   std::vector<float> mean, scale;  ///< [observation]
 };
 
@@ -69,8 +76,9 @@ class ExportedC {
   void (*forget)(void* state);  ///< the history
   int (*policy)(const float* observation, float* action);
   void (*act)(void* state, const float* action);
-  void (*steer)(void* state, float* input);                      ///< V, V, V, split cycle, before they are clipped
-  void (*drive)(void* state, const float* input, float* volts);  ///< left, right; with this input
+  void (*steer)(void* state, float* input);  ///< V, V, V, split cycle, before they are clipped
+  void (*drive)(void* state, const float* input,
+                float* volts);  ///< left, right, or the robot's inputs; with this input
 
  private:
   ExportedC(const std::filesystem::path& folder, Build build, const std::string& controller);

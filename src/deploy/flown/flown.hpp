@@ -34,6 +34,7 @@ class FlownCheck {
   explicit FlownCheck(const std::filesystem::path& folder);
   Flown check(const OnboardLog& log) const;
   const Contract& contract() const { return contract_; }
+  const std::filesystem::path& folder() const { return folder_; }
 
  private:
   const ExportedC& library(Build build) const;

@@ -51,6 +51,13 @@ nlohmann::ordered_json json_of(const std::vector<Signal>& signals) {
   return list;
 }
 
+nlohmann::ordered_json json_of(const std::vector<model::BeatAveraged::Input>& inputs) {
+  auto list = nlohmann::ordered_json::array();
+  for (const auto& i : inputs)
+    list.push_back({{"name", i.name}, {"neutral", i.neutral}, {"mix", i.mix}, {"low", i.low}, {"high", i.high}});
+  return list;
+}
+
 /// Rows of `width` numbers.
 nlohmann::ordered_json rows_of(const std::vector<float>& numbers, std::size_t width) {
   auto rows = nlohmann::ordered_json::array();
@@ -163,6 +170,7 @@ std::string contract_json(const FlyConfig& config, const policy::RunInfo& run, c
       {"observation", json_of(task.observation())},
       {"normalisation", {{"mean", network.mean}, {"scale", network.scale}, {"clip", network.clip}}},
       {"action", json_of(task.action())},
+      {"inputs", json_of(model::mixed_inputs(config.vehicle))},
       {"test_vectors",
        {{"observation", rows_of(vectors.observation, static_cast<std::size_t>(network.inputs()))},
         {"action", rows_of(vectors.action, static_cast<std::size_t>(network.outputs()))}}}};

@@ -6,8 +6,10 @@
 
 #include <random>
 
+#include "deploy/flown/inferences.hpp"
 #include "deploy/flown/replay.hpp"
 #include "deploy/header/exported_files.hpp"
+#include "deploy/header/policy_vectors.hpp"
 #include "full.hpp"
 #include "rollout/fly_fixture.hpp"
 #include "rollout/rollout.hpp"
@@ -194,6 +196,80 @@ TEST_F(FlownTest, SaysWhereNothingExplainsIt) {
   const Flown silent = check_->check(logged(order));
   ASSERT_EQ(silent.mistakes.size(), 1U) << "a log that has no observation";
   EXPECT_EQ(silent.mistakes[0].id, "another_policy");
+}
+
+/// A robot with inputs: what its policy got and gave, and the inputs that it asked for.
+class InferencesTest : public testing::Test {
+ protected:
+  InferencesTest() {
+    config_ = rollout::read_fly_config(source_path("configs/fly/flapper_dash.toml"));
+    config_.actor = random_actor(config_.fleet.task, 7);
+    for (const auto& [name, text] : exported_files(config_, {"0123", "abcd", false, "flapper_dash"}))
+      folder_.write(name, text);
+    contract_ = read_contract(folder_ / "");
+    const policy::PolicyVectors flown = roll_out(config_, 0, 2);
+    const auto seen = static_cast<std::size_t>(flown.inputs), acts = static_cast<std::size_t>(flown.outputs);
+    for (std::size_t k = 0; k < seen + acts; ++k) log_.policy_numbers.push_back(k), log_.policy_steps.push_back(0);
+    for (const Contract::Input& i : contract_.inputs) inputs_.push_back({i.name, {}});
+    for (std::size_t row = 0; row < flown.rows(); ++row) {
+      OnboardLog::Inference& to = log_.inferences.emplace_back();
+      for (std::size_t k = 0; k < seen; ++k)
+        to.numbers.push_back(static_cast<double>(flown.observation[row * seen + k]));
+      for (std::size_t k = 0; k < acts; ++k) to.numbers.push_back(static_cast<double>(flown.action[row * acts + k]));
+      for (std::size_t i = 0; i < inputs_.size(); ++i) {
+        double value = contract_.inputs[i].neutral;
+        for (std::size_t k = 0; k < acts; ++k) value += contract_.inputs[i].mix[k] * to.numbers[seen + k];
+        inputs_[i].value.push_back(std::clamp(value, contract_.inputs[i].low, contract_.inputs[i].high));
+      }
+    }
+  }
+  Inferences check() { return check_inferences(folder_ / "", contract_, log_, inputs_); }
+  LoggedInput& input(const std::string& name) { return *std::ranges::find(inputs_, name, &LoggedInput::name); }
+
+  Folder folder_;
+  rollout::FlyConfig config_;
+  Contract contract_;
+  OnboardLog log_;
+  std::vector<LoggedInput> inputs_;
+};
+
+TEST_F(InferencesTest, KnowsTheExportedPolicy) {
+  const Inferences found = check();
+  EXPECT_EQ(found.rows, log_.inferences.size());
+  EXPECT_GT(found.rows, 50u);
+  EXPECT_EQ(found.same, found.rows);
+  EXPECT_TRUE(found.as_exported());
+  ASSERT_EQ(found.inputs.size(), 4u);
+  for (const auto& i : found.inputs) EXPECT_EQ(i.share, 1) << i.name;
+  for (auto& row : log_.inferences)  // three digits behind the point
+    for (double& x : row.numbers) x = std::round(x * 1000) / 1000;
+  log_.policy_steps.assign(log_.policy_steps.size(), 1e-3);
+  EXPECT_TRUE(check().as_exported());
+  log_.inferences[0].numbers.assign(log_.inferences[0].numbers.size(), 0);  // before the first inference
+  EXPECT_EQ(check().rows, log_.inferences.size() - 1);
+}
+
+TEST_F(InferencesTest, SeesAnotherPolicyAndOtherInputs) {
+  for (double& x : input("yaw_servo").value) x = 1 - x;
+  for (double& x : input("pitch_servo").value) x += 0.03;
+  Inferences found = check();
+  EXPECT_FALSE(found.as_exported());
+  EXPECT_EQ(found.same, found.rows);
+  for (const auto& i : found.inputs) {
+    EXPECT_EQ(i.share > 0.9, i.name.ends_with("flap")) << i.name;
+    if (i.name == "pitch_servo") EXPECT_NEAR(i.offset, 0.03, 1e-9);
+  }
+  const std::size_t roll_rate = 15;  // its sign
+  ASSERT_EQ(contract_.observation[roll_rate].name, "roll_rate");
+  for (auto& row : log_.inferences) row.numbers[roll_rate] *= -1;
+  found = check();
+  EXPECT_LT(found.same, found.rows / 10);
+  EXPECT_GT(found.largest, 0.001);
+  log_.policy_numbers[3] = 999;
+  EXPECT_EQ(flight::message([&] { check(); }),
+            std::string(folder_ / "") +
+                ": is checked by all that the policy got and gave, and the log lacks observation_R_yx; "
+                "accepted: a log with policy.csv, as the mapping beside the exported app makes it");
 }
 
 }  // namespace

@@ -1,0 +1,101 @@
+#include "deploy/flown/inferences.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <random>
+
+#include "io/refuse.hpp"
+
+namespace flappy::deploy {
+namespace {
+
+constexpr double kSame = 0.99, kFollows = 0.95, kOfRange = 0.01;
+constexpr int kDithers = 8;
+constexpr double kRounding = 1e-6;  ///< of an output's range: sums of single precision
+
+double median(std::vector<double> x) {
+  std::ranges::nth_element(x, x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2));
+  return x[x.size() / 2];
+}
+
+/// Where each number of the contract is in a row of the log.
+std::vector<std::size_t> places(const std::filesystem::path& folder, const Contract& contract, const OnboardLog& log) {
+  const std::size_t inputs = contract.observation.size(), count = inputs + contract.action.size();
+  std::vector<std::size_t> at;
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto found = std::ranges::find(log.policy_numbers, k);
+    if (found == log.policy_numbers.end())
+      io::refuse(folder,
+                 "is checked by all that the policy got and gave, and the log lacks " +
+                     (k < inputs ? "observation_" + contract.observation[k].name
+                                 : "action_" + contract.action[k - inputs].name),
+                 "a log with policy.csv, as the mapping beside the exported app makes it");
+    at.push_back(static_cast<std::size_t>(found - log.policy_numbers.begin()));
+  }
+  return at;
+}
+
+}  // namespace
+
+bool Inferences::as_exported() const {
+  return rows > 0 && static_cast<double>(same) >= kSame * static_cast<double>(rows) &&
+         std::ranges::all_of(inputs, [](const Input& i) { return i.share >= kFollows; });
+}
+
+Inferences check_inferences(const std::filesystem::path& folder, const Contract& contract, const OnboardLog& log,
+                            const std::vector<LoggedInput>& inputs) {
+  const std::size_t seen = contract.observation.size(), acts = contract.action.size();
+  const std::vector<std::size_t> at = places(folder, contract, log);
+  const ExportedC exported(folder, Build::exact);
+  Inferences found;
+  std::vector<std::vector<double>> offsets(inputs.size());
+  std::vector<std::size_t> follow(inputs.size(), 0);
+  std::mt19937 random(1);
+  std::vector<float> observation((kDithers + 1) * seen), action((kDithers + 1) * acts);
+  for (std::size_t row = 0; row < log.inferences.size(); ++row) {
+    const auto number = [&](std::size_t k) { return log.inferences[row].numbers[at[k]]; };
+    bool begun = false;  // before its first inference all numbers are 0
+    for (std::size_t k = 0; k < seen; ++k) begun = begun || number(k) != 0;
+    if (!begun) continue;
+    ++found.rows;
+    for (std::size_t d = 0; d <= kDithers; ++d)  // the digits that the log has lost
+      for (std::size_t k = 0; k < seen; ++k) {
+        const double share = d == 0 ? 0 : static_cast<double>(random()) / 0x1p32 - 0.5;
+        observation[d * seen + k] = static_cast<float>(number(k) + share * log.policy_steps[at[k]]);
+      }
+    for (std::size_t d = 0; d <= kDithers; ++d) exported.policy(&observation[d * seen], &action[d * acts]);
+    bool same = true;
+    for (std::size_t k = 0; k < acts; ++k) {
+      const Contract::Signal& signal = contract.action[k];
+      const double range = signal.high - signal.low, is = number(seen + k), should = static_cast<double>(action[k]);
+      double tolerance = kRounding * range + log.policy_steps[at[seen + k]];
+      for (std::size_t d = 1; d <= kDithers; ++d)
+        tolerance = std::max(tolerance, 2 * std::abs(static_cast<double>(action[d * acts + k]) - should));
+      if (std::abs(is - should) <= tolerance) continue;
+      same = false;
+      if (range > 0 && std::abs(is - should) / range > found.largest) {
+        found.largest = std::abs(is - should) / range;
+        found.output = signal.name;
+      }
+    }
+    found.same += same;
+    for (std::size_t i = 0; i < inputs.size(); ++i) {
+      const auto known = std::ranges::find(contract.inputs, inputs[i].name, &Contract::Input::name);
+      if (known == contract.inputs.end()) continue;
+      double asked = known->neutral;
+      for (std::size_t k = 0; k < acts; ++k) asked += known->mix[k] * number(seen + k);
+      asked = std::clamp(asked, known->low, known->high);
+      const double off = inputs[i].value[row] - asked;
+      offsets[i].push_back(off);
+      follow[i] += std::abs(off) <= kOfRange * (known->high - known->low);
+    }
+  }
+  for (std::size_t i = 0; i < inputs.size(); ++i)
+    if (!offsets[i].empty())
+      found.inputs.push_back({inputs[i].name, static_cast<double>(follow[i]) / static_cast<double>(offsets[i].size()),
+                              median(offsets[i])});
+  return found;
+}
+
+}  // namespace flappy::deploy
