@@ -11,7 +11,7 @@ typedef struct {
   float thrust;
   int32_t roll, pitch, yaw, pid; /* pid: how often the PID has been called; then where it was to go */
   float to_m[3];
-  uint32_t state, flags;
+  uint32_t state, flags, us; /* us: that the app took in all steps */
 } record_out;
 
 extern const struct stub_variable stub_params_flappy[], stub_logs_flappy[];
@@ -70,7 +70,9 @@ int main(void) {
     state.attitudeQuaternion.w = in.attitude[0], state.attitudeQuaternion.x = in.attitude[1];
     state.attitudeQuaternion.y = in.attitude[2], state.attitudeQuaternion.z = in.attitude[3];
     sensors.gyro.x = in.gyro_deg_s[0], sensors.gyro.y = in.gyro_deg_s[1], sensors.gyro.z = in.gyro_deg_s[2];
+    out.us -= board_us();
     controllerOutOfTree(&control, &setpoint, &sensors, &state, step);
+    out.us += board_us();
     out.thrust = control.thrust;
     out.roll = control.roll, out.pitch = control.pitch, out.yaw = control.yaw;
     out.state = *mode, out.flags = *flags;

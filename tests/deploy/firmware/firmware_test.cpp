@@ -38,7 +38,7 @@ struct Out {
   float thrust;
   std::int32_t roll, pitch, yaw, pid;
   float to_m[3];
-  std::uint32_t state, flags;
+  std::uint32_t state, flags, us;
 };
 
 /// A dash within what the firmware can set. Body rates come in degrees, which not every float of radians has, so the
