@@ -17,8 +17,8 @@ import sys
 BIN, ROOT, RUN, OUT = (pathlib.Path(a).resolve() for a in sys.argv[1:5])
 MACHINE = ["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"]
 STEPS = 600  # of 1 ms, two for each control period
-RECORD_IN, RECORD_OUT = struct.Struct("<I13f3i"), struct.Struct("<f4i3f3I")
-SHIMS = "FreeRTOS app controller controller_pid log param stabilizer_types supervisor task usec_time"
+RECORD_IN, RECORD_OUT = struct.Struct("<I13f3i"), struct.Struct("<f4i3f4I")
+SHIMS = "FreeRTOS app controller controller_pid debug eventtrigger log param stabilizer_types supervisor task usec_time"
 
 
 def run(*command, data=None):
@@ -45,7 +45,7 @@ def instructions(act):
     records = b"".join(RECORD_IN.pack(1000 * (k + 1), *[0.0] * 6, 1.0, *[0.0] * 6, 1, act, 1) for k in range(STEPS)) + RECORD_IN.pack(0, *[0.0] * 13, 0, -1, 0)
     said = run("qemu-system-arm", "-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "stdio", "-semihosting", "-icount", "shift=0", "-kernel",
                OUT / "app.elf", data=records)
-    return 1000 * RECORD_OUT.unpack(said[-RECORD_OUT.size:])[-1] / (STEPS / 2)
+    return 1000 * RECORD_OUT.unpack(said[-RECORD_OUT.size:])[-2] / (STEPS / 2)
 
 
 proof = json.loads((OUT / "proof.json").read_text())

@@ -27,9 +27,16 @@ def run(*command, code=0):
     return done.stdout + done.stderr
 
 
-def variables():
-    lines = (WORK / "exported/crazyflie/config.txt").read_text().split("\n")
-    return [line for line in lines[7:] if line]
+def events():
+    """What the card logs: {event: its variables}."""
+    found = {}
+    for line in (WORK / "exported/crazyflie/config.txt").read_text().split("\n")[4:]:
+        if line.startswith("on:"):
+            found[line[3:]] = []
+        elif "." in line:
+            found[list(found)[-1]].append(line)
+    assert all(len(variables) <= 20 for variables in found.values()), found  # more are lost in the firmware
+    return found
 
 
 def rows(policy, observations):
@@ -51,14 +58,21 @@ def rows(policy, observations):
 
 
 def write_log(policy, observations, name, swap=()):
-    kinds = {v: "I" if v.startswith("motor.") or v == "flappy.flags" else "B" if v == "flappy.state" else "f" for v in variables()}
-    head = b"\xbc" + struct.pack("<HHH", 2, 1, 0) + b"fixedFrequency\0" + struct.pack("<H", len(kinds))
-    head += b"".join(f"{v}({kind})\0".encode() for v, kind in kinds.items())
+    def kind(v):
+        return "I" if v.startswith("motor.") or v == "flappy.flags" else "B" if v == "flappy.state" else "f"
+
+    head = b"\xbc" + struct.pack("<HH", 2, len(events()))
+    for number, (event, variables) in enumerate(events().items()):
+        head += struct.pack("<H", number) + event.encode() + b"\0" + struct.pack("<H", len(variables))
+        head += b"".join(f"{v}({kind(v)})\0".encode() for v in variables)
     body = b""
     for tick, row in rows(policy, observations):
         for one, other in swap:
             row[one], row[other] = row[other], row[one]
-        body += struct.pack("<HQ", 0, 10_000 * tick) + b"".join(struct.pack("<" + kind, row.get(v, 0)) for v, kind in kinds.items())
+        for late, (number, variables) in enumerate(reversed(list(enumerate(events().values())))):  # the first event is triggered last
+            if number and tick <= 50:
+                continue  # before the first inference
+            body += struct.pack("<HQ", number, 10_000 * tick + late) + b"".join(struct.pack("<" + kind(v), row.get(v, 0)) for v in variables)
     (WORK / name).write_bytes(head + body + struct.pack("<I", zlib.crc32(head + body)))
 
 

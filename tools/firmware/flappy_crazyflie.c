@@ -4,10 +4,14 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#define DEBUG_MODULE "FLAPPY"
+
 #include "FreeRTOS.h"
 #include "app.h"
 #include "controller.h"
 #include "controller_pid.h"
+#include "debug.h"
+#include "eventtrigger.h"
 #include "flappy_guest.h"
 #include "log.h"
 #include "param.h"
@@ -29,10 +33,12 @@
 #define FLAPPY_RAD_PER_DEG 0.017453292519943295F
 
 static flappy_guest guest;
+#include "flappy_log.h" /* made for this policy */
 static uint8_t act, in_world; /* parameters */
 static uint8_t state_now;
 static uint32_t flags_now;
-static setpoint_t stay; /* where the policy handed back */
+static setpoint_t stay; /* at the last place of the manoeuvre */
+static int ended;       /* a manoeuvre, and the pilot still wishes it */
 
 static int16_t flappy_rounded(float x) {
   const float limited = flappy_clamp(x, -32767.0F, 32767.0F);
@@ -60,7 +66,7 @@ static flappy_motion flappy_estimate(const state_t *state, const sensorData_t *s
   return x;
 }
 
-/* The commander's set point, at the place where the policy ended. */
+/* The commander's set point, at this place. */
 static setpoint_t flappy_stay(const setpoint_t *setpoint, const state_t *state) {
   setpoint_t s = *setpoint;
   s.mode.x = s.mode.y = s.mode.z = s.mode.yaw = modeAbs;
@@ -71,31 +77,36 @@ static setpoint_t flappy_stay(const setpoint_t *setpoint, const state_t *state) 
   return s;
 }
 
-void controllerOutOfTreeInit(void) {
-  controllerPidInit();
-  flappy_guest_begin(&guest);
-}
+void controllerOutOfTreeInit(void) { controllerPidInit(); }
 
-bool controllerOutOfTreeTest(void) { return controllerPidTest() && guest.state != FLAPPY_GUEST_REFUSED; }
+bool controllerOutOfTreeTest(void) { return controllerPidTest(); }
 
 void controllerOutOfTree(control_t *control, const setpoint_t *setpoint, const sensorData_t *sensors, const state_t *state,
-                         const stabilizerStep_t step) {
+                         const uint32_t step) {
+  const int flies = supervisorIsFlying() && supervisorCanFly();
   if (step % FLAPPY_STEPS == 0) {
     const flappy_motion estimate = flappy_estimate(state, sensors);
     const int flew = flappy_guest_flies(&guest);
-    guest.in_world = in_world != 0;
-    if (flappy_guest_tick(&guest, (uint32_t)usecTimestamp(), &estimate, supervisorIsFlying() && supervisorCanFly(), act != 0))
+    const uint32_t inferences = guest.inferences;
+    guest.wishes_world = in_world != 0;
+    if (flappy_guest_tick(&guest, (uint32_t)usecTimestamp(), &estimate, flies, act != 0)) {
       flappy_set(control, guest.inputs);
-    else if (flew) stay = flappy_stay(setpoint, state);
+      stay = flappy_stay(setpoint, state); /* an estimate that is a number */
+    }
+    ended = act != 0 && (ended || flew) && !flappy_guest_flies(&guest);
     state_now = (uint8_t)guest.state;
     flags_now = guest.flags;
+    if (guest.inferences != inferences) flappy_log_inference();
   }
-  /* The PID stands still while the policy acts, so that its integrators keep the trim of the hover before. */
-  if (flappy_guest_flies(&guest)) return;
-  controllerPid(control, guest.state == FLAPPY_GUEST_RETURNED && act != 0 ? &stay : setpoint, sensors, state, step);
+  if (flappy_guest_flies(&guest)) return; /* the PID stands still while the policy acts */
+  /* a set point without a height is the supervisor's, and stops the motors */
+  controllerPid(control, ended && flies && setpoint->mode.z != modeDisable ? &stay : setpoint, sensors, state, step);
 }
 
+/* The self-tests take more stack than the firmware's start has. Until they have passed, the policy is refused. */
 void appMain(void) {
+  flappy_guest_begin(&guest);
+  DEBUG_PRINT("flappy: %s\n", guest.state == FLAPPY_GUEST_READY ? "ready" : "REFUSED: a self-test failed");
   for (;;) vTaskDelay(M2T(1000));
 }
 
@@ -107,5 +118,5 @@ PARAM_GROUP_STOP(flappy)
 LOG_GROUP_START(flappy)
 LOG_ADD(LOG_UINT8, state, &state_now)
 LOG_ADD(LOG_UINT32, flags, &flags_now)
-#include "flappy_log.h"
+FLAPPY_LOG
 LOG_GROUP_STOP(flappy)

@@ -2,7 +2,8 @@
    hardware; times are arguments, in microseconds that may wrap.
 
      flappy_guest_begin    runs the self-tests: to REFUSED or READY
-     READY                 the autopilot flies; to HOVERING by the pilot's wish, if the robot flies and its estimate is a number
+     READY                 the autopilot flies; to HOVERING by the pilot's wish, if the robot flies and its estimate is a number, and,
+                           with in_world, is at the place where the task begins
      HOVERING              only with a feedback controller in flappy_controller.h: it learns its trim where the task begins
      ACTING                the policy acts; to RETURNED when it hands back, at a fault, or when the wish ends
      RETURNED              the autopilot flies; to READY when the wish has ended. After a fault it stays until the next start */
@@ -30,6 +31,10 @@
 #ifndef FLAPPY_GUEST_AWAY_M
 #define FLAPPY_GUEST_AWAY_M 1.5F
 #endif
+/* With in_world, how far from the task's beginning the policy may begin. */
+#ifndef FLAPPY_GUEST_PLACE_M
+#define FLAPPY_GUEST_PLACE_M 0.3F
+#endif
 /* How long the feedback controller, if any, hovers before the policy acts. */
 #ifndef FLAPPY_GUEST_HOVER_US
 #define FLAPPY_GUEST_HOVER_US 2000000U
@@ -51,13 +56,16 @@ typedef enum {
 #define FLAPPY_GUEST_LATE 16U          /* this and all that follow are faults */
 #define FLAPPY_GUEST_AWAY 32U          /* too far from its path */
 #define FLAPPY_GUEST_NOT_FINITE 64U    /* estimate, observation or inputs are no numbers */
-#define FLAPPY_GUEST_FAULTS (~15U)
+#define FLAPPY_GUEST_FAULTS 112U
+#define FLAPPY_GUEST_UNREADY 128U /* a wished manoeuvre did not begin: the robot is elsewhere */
 
 typedef struct {
   flappy_controller controller;
   flappy_guest_state state;
   uint32_t flags, ticked_us, began_us;
-  int in_world;           /* the task's frame is the autopilot's; else it begins where the robot is, with its heading */
+  uint32_t inferences; /* of the policy */
+  /* The task's frame is the autopilot's; else it begins where the robot is, with its heading. Wished before the begin, then held. */
+  int wishes_world, in_world;
   flappy_vector from_m;   /* place of the task's beginning in the autopilot's frame */
   flappy_quaternion back; /* turns the autopilot's frame into the task's */
   float observation[FLAPPY_POLICY_OBS], action[4];
@@ -120,8 +128,13 @@ static inline int flappy_guest_finite(const float *numbers, uint32_t count) {
 
 static inline void flappy_guest_start(flappy_guest *g, uint32_t now_us, const flappy_motion *x) {
   flappy_motion seen;
+  g->in_world = g->wishes_world;
   flappy_guest_place(g, x);
   seen = flappy_guest_seen(g, x);
+  if (!flappy_plausible(flappy_minus(seen.position_m, flappy_controller_k.start_position_m), FLAPPY_GUEST_PLACE_M)) {
+    flappy_guest_return(g, FLAPPY_GUEST_UNREADY);
+    return;
+  }
   flappy_controller_start(&g->controller, now_us, seen.position_m, seen.attitude);
   g->controller.estimate = seen;
   flappy_feedback_start(&g->controller.feedback, &seen);
@@ -170,6 +183,7 @@ static inline int flappy_guest_tick(flappy_guest *g, uint32_t now_us, const flap
   if (!flappy_guest_flies(g)) return 0;
   if (flappy_controller_policy_due(&g->controller)) {
     flappy_controller_observe(&g->controller, g->observation);
+    ++g->inferences;
     if (flappy_policy_step(g->observation, g->action) != 0) {
       flappy_guest_return(g, FLAPPY_GUEST_NOT_FINITE);
       return 0;

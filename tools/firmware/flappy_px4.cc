@@ -1,4 +1,4 @@
-/* The policy as a module of PX4 (1.14 and later) for a flapper with two motors: estimator, feedback controller, policy and wing-beat
+/* The policy as a module of PX4 (1.14 to 1.16) for a flapper with two motors: estimator, feedback controller, policy and wing-beat
    modulator are those of the exported headers; of PX4 it takes the IMU, motion capture as visual odometry, arming, the motors' outputs
    and the log. Interface: github.com/PX4/PX4-Autopilot, src/examples/work_item, msg/SensorCombined.msg, msg/VehicleOdometry.msg,
    msg/versioned/ActuatorMotors.msg, msg/DebugArray.msg. Start it in place of the multicopter's controllers. */
@@ -43,6 +43,7 @@ class FlappyControl : public ModuleBase<FlappyControl>, public px4::ScheduledWor
   void take_samples(uint32_t now_us);
   void take_arming(uint32_t now_us);
   void publish_policy();
+  void publish_motors(uint64_t now, float left_V, float right_V, bool turn);
 
   uORB::Subscription _imu_sub{ORB_ID(sensor_combined)};
   uORB::Subscription _pose_sub{ORB_ID(vehicle_visual_odometry)};
@@ -106,6 +107,7 @@ void FlappyControl::publish_policy() {
 
 void FlappyControl::Run() {
   if (should_exit()) {
+    publish_motors(hrt_absolute_time(), 0.0F, 0.0F, false); /* the outputs would hold the last voltage */
     ScheduleClear();
     exit_and_cleanup();
     return;
@@ -126,11 +128,16 @@ void FlappyControl::Run() {
   if (!onboard_due(_vehicle.drive_us, now_us)) return;
   float left_V = 0.0F, right_V = 0.0F;
   onboard_drive(&_vehicle, now_us, &left_V, &right_V);
+  publish_motors(now, left_V, right_V, _armed && onboard_flies(&_vehicle));
+}
+
+/* NaN stops a motor. */
+void FlappyControl::publish_motors(uint64_t now, float left_V, float right_V, bool turn) {
   actuator_motors_s motors{};
   motors.timestamp = motors.timestamp_sample = now;
   motors.reversible_flags = 3;
   for (float &control : motors.control) control = __builtin_nanf("");
-  if (_armed && onboard_flies(&_vehicle)) {
+  if (turn) {
     motors.control[0] = left_V / FLAPPY_PX4_FULL_V;
     motors.control[1] = right_V / FLAPPY_PX4_FULL_V;
   }

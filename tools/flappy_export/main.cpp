@@ -89,10 +89,9 @@ void write_all(const fs::path& folder, const std::string& prefix, const std::map
   for (const std::string& name : {prefix + "_policy.h", prefix + "_policy_int8.h", prefix + "_controller.h",
                                   std::string("policy.pt"), std::string("policy.onnx")})
     if (!files.contains(name)) fs::remove(folder / name);
-  // an app with headers of another run could be flashed by mistake
-  for (const std::string at : {"crazyflie/src/", "px4/src/modules/flappy_control/"})
-    for (const char* name : {"flappy_policy.h", "flappy_controller.h"})
-      if (!files.contains(at + name)) fs::remove(folder / (at + name));
+  for (const char* firmware : deploy::kFirmwares)  // an app of another run could be flashed by mistake
+    if (std::ranges::none_of(files, [&](const auto& f) { return f.first.starts_with(std::string(firmware) + "/"); }))
+      fs::remove_all(folder / firmware);
   io::sync_folder(folder);
 }
 

@@ -9,6 +9,7 @@
 #include "deploy/embedded.hpp"
 #include "deploy/header/controller_header.hpp"
 #include "io/files.hpp"
+#include "io/text.hpp"
 #include "model/derive.hpp"
 #include "model/jointed.hpp"
 
@@ -54,19 +55,21 @@ void check_flapper(const rollout::FlyConfig& config) {
   if (!fits)
     throw io::InputError("--for crazyflie: the vehicle has " + (has.empty() ? "two motors" : "the inputs " + has) +
                          "; accepted: a vehicle with " + wants + ", such as flapper_nimble" +
-                         (has.empty() ? "; for two motors, tools/onboard is a main loop" : ""));
+                         (has.empty() ? "; for two motors, --for px4 or tools/onboard" : ""));
   if (config.fleet.controller.kind != flight::kNoController) return;  // feedback and policy add up, and are clipped
+  std::string beyond;
   for (const Channel& c : kFlapper) {
     constexpr double kDigits = 1e-4;
     const auto [low, high] = reach_of(*std::ranges::find(inputs, c.input, &Input::name), config.fleet.task);
     if (low >= c.low - kDigits && high <= c.high + kDigits) continue;
-    throw io::InputError("--for crazyflie: the task's actions move " + std::string(c.input) + " from " +
-                         io::shortest_digits(std::round(low * 1000) / 1000) + " to " +
-                         io::shortest_digits(std::round(high * 1000) / 1000) +
-                         "; accepted: " + io::shortest_digits(std::ceil(c.low * 1000) / 1000) + " to " +
-                         io::shortest_digits(std::floor(c.high * 1000) / 1000) +
-                         ", which the firmware can set: train with a smaller task.action");
+    beyond += (beyond.empty() ? "" : ", ") + io::format("%s from %.3g to %.3g (the firmware sets %.3g to %.3g)",
+                                                        c.input, low, high, std::ceil(c.low * 1000) / 1000,
+                                                        std::floor(c.high * 1000) / 1000);
   }
+  if (!beyond.empty())
+    throw io::InputError("--for crazyflie: the task's actions move " + beyond +
+                         "; accepted: what the firmware sets, after training with narrower task.action.amplitude_V, "
+                         "difference_V, bias_V or split_cycle");
 }
 
 struct Logged {
@@ -118,26 +121,42 @@ std::vector<Logged> commands() {
   return all;
 }
 
+/// The firmware logs so many variables at one event (usddeck.c, MAX_USD_LOG_VARIABLES_PER_EVENT).
+constexpr std::size_t kVariablesOfAnEvent = 20;
+
+std::string event_of(std::size_t variable) { return "flappy" + std::to_string(variable / kVariablesOfAnEvent); }
+
+/// flappy_log.h: variables of the log, and events that log them at each inference. The first event is the last to be
+/// triggered, so that at its time all have their newest values.
 std::string log_header(const flight::Task& task) {
-  std::string text = "/* What the policy got and gave, in the order of contract.json. */\n";
-  for (std::size_t i = 0; i < task.observation().size(); ++i) {
-    const std::string k = std::to_string(i);
-    text += "LOG_ADD(LOG_FLOAT, o" + k + ", &guest.observation[" + k + "])\n";
+  std::string variables, declared, triggered;
+  const auto add = [&](const char* name, const char* member, std::size_t k) {
+    const std::string number = std::to_string(k);
+    variables += " \\\n  LOG_ADD(LOG_FLOAT, " + std::string(name) + number + ", &guest." + member + "[" + number + "])";
+  };
+  const std::size_t seen = task.observation().size(), acts = static_cast<std::size_t>(task.actions());
+  for (std::size_t k = 0; k < seen; ++k) add("o", "observation", k);
+  for (std::size_t k = 0; k < acts; ++k) add("a", "action", k);
+  for (std::size_t k = 0; k < seen + acts; k += kVariablesOfAnEvent) {
+    declared += "EVENTTRIGGER(" + event_of(k) + ")\n";
+    triggered = "  eventTrigger(&eventTrigger_" + event_of(k) + ");\n" + triggered;
   }
-  for (int i = 0; i < task.actions(); ++i) {
-    const std::string k = std::to_string(i);
-    text += "LOG_ADD(LOG_FLOAT, a" + k + ", &guest.action[" + k + "])\n";
-  }
-  return text;
+  return "/* What the policy got and gave, in the order of contract.json. The firmware logs at most 20 variables of an "
+         "event. */\n"
+         "#define FLAPPY_LOG" +
+         variables + "\n\n" + declared + "\nstatic void flappy_log_inference(void) {\n" + triggered + "}\n";
 }
 
-/// config.txt of the microSD card: docs/.../micro-sd-card-deck of the firmware.
+/// config.txt of the microSD card (the firmware's docs of the micro SD card deck): it logs from the start.
 std::string card(const rollout::FlyConfig& config) {
-  const long rate_Hz = std::min(500L, std::lround(1 / (config.fleet.task.action_repeat / config.fleet.control_hz)) * 2);
-  std::string text = "1\n2048\nlog\n0\non:fixedFrequency\n" + std::to_string(std::max(100L, rate_Hz)) + "\n1\n";
-  for (const auto& list : {commands(), kMocap, kImu, policy_on_card(config.fleet.task)})
+  std::string text = "1\n2048\nlog\n1\non:fixedFrequency\n200\n1\n";
+  for (const auto& list : {commands(), kMocap, kImu})
     for (const Logged& c : list) text += c.variable + "\n";
-  return text + "pm.vbat\nflappy.state\nflappy.flags\n";
+  text += "pm.vbat\nflappy.state\nflappy.flags\n";
+  const std::vector<Logged> policy = policy_on_card(config.fleet.task);
+  for (std::size_t k = 0; k < policy.size(); ++k)
+    text += (k % kVariablesOfAnEvent == 0 ? "on:" + event_of(k) + "\n" : "") + policy[k].variable + "\n";
+  return text;
 }
 
 /// The stream of what the policy got and gave.
@@ -151,6 +170,10 @@ std::string policy_stream(const std::string& channel, const std::vector<Logged>&
 std::string mapping(const rollout::FlyConfig& config) {
   std::string inputs;
   for (const Channel& c : kFlapper) inputs += (inputs.empty() ? "\"" : ", \"") + std::string(c.input) + "\"";
+  std::string others;  // of the second event on
+  const std::vector<Logged> policy = policy_on_card(config.fleet.task);
+  for (std::size_t k = kVariablesOfAnEvent; k < policy.size(); ++k)
+    others += (others.empty() ? "[policy.from]\n" : "") + policy[k].column + " = \"" + event_of(k) + "\"\n";
   return "# The log of this app on the microSD card: flappy-gap import log00 --mapping mapping.toml --out FLIGHT.\n"
          "# Vehicle file, air and noise are yours to check; all keys are in docs/reference/import.md.\n"
          "schema = 1\nvehicle = \"" +
@@ -165,11 +188,12 @@ std::string mapping(const rollout::FlyConfig& config) {
          "position_noise_m = 2e-3\nattitude_noise_rad = 0.03\n" +
          columns_of("mocap", kMocap) +
          "\n[imu]\nchannel = \"fixedFrequency\"\nlatency_s = 0.0\nbandwidth_hz = 80.0\nposition_m = [0.0, 0.0, 0.0]\n"
-         "gyro_noise_rad_s = 0.5\ngyro_bias_sd_rad_s = [0.02, 0.02, 0.02]\naccel_noise_m_s2 = 10.0\n" +
+         "gyro_noise_rad_s = 0.5  # in flight, with the beat, as that of the accelerometer, whose bandwidth is 30 "
+         "Hz\ngyro_bias_sd_rad_s = [0.02, 0.02, 0.02]\naccel_noise_m_s2 = 10.0\n" +
          columns_of("imu", kImu) +
          "\n[power]\nchannel = \"fixedFrequency\"\ncurrents = false\nbattery_nominal_V = 7.4\nlatency_s = 0.0\n"
          "voltage_noise_V = 0.04\n[power.columns]\nbattery_V = \"pm.vbat\"\n" +
-         policy_stream("fixedFrequency", policy_on_card(config.fleet.task));
+         policy_stream(event_of(0), policy_on_card(config.fleet.task)) + others;
 }
 
 std::map<std::string, std::string> crazyflie_files(const rollout::FlyConfig& config) {
@@ -178,12 +202,14 @@ std::map<std::string, std::string> crazyflie_files(const rollout::FlyConfig& con
       {"Makefile",
        "# make, then make cload. CRAZYFLIE_BASE: a clone of the firmware with its submodules.\n"
        "CRAZYFLIE_BASE ?= $(HOME)/crazyflie-firmware\nOOT_CONFIG := $(PWD)/app-config\n"
+       "# Kconfig drops this with another controller than the PID, which flies the Flapper all the same\n"
+       "EXTRA_CFLAGS += -DCONFIG_CONTROLLER_PID_FILTER_ALL=1\n"
        "include $(CRAZYFLIE_BASE)/tools/make/oot.mk\n"},
       {"app-config",
-       "CONFIG_APP_ENABLE=y\nCONFIG_APP_PRIORITY=1\nCONFIG_APP_STACKSIZE=350\nCONFIG_CONTROLLER_OOT=y\n"
+       "CONFIG_APP_ENABLE=y\nCONFIG_APP_PRIORITY=1\nCONFIG_APP_STACKSIZE=700\nCONFIG_CONTROLLER_OOT=y\n"
        "CONFIG_PLATFORM_FLAPPER=y\nCONFIG_ESTIMATOR_AUTO_SELECT=y\nCONFIG_MOTORS_ESC_PROTOCOL_STANDARD_PWM=y\n"
-       "CONFIG_CONTROLLER_PID_FILTER_ALL=y\nCONFIG_DECK_FORCE=\"bcUSD:bcLedRing:bcFlapperDeck\"\n"
-       "CONFIG_DECK_FLAPPER=y\nCONFIG_DECK_USD=y\nCONFIG_DECK_LEDRING=y\n"},
+       "CONFIG_DECK_FORCE=\"bcUSD:bcLedRing:bcFlapperDeck\"\nCONFIG_DECK_FLAPPER=y\nCONFIG_DECK_USD=y\n"
+       "CONFIG_DECK_LEDRING=y\nCONFIG_DECK_FLAPPER_EXTRX_ENABLE=n\nCONFIG_DECK_CPPM=y\nCONFIG_DECK_CPPM_USE_PA3=y\n"},
       {"Kbuild", "obj-y += src/\n"},
       {"src/Kbuild", "obj-y += flappy_crazyflie.o\n"},
       {"src/flappy_crazyflie.c", std::string(kEmbedded.at("flappy_crazyflie.c"))},
@@ -202,6 +228,8 @@ std::string px4_mapping(const rollout::FlyConfig& config) {
     text.replace(begin, text.find('\n', begin) - begin, key + " = " + value);
   };
   replace("vehicle", "\"" + config.vehicle.name + ".toml\"");
+  const std::string of_battery = "# -1 to 1, as a share of the battery's voltage";
+  text.replace(text.find(of_battery), of_battery.size(), "# 1 is FLAPPY_PX4_FULL_V of flappy_px4.cpp, below");
   replace("flapping_Hz", io::shortest_digits(config.vehicle.driver.flapping_Hz));
   const std::size_t inputs = config.fleet.task.observation().size();
   const auto data = [](std::size_t i) { return "data[" + std::to_string(i) + "]"; };
@@ -212,7 +240,9 @@ std::string px4_mapping(const rollout::FlyConfig& config) {
 std::map<std::string, std::string> px4_files(const rollout::FlyConfig& config) {
   constexpr std::size_t kDebugArray = 58;
   if (!model::mixed_inputs(config.vehicle).empty())
-    throw io::InputError("--for px4: the vehicle has inputs in place of two motors; accepted: a vehicle with motors");
+    throw io::InputError(
+        "--for px4: the vehicle has inputs in place of two motors; accepted: a vehicle with motors; for these inputs, "
+        "--for crazyflie");
   if (const std::string why_not = no_controller(config); !why_not.empty())
     throw io::InputError("--for px4: " + why_not + "; accepted: a task that leaves the controller to fly");
   if (const std::size_t n = config.fleet.task.observation().size() + 4; n > kDebugArray)
@@ -223,6 +253,8 @@ std::map<std::string, std::string> px4_files(const rollout::FlyConfig& config) {
       {"src/CMakeLists.txt", "set(config_module_list_external modules/flappy_control PARENT_SCOPE)\n"},
       {at + "CMakeLists.txt",
        "px4_add_module(\n  MODULE modules__flappy_control\n  MAIN flappy_control\n"
+       "  STACK_MAIN 4096  # for the self-tests\n  COMPILE_FLAGS -fno-reciprocal-math  # the numbers of the headers "
+       "are those of IEEE\n"
        "  SRCS flappy_px4.cpp onboard.c\n  DEPENDS px4_work_queue\n  EXTERNAL\n)\n"},
       {at + "flappy_px4.cpp", std::string(kEmbedded.at("flappy_px4.cc"))},
       {at + "onboard.h", std::string(kEmbedded.at("onboard.h"))},

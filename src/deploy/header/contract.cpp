@@ -189,28 +189,27 @@ std::string wiring_text(const FlyConfig& config, const policy::RunInfo& run, boo
       << "2. At start-up, fly only if `flappy_policy_selftest()`"
       << (with_controller ? " and `flappy_controller_selftest()` return" : " returns") << " 0.\n";
   if (with_controller) {
-    text
-        << "3. Convert what your sensors say: rates in rad/s and specific force in m/s^2 (at rest +9.8 along z), both "
-           "in\n"
-        << "   B: x forward, y left, z up; poses of the torso's origin in W, z up, attitude as w, x, y, z from B to "
-           "W.\n"
-        << "4. `flappy_controller_start()` with the pose; then, every " << p.control_us << " us, in this order:\n"
-        << "   - if `flappy_controller_policy_due()`: `_observe()`, `flappy_policy_step()`, `_act()`\n"
-        << (model::mixed_inputs(config.vehicle).empty()
-                ? "   - `_steer()`, and from then on `_drive()` every " + std::to_string(p.driver_us) +
-                      " us: the motors' voltages\n"
-                : "   - `_steer()`, then `_inputs()`: the robot's inputs\n")
-        << "   - at the end of the period `_imu()` and `_pose()` with all that has arrived, oldest first, then "
-           "`_tick()`\n"
-        << (config.fleet.controller.kind == flight::kNoController
-                ? "5. There is no feedback controller: who flies until `flappy_controller_begin()` and after the "
-                  "hand-back is "
-                  "yours.\n"
-                : "5. `flappy_controller_hover()` until the trim is learnt, then `flappy_controller_begin()`: the "
-                  "policy "
-                  "acts.\n")
-        << "6. Log what the sensors said and the voltages that were set, with their times: `flappy-gap check --flown`\n"
-        << "   says whether the robot flew this, or which mistake of its firmware explains what it did.\n";
+    text << "3. Convert what your sensors say: rates in rad/s and specific force in m/s^2 (at rest +9.8 along z), both "
+            "in\n"
+         << "   B: x forward, y left, z up; poses of the torso's origin in W, z up, attitude as w, x, y, z from B to "
+            "W.\n"
+         << "4. `flappy_controller_start()` with the pose; then, every " << p.control_us << " us, in this order:\n"
+         << "   - if `flappy_controller_policy_due()`: `_observe()`, `flappy_policy_step()`, `_act()`\n"
+         << (model::mixed_inputs(config.vehicle).empty()
+                 ? "   - `_steer()`, and from then on `_drive()` every " + std::to_string(p.driver_us) +
+                       " us: the motors' voltages\n"
+                 : "   - `_steer()`, then `_inputs()`: the robot's inputs\n")
+         << "   - at the end of the period `_imu()` and `_pose()` with all that has arrived, oldest first, then "
+            "`_tick()`\n"
+         << (config.fleet.controller.kind == flight::kNoController
+                 ? "5. There is no feedback controller: who flies until `flappy_controller_begin()` and after the "
+                   "hand-back is "
+                   "yours.\n"
+                 : "5. `flappy_controller_hover()` until the trim is learnt, then `flappy_controller_begin()`: the "
+                   "policy "
+                   "acts.\n")
+         << "6. Log what the sensors said and what was set, with their times: `flappy-gap check --flown`\n"
+         << "   says whether the robot flew this, or which mistake of its firmware explains what it did.\n";
   } else {
     text << "3. Every " << p.policy_us
          << " us, fill the observation in the order of `contract.json`, raw, in its units:\n"

@@ -222,33 +222,38 @@ std::string about(const rollout::FlyConfig& config, const policy::RunInfo& run, 
   const flight::Sensors& s = config.fleet.sensors;
   const auto& at = s.imu.position_m;
   std::ostringstream text;
-  text << "Estimator and feedback controller of a trained policy, exported by flappy-export. C99 or C++17, gcc or "
-          "clang;\n"
-       << "nothing else is needed.\n\n"
-       << contract_text(config, run) << "\nEvery control period:\n"
-       << "  1. flappy_controller_observe() where flappy_controller_policy_due(), the policy, flappy_controller_act()\n"
-       << (model::mixed_inputs(config.vehicle).empty()
-               ? "  2. flappy_controller_steer(), then flappy_controller_drive() every " +
-                     std::to_string(periods.driver_us) + " us\n"
-               : "  2. flappy_controller_steer(), then flappy_controller_inputs()\n")
-       << "  3. flappy_controller_imu() and flappy_controller_pose() with what has arrived, oldest first\n"
-       << "  4. flappy_controller_tick() at its end; or, in place of 3 and 4, flappy_controller_tick_with() the "
-          "estimate\n"
-       << "     of the autopilot around it\n"
-       << "Times are microseconds of one clock that may wrap; no more than 2^31 of them may pass between two ticks.\n"
-       << "flappy_controller_start() comes first, then flappy_controller_hover() until the trim is learnt, then\n"
-       << "flappy_controller_begin(). What a sample holds is at the function that takes it.\n\n"
-       << "The gains were chosen for an IMU of " << io::shortest_digits(s.imu.rate_hz) << " Hz, "
-       << milliseconds(s.imu.latency_s) << " late, at (" << io::shortest_digits(at.x) << ", "
-       << io::shortest_digits(at.y) << ", " << io::shortest_digits(at.z) << ") m in B,\n"
-       << "and motion capture of " << io::shortest_digits(s.mocap.rate_hz) << " Hz, " << milliseconds(s.mocap.latency_s)
-       << " late; what is later than " << milliseconds(1e-6 * ring * static_cast<double>(periods.control_us))
-       << " is dropped.\n"
-       << "What the IMU hands over in one control period is one increment: where its latency is no whole number of\n"
-       << "periods, the training server groups its samples otherwise.\n"
-       << "Angular rates are in B, accelerations the specific force in B: at rest +g upward. Poses are those of the "
-          "torso's\n"
-       << "origin in W, attitude as a quaternion w, x, y, z from B to W. The hand-back is judged on the estimate.\n";
+  text
+      << "Estimator and feedback controller of a trained policy, exported by flappy-export. C99 or C++17, gcc or "
+         "clang;\n"
+      << "nothing else is needed.\n\n"
+      << contract_text(config, run) << "\nEvery control period:\n"
+      << "  1. flappy_controller_observe() where flappy_controller_policy_due(), the policy, flappy_controller_act()\n"
+      << (model::mixed_inputs(config.vehicle).empty()
+              ? "  2. flappy_controller_steer(), then flappy_controller_drive() every " +
+                    std::to_string(periods.driver_us) + " us\n"
+              : "  2. flappy_controller_steer(), then flappy_controller_inputs()\n")
+      << "  3. flappy_controller_imu() and flappy_controller_pose() with what has arrived, oldest first\n"
+      << "  4. flappy_controller_tick() at its end; or, in place of 3 and 4, flappy_controller_tick_with() the "
+         "estimate\n"
+      << "     of the autopilot around it\n"
+      << "Times are microseconds of one clock that may wrap; no more than 2^31 of them may pass between two ticks.\n"
+      << (config.fleet.controller.kind == flight::kNoController
+              ? "flappy_controller_start() comes first, then flappy_controller_begin(): there is no feedback "
+                "controller.\n"
+              : "flappy_controller_start() comes first, then flappy_controller_hover() until the trim is learnt, then\n"
+                "flappy_controller_begin().\n")
+      << "What a sample holds is at the function that takes it.\n\n"
+      << "It was trained with an IMU of " << io::shortest_digits(s.imu.rate_hz) << " Hz, "
+      << milliseconds(s.imu.latency_s) << " late, at (" << io::shortest_digits(at.x) << ", "
+      << io::shortest_digits(at.y) << ", " << io::shortest_digits(at.z) << ") m in B,\n"
+      << "and motion capture of " << io::shortest_digits(s.mocap.rate_hz) << " Hz, " << milliseconds(s.mocap.latency_s)
+      << " late; what is later than " << milliseconds(1e-6 * ring * static_cast<double>(periods.control_us))
+      << " is dropped.\n"
+      << "What the IMU hands over in one control period is one increment: where its latency is no whole number of\n"
+      << "periods, the training server groups its samples otherwise.\n"
+      << "Angular rates are in B, accelerations the specific force in B: at rest +g upward. Poses are those of the "
+         "torso's\n"
+      << "origin in W, attitude as a quaternion w, x, y, z from B to W. The hand-back is judged on the estimate.\n";
   return text.str();
 }
 

@@ -11,7 +11,7 @@ typedef struct {
   float thrust;
   int32_t roll, pitch, yaw, pid; /* pid: how often the PID has been called; then where it was to go */
   float to_m[3];
-  uint32_t state, flags, us; /* us: that the app took in all steps */
+  uint32_t state, flags, us, events; /* us: that the app took in all steps */
 } record_out;
 
 extern const struct stub_variable stub_params_flappy[], stub_logs_flappy[];
@@ -36,7 +36,8 @@ void controllerPid(control_t *control, const setpoint_t *setpoint, const sensorD
 bool supervisorCanFly(void) { return true; }
 bool supervisorIsFlying(void) { return in.flies != 0; }
 uint64_t usecTimestamp(void) { return time_us; }
-void vTaskDelay(uint32_t ticks) { (void)ticks; }
+static uint32_t events;
+void eventTrigger(const eventtrigger *event) { events += event->name != 0; }
 
 static bool same(const char *a, const char *b) {
   while (*a != '\0' && *a == *b) ++a, ++b;
@@ -60,7 +61,9 @@ int main(void) {
   if (action == 0) return 4;
   controllerOutOfTreeInit();
   if (!controllerOutOfTreeTest()) return 5;
+  appMain();
   setpoint.position.x = 9.0F;
+  setpoint.mode.z = modeAbs;
   for (; board_read(&in, (unsigned)sizeof in) && in.act >= 0; ++step) {
     time_us = in.us;
     *(uint8_t *)named(stub_params_flappy, "act") = (uint8_t)in.act;
@@ -75,7 +78,7 @@ int main(void) {
     out.us += board_us();
     out.thrust = control.thrust;
     out.roll = control.roll, out.pitch = control.pitch, out.yaw = control.yaw;
-    out.state = *mode, out.flags = *flags;
+    out.state = *mode, out.flags = *flags, out.events = events;
     board_write(&out, (unsigned)sizeof out);
   }
   return 0;

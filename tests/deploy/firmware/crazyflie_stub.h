@@ -1,6 +1,6 @@
 /* The part of the Crazyflie's firmware that the exported app uses, as its headers of 2025 declare it
    (github.com/bitcraze/crazyflie-firmware: src/modules/interface/stabilizer_types.h, controller/controller.h,
-   controller/controller_pid.h, supervisor.h, param.h, log.h, app.h; src/hal/interface/usec_time.h). The test includes it by their names. */
+   controller/controller_pid.h, supervisor.h, param.h, log.h, eventtrigger.h, app.h; src/utils/interface/debug.h; src/hal/interface/usec_time.h). The test includes it by their names. */
 #ifndef CRAZYFLIE_STUB
 #define CRAZYFLIE_STUB 1
 
@@ -68,8 +68,14 @@ bool supervisorCanFly(void);
 bool supervisorIsFlying(void);
 uint64_t usecTimestamp(void);
 void appMain(void);
-void vTaskDelay(uint32_t ticks);
+#define vTaskDelay(ticks) return /* there is one task */
 #define M2T(ms) (ms)
+#define DEBUG_PRINT(...) ((void)0)
+typedef struct {
+  const char *name;
+} eventtrigger;
+#define EVENTTRIGGER(name) static eventtrigger eventTrigger_##name = {#name};
+void eventTrigger(const eventtrigger *event);
 
 /* Tables of pointers, in place of the firmware's sections. */
 struct stub_variable {

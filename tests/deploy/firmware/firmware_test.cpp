@@ -27,7 +27,7 @@ using rollout::FlyConfig;
 using Words = std::vector<std::string>;
 
 enum State : std::uint32_t { kRefused, kReady, kHovering, kActing, kReturned };
-enum Flag : std::uint32_t { kHandedBack = 4, kTakenBack = 8, kLate = 16, kAway = 32, kNotFinite = 64 };
+enum Flag : std::uint32_t { kHandedBack = 4, kTakenBack = 8, kLate = 16, kAway = 32, kNotFinite = 64, kUnready = 128 };
 
 struct In {  // as crazyflie_board.c has them
   std::uint32_t us = 0;
@@ -38,7 +38,7 @@ struct Out {
   float thrust;
   std::int32_t roll, pitch, yaw, pid;
   float to_m[3];
-  std::uint32_t state, flags, us;
+  std::uint32_t state, flags, us, events;
 };
 
 /// A dash within what the firmware can set. Body rates come in degrees, which not every float of radians has, so the
@@ -77,8 +77,8 @@ class App {
       std::filesystem::create_directories(std::filesystem::path(folder_ / path).parent_path());
       folder_.write(path, text);
     }
-    for (const char* name : {"FreeRTOS.h", "app.h", "controller.h", "controller_pid.h", "log.h", "param.h",
-                             "stabilizer_types.h", "supervisor.h", "task.h", "usec_time.h"})
+    for (const char* name : {"FreeRTOS.h", "app.h", "controller.h", "controller_pid.h", "debug.h", "eventtrigger.h",
+                             "log.h", "param.h", "stabilizer_types.h", "supervisor.h", "task.h", "usec_time.h"})
       folder_.write(std::string("src/") + name, "#include \"crazyflie_stub.h\"\n");
     write_board(folder_ / "");
   }
@@ -173,6 +173,7 @@ TEST(CrazyflieApp, FliesAsTheSimulatorDoes) {
       most = std::max(most, std::abs(out[2 * k].thrust - out[0].thrust));
     }
     EXPECT_GT(most, 1000) << "the policy hardly moves";
+    EXPECT_EQ(out.back().events, 2 * kPeriods / 10) << "of 24 numbers, at each inference";
   }
 }
 
@@ -193,7 +194,7 @@ TEST(CrazyflieApp, BeginsWhereTheRobotIs) {
     EXPECT_NEAR(moved[i].yaw, original[i].yaw, 2);
   }
   here.in_world = 1;  // 2 m away from where the task begins
-  EXPECT_EQ(built_app().fly(steps(3, here)).back().flags, kAway);
+  EXPECT_EQ(built_app().fly(steps(3, here)).back().flags, kUnready);
 }
 
 TEST(CrazyflieApp, LeavesTheRestToTheAutopilot) {
@@ -207,7 +208,9 @@ TEST(CrazyflieApp, LeavesTheRestToTheAutopilot) {
   change(100, 120, [](In& r) { r.act = 0, r.position_m[0] = 0.1F; });  // taken back
   change(120, 400, [](In& r) { r.act = 1; });
   change(300, 301, [](In& r) { r.position_m[1] = std::numeric_limits<float>::quiet_NaN(); });
+  change(306, 309, [](In& r) { r.flies = 0; });
   change(310, 320, [](In& r) { r.act = 0; });
+  change(350, 352, [](In& r) { r.position_m[0] = 1.6F; });
   const std::vector<Out> out = app.fly(in);
   const auto at = [&](std::size_t period) { return out[2 * period]; };
   EXPECT_EQ(at(5).state, kReady);
@@ -222,6 +225,8 @@ TEST(CrazyflieApp, LeavesTheRestToTheAutopilot) {
   EXPECT_EQ(at(130).state, kActing);
   EXPECT_EQ(at(300).state, kReturned);
   EXPECT_EQ(at(305).to_m[0], 0);  // where it was, as long as the pilot still wishes
+  EXPECT_EQ(at(305).to_m[1], 0);
+  EXPECT_EQ(at(307).to_m[0], 9);  // on the ground the firmware's own
   EXPECT_EQ(at(315).to_m[0], 9);
   EXPECT_EQ(at(399).state, kReturned);  // a fault is for good
   EXPECT_EQ(at(399).flags, kTakenBack | kNotFinite);
@@ -239,15 +244,35 @@ TEST(CrazyflieApp, EndsAtItsTimeAndAtALateStep) {
   EXPECT_EQ(app.fly(in)[2 * 40].flags, kLate);
 }
 
+TEST(CrazyflieApp, GivesBackFarFromItsPath) {
+  std::vector<In> in = steps(40);
+  for (std::size_t k = 2 * 30; k < in.size(); ++k) in[k].position_m[0] = 1.6F;
+  const std::vector<Out> out = built_app().fly(in);
+  EXPECT_EQ(out[2 * 29].flags, 0u);
+  EXPECT_EQ(out[2 * 30].flags, kAway);
+}
+
+/// With a feedback controller, that one hovers first.
+TEST(CrazyflieApp, HoversByItsOwnControllerFirst) {
+  App app(dash({"controller=" + source_path("configs/controllers/pid_flapper_nimble.toml")}));
+  ASSERT_EQ(app.build(), "");
+  const std::vector<Out> out = app.fly(steps(1100));
+  EXPECT_EQ(out[2 * 999].state, kHovering);
+  EXPECT_EQ(out[2 * 1000].state, kActing);
+  EXPECT_EQ(out.back().pid, 0);
+  EXPECT_NEAR(out[0].thrust, 65535 * 0.587, 100);  // hover_V
+}
+
 TEST(CrazyflieApp, RefusesWhatTheFirmwareCannotSet) {
   EXPECT_EQ(message([] { firmware_files("crazyflie", dash({"task.action.bias_V=[-0.4,0.4]"}), {}); }),
-            "--for crazyflie: the task's actions move pitch_servo from 0.1 to 0.9; accepted: 0.301 to 0.699, which the "
-            "firmware can set: train with a smaller task.action");
+            "--for crazyflie: the task's actions move pitch_servo from 0.1 to 0.9 (the firmware sets 0.301 to 0.699); "
+            "accepted: what the firmware sets, after training with narrower task.action.amplitude_V, difference_V, "
+            "bias_V or split_cycle");
   EXPECT_EQ(message([] {
               firmware_files("crazyflie", rollout::read_fly_config(source_path("configs/fly/escape.toml")), {});
             }),
             "--for crazyflie: the vehicle has two motors; accepted: a vehicle with left_flap, right_flap, pitch_servo, "
-            "yaw_servo, such as flapper_nimble; for two motors, tools/onboard is a main loop");
+            "yaw_servo, such as flapper_nimble; for two motors, --for px4 or tools/onboard");
 }
 
 }  // namespace

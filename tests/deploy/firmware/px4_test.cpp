@@ -28,7 +28,8 @@ class Module {
     write_board(folder_ / "");
   }
   std::string build(bool for_board) {
-    Words options = {"-O2", "-fno-exceptions"};
+    // flags of PX4 that change numbers, and what the module sets against them (its CMakeLists.txt)
+    Words options = {"-O2", "-fno-exceptions", "-fno-math-errno", "-freciprocal-math", "-fno-reciprocal-math"};
     append(options, strict_options({folder_ / "src/modules/flappy_control", folder_ / "stub", folder_ / "",
                                     source_path("tests/deploy/firmware"), source_path("tools/onboard")}));
     const std::string object = folder_ / "module.o", flight_logic = folder_ / "src/modules/flappy_control/onboard.c";
@@ -71,7 +72,8 @@ TEST(Px4Module, RefusesWhatItCannotFly) {
   EXPECT_EQ(flight::message([] {
               firmware_files("px4", rollout::read_fly_config(source_path("configs/fly/flapper_dash.toml")), {});
             }),
-            "--for px4: the vehicle has inputs in place of two motors; accepted: a vehicle with motors");
+            "--for px4: the vehicle has inputs in place of two motors; accepted: a vehicle with motors; for these "
+            "inputs, --for crazyflie");
   EXPECT_EQ(
       flight::message(
           [] { firmware_files("px4", rollout::read_fly_config(source_path("configs/fly/hover_voltages.toml")), {}); }),
