@@ -1,7 +1,5 @@
 #include "io/child_process.hpp"
 
-#include <fcntl.h>
-#include <spawn.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -10,6 +8,8 @@
 #include <csignal>
 #include <stdexcept>
 #include <system_error>
+
+#include "io/run_program.hpp"
 
 namespace flappy::io {
 namespace {
@@ -26,21 +26,14 @@ ChildProcess::ChildProcess(const std::vector<std::string>& command) {
     close(in[0]), close(in[1]);
     fail(error);
   }
-  std::vector<char*> arguments;
-  arguments.reserve(command.size() + 1);
-  for (const auto& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
-  arguments.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, in[1], 0);
-  posix_spawn_file_actions_adddup2(&actions, out[1], 1);
-  const int error = posix_spawnp(&pid_, arguments[0], &actions, nullptr, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  close(in[1]), close(out[1]);
   to_ = in[0], from_ = out[0];
-  if (error != 0) {
-    close(to_), close(from_);
-    fail(error);
+  try {
+    const int theirs[] = {in[1], out[1]};
+    pid_ = start_program(command, theirs);
+    close(in[1]), close(out[1]);
+  } catch (const std::system_error&) {
+    for (const int end : {in[0], in[1], out[0], out[1]}) close(end);
+    throw;
   }
 }
 

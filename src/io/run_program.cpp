@@ -29,6 +29,22 @@ std::string contents(std::FILE* file) {
 
 }  // namespace
 
+pid_t start_program(const std::vector<std::string>& command, std::span<const int> streams) {
+  std::vector<char*> arguments;
+  arguments.reserve(command.size() + 1);
+  for (const auto& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  for (std::size_t i = 0; i < streams.size(); ++i)
+    posix_spawn_file_actions_adddup2(&actions, streams[i], static_cast<int>(i));
+  pid_t child = 0;
+  const int error = posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (error != 0) throw std::system_error(error, std::generic_category());
+  return child;
+}
+
 Finished run(const std::vector<std::string>& command, std::string_view input) {
   const auto fail = [](int error) { throw std::system_error(error, std::generic_category()); };
   // unnamed files instead of pipes, which could block both sides
@@ -41,18 +57,8 @@ Finished run(const std::vector<std::string>& command, std::string_view input) {
     fail(errno);
   std::rewind(streams[0].get());
 
-  std::vector<char*> arguments;
-  arguments.reserve(command.size() + 1);
-  for (const auto& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
-  arguments.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  for (std::size_t i = 0; i < 3; ++i)
-    posix_spawn_file_actions_adddup2(&actions, fileno(streams[i].get()), static_cast<int>(i));
-  pid_t child = 0;
-  const int error = posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (error != 0) fail(error);
+  const int numbers[] = {fileno(streams[0].get()), fileno(streams[1].get()), fileno(streams[2].get())};
+  const pid_t child = start_program(command, numbers);
   int status = 0;
   rusage used{};
   while (wait4(child, &status, 0, &used) < 0)

@@ -1,11 +1,18 @@
 // Runs another program as a function from text to text.
 #pragma once
 
+#include <sys/types.h>
+
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace flappy::io {
+
+/// Starts a program (along PATH, no shell), whose file descriptor i is `streams[i]`. Throws std::system_error where it
+/// cannot be started.
+pid_t start_program(const std::vector<std::string>& command, std::span<const int> streams);
 
 struct Finished {
   int exit_code;  ///< -1: a signal ended it
