@@ -7,8 +7,8 @@
 #include <stdint.h>
 
 extern "C" { /* the board has no string.h */
-void *memcpy(void *to, const void *from, decltype(sizeof 0) bytes);
-int strcmp(const char *a, const char *b);
+void* memcpy(void* to, const void* from, decltype(sizeof 0) bytes);
+int strcmp(const char* a, const char* b);
 }
 
 #define MODULE_NAME "flappy_control"
@@ -24,7 +24,7 @@ int strcmp(const char *a, const char *b);
 #define PRINT_MODULE_USAGE_DEFAULT_COMMANDS() stub_say("stop")
 
 template <class... T>
-void stub_say(const char *, T...) {}
+void stub_say(const char*, T...) {}
 
 extern uint64_t stub_now_us;
 inline uint64_t hrt_absolute_time() { return stub_now_us; }
@@ -44,15 +44,15 @@ static const int task_id_is_work_queue = -2;
 template <class T>
 class ModuleBase {
  public:
-  static int main(int argc, char *argv[]) { return T::custom_command(argc, argv); }
+  static int main(int argc, char* argv[]) { return T::custom_command(argc, argv); }
   static bool is_running() { return _object.load() != nullptr; }
-  static T *get_instance() { return _object.load(); }
+  static T* get_instance() { return _object.load(); }
   virtual int print_status() { return 0; }
 
  protected:
   bool should_exit() const { return false; }
   static void exit_and_cleanup() {}
-  inline static stub_atomic<T *> _object;
+  inline static stub_atomic<T*> _object;
   inline static int _task_id = -1;
 };
 
@@ -63,7 +63,7 @@ static const wq_config_t rate_ctrl{};
 }
 class ScheduledWorkItem {
  public:
-  ScheduledWorkItem(const char *, const wq_config_t &) {}
+  ScheduledWorkItem(const char*, const wq_config_t&) {}
   void ScheduleOnInterval(uint32_t interval_us) { stub_interval_us = interval_us; }
   void ScheduleClear() {}
   uint32_t stub_interval_us = 0;
@@ -105,13 +105,13 @@ template <class T>
 struct stub_topic {
   T queue[16];
   uint32_t written = 0, read = 0;
-  void put(const T &message) { queue[written++ % 16] = message; }
+  void put(const T& message) { queue[written++ % 16] = message; }
 };
-#define STUB_TOPIC(name, type)                  \
-  struct stub_##name {                          \
-    using Message = type;                       \
-    inline static stub_topic<type> topic;       \
-  };                                            \
+#define STUB_TOPIC(name, type)            \
+  struct stub_##name {                    \
+    using Message = type;                 \
+    inline static stub_topic<type> topic; \
+  };                                      \
   inline stub_##name stub_id_##name;
 STUB_TOPIC(sensor_combined, sensor_combined_s)
 STUB_TOPIC(vehicle_visual_odometry, vehicle_odometry_s)
@@ -124,30 +124,30 @@ namespace uORB {
 class Subscription {
  public:
   template <class Id>
-  explicit Subscription(Id &) : topic_(&Id::topic) {}
+  explicit Subscription(Id&) : topic_(&Id::topic) {}
   template <class T>
-  bool update(T *message) {
-    stub_topic<T> &from = *static_cast<stub_topic<T> *>(topic_);
+  bool update(T* message) {
+    stub_topic<T>& from = *static_cast<stub_topic<T>*>(topic_);
     if (from.read == from.written) return false;
     *message = from.queue[from.read++ % 16];
     return true;
   }
 
  private:
-  void *topic_;
+  void* topic_;
 };
 template <class T>
 class Publication {
  public:
   template <class Id>
-  explicit Publication(Id &) : topic_(&Id::topic) {}
-  bool publish(const T &message) {
+  explicit Publication(Id&) : topic_(&Id::topic) {}
+  bool publish(const T& message) {
     topic_->put(message);
     return true;
   }
 
  private:
-  stub_topic<T> *topic_;
+  stub_topic<T>* topic_;
 };
 }  // namespace uORB
 
