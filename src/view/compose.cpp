@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 constexpr const char* kAccepted =
     "a flight log or a folder of them, a run folder or a folder of runs of flappy-train, JSON of flappy-eval, "
     "flappy-gap diagnose or plan (or its folder) or flappy-identify forces, a folder or score.csv of flappy-blind "
-    "score";
+    "score, figures of flappy-bench (.jsonl)";
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& what) {
   throw io::InputError(path.string() + ": " + what + "; accepted: " + kAccepted);
@@ -78,6 +78,7 @@ Kind recognised(const fs::path& path) {
   if (fs::is_directory(path, none)) return recognised_folder(path);
   if (path.extension() == ".json") return recognised_json(path);
   if (path.extension() == ".csv" && io::read_text(path).starts_with("case,part,effects,")) return Kind::benchmark;
+  if (path.extension() == ".jsonl") return Kind::speed;
   refuse(path, "is no result");
 }
 
@@ -122,6 +123,9 @@ std::vector<Section> composed(const std::vector<fs::path>& given, const FlightOp
         break;
       case Kind::benchmark:
         sections.push_back(benchmark_section(path));
+        break;
+      case Kind::speed:
+        sections.push_back(speed_section(path));
         break;
     }
   }

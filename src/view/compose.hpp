@@ -11,10 +11,10 @@
 
 namespace flappy::view {
 
-enum class Kind { flight, run, evaluation, diagnosis, plan, identification, benchmark };
+enum class Kind { flight, run, evaluation, diagnosis, plan, identification, benchmark, speed };
 
 /// A flight log; a run folder or a folder of runs; results of flappy-eval, flappy-gap diagnose or plan (or its folder),
-/// flappy-identify forces or flappy-blind score (its folder, or score.csv). Throws InputError for anything else, also
+/// flappy-identify forces, flappy-blind score (its folder, or score.csv) or flappy-bench --figures. Throws InputError else, also
 /// for a folder of flight logs, which composed() expands.
 Kind recognised(const std::filesystem::path& path);
 

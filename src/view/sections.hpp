@@ -22,6 +22,9 @@ Section identification_section(const std::filesystem::path& file);  ///< of flap
 
 Section plan_section(const std::filesystem::path& file);  ///< of flappy-gap plan
 
+/// Figures of flappy-bench --figures over commits, a plot each, machines by colour.
+Section speed_section(const std::filesystem::path& file);
+
 Section run_section(const std::filesystem::path& folder);  ///< a run of flappy-train, or several (--seeds)
 
 /// A scored blind benchmark: its folder, or score.csv alone, such as docs/results/blind_reported.csv; reads predictions

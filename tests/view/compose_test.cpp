@@ -491,5 +491,31 @@ TEST(Figure, IsTheSameOnPaper) {
   EXPECT_EQ(json.at("series")[0].at("colour"), "#d55e00");
 }
 
+TEST(SpeedSection, DrawsFiguresOverCommits) {
+  const io::TemporaryFolder folder;
+  const auto line = [](const char* commit, const char* date, const char* machine, double value) {
+    return Json{{"figure", "speed.steps_per_s"},  {"value", value},   {"machine", machine}, {"processors", 2},
+                {"instruction_set", "x86-64-v3"}, {"commit", commit}, {"date", date}}
+               .dump() +
+           "\n";
+  };
+  const std::string file = folder / "f.jsonl";
+  io::write_atomically(file, line("newer", "2026-11-28", "one", 3) + line("older", "2026-11-27", "one", 2) +
+                                 line("newer", "2026-11-29", "other", 5));
+  EXPECT_EQ(recognised(file), Kind::speed);
+  const Section section = speed_section(file);
+  ASSERT_EQ(section.figures().size(), 1u);
+  const Figure& f = section.figures()[0];
+  EXPECT_EQ(f.title, "speed.steps_per_s");
+  ASSERT_EQ(f.series.size(), 2u);
+  EXPECT_EQ(f.series[0].name, "one, 2 processors, x86-64-v3");
+  EXPECT_EQ(f.series[0].x, (std::vector<double>{1, 0}));  // by date, not in the order of the file
+  EXPECT_EQ(f.series[0].y, (std::vector<double>{3, 2}));
+  EXPECT_EQ(f.series[1].x, (std::vector<double>{1}));
+  io::write_atomically(file, line("newer", "2026-11-28", "one", 3) + "{\"a\":1}\n");
+  EXPECT_EQ(test::refusal([&] { speed_section(file); }),
+            file + ":2: is no figure of a benchmark; accepted: lines that flappy-bench --figures wrote");
+}
+
 }  // namespace
 }  // namespace flappy::view

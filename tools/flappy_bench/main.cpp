@@ -9,6 +9,7 @@
 #include "busy.hpp"
 #include "closed_loop.hpp"
 #include "engines.hpp"
+#include "figures.hpp"
 #include "flappy/batch.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "hover.hpp"
@@ -377,6 +378,8 @@ int main(int argc, char** argv) {
   app.option("--vehicle", vehicle, "vehicle file").shows_default();
   app.option("--rounds", options.rounds, "rounds to take the median of").range(1, 1000).shows_default();
   app.option("--seconds", options.seconds, "of each measurement").range(0.01, 60.0).shows_default();
+  std::string figures;
+  app.option("--figures", figures, "append each figure to this file, a line of JSON with machine and commit");
   app.flag("!--no-peers", options.peers, "leave DART, MuJoCo and LibTorch out");
   io::Command convergence =
       app.command("convergence", "error against step size, and against work for other integrators");
@@ -402,14 +405,18 @@ int main(int argc, char** argv) {
       .one_at_a_time();  // otherwise a --set in front of the config would take it as a second value
   app.expect_commands(0, 1);
   return program.run(argc, argv, [&] {
+    const auto finish = [&](const char* command, const bench::Json& results) {
+      program.write_json(results);
+      if (!figures.empty()) bench::append_figures(figures, command, results);
+    };
     if (batch.given()) return program.write_json(bench::fly_batch(config, overrides));
-    if (learner.given()) return program.write_json(bench::learner(options));
-    if (telemetry.given()) return program.write_json(bench::telemetry(telemetry_s));
-    if (engines.given()) return program.write_json(bench::engines(seeds, beside));
+    if (learner.given()) return finish("learner", bench::learner(options));
+    if (telemetry.given()) return finish("telemetry", bench::telemetry(telemetry_s));
+    if (engines.given()) return finish("engines", bench::engines(seeds, beside));
     const model::Vehicle v = model::read_vehicle(vehicle);
-    program.write_json(convergence.given()      ? bench::convergence(v)
-                       : work_precision.given() ? bench::error_against_work(v, options)
-                       : busy.given()           ? bench::busy(v, options)
-                                                : bench::speed(v, options));
+    if (convergence.given()) return finish("convergence", bench::convergence(v));
+    if (work_precision.given()) return finish("work-precision", bench::error_against_work(v, options));
+    if (busy.given()) return finish("busy", bench::busy(v, options));
+    finish("speed", bench::speed(v, options));
   });
 }
