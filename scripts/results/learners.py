@@ -5,7 +5,7 @@
 
 BIN holds the programs, ROOT is the project, OUT keeps each cell as JSON: what is there is not run again. A cell is a tool, a task, a variant ("own": its
 defaults; "recipe": what it can take of configs/train) and a seed. Only training counts; evaluations do not. Unseen robots: 500 flights of another seed,
-of the same tasks, by each tool's own policy without exploration. Python needs the modules of requirements() and flappy.
+of the same tasks, by each tool's own policy without exploration. The quadrotor is flown by each tool's own simulator (rltools_quadrotor.cpp). Python needs the modules of requirements() and flappy.
 """
 
 import argparse
@@ -20,7 +20,7 @@ import time
 
 SHARES = (0.5, 0.8, 0.9, 0.95)
 FLIGHTS, UNSEEN, EVERY_S = 500, 1_000_000, 10.0
-TASKS = {"escape": ("flappy/Escape-v0", "escape"), "hover": ("flappy/Hover-v0", "hover_direct")}  # environment; configs/train
+TASKS = {"escape": ("flappy/Escape-v0", "escape"), "hover": ("flappy/Hover-v0", "hover_direct"), "quadrotor": (None, "quadrotor")}  # environment; configs/train
 RECIPE = {"learning_rate": 1e-3, "batch_size": 256, "gamma": 0.98, "tau": 0.02}
 RECIPE_TD3 = {"target_policy_noise": 0.1, "target_noise_clip": 0.3, "n_steps": 5}
 NETWORKS = {"pi": [32, 32], "qf": [128, 128]}
@@ -118,8 +118,28 @@ def by_rltools(algorithm, env_id, variant, seed):
             return clock, importlib.metadata.version("rltools")
 
 
+def build_rltools_loop():
+    import rltools
+
+    program, headers = OUT / "rltools_quadrotor", pathlib.Path(rltools.__file__).parent / "external/rl_tools/include"
+    command = ["g++", "-std=c++17", "-Ofast", "-march=native", "-DRL_TOOLS_BACKEND_ENABLE_OPENBLAS", "-I", headers, ROOT / "scripts/results/rltools_quadrotor.cpp"]
+    if not program.exists():
+        subprocess.run([*command, "-o", program, "-lopenblas"], check=True)
+
+
+def by_rltools_loop(seed):
+    """RLtools' own loop, environment and published parameters."""
+    import importlib.metadata
+
+    done = subprocess.run([OUT / "rltools_quadrotor", str(seed)], capture_output=True, text=True, check=True, env=os.environ | {"OPENBLAS_NUM_THREADS": "1"})
+    clock = Clock()
+    clock.rows = [json.loads(line) for line in done.stdout.splitlines()]
+    clock.wall, clock.cpu = clock.rows[-1]["wall_s"], clock.rows[-1]["cpu_s"]
+    return clock, importlib.metadata.version("rltools")
+
+
 def by_flappy(engine, config, seed, folder):
-    overrides = [f"learn.engine={engine}", f"seed={seed}", "evaluate.every=1000", f"evaluate.vehicles={FLIGHTS}"]
+    overrides = [f"learn.engine={engine}", f"seed={seed}", f"evaluate.every={250 if config == 'quadrotor' else 1000}", f"evaluate.vehicles={FLIGHTS}"]
     done = subprocess.run([BIN / "flappy-train", ROOT / f"configs/train/{config}.toml", "--out", folder, *(w for o in overrides for w in ("--set", o))], capture_output=True, text=True)
     if done.returncode:
         sys.exit(done.stderr)
@@ -140,10 +160,15 @@ def cell(name, task, variant, seed):
                  "start_s": time.monotonic() - start - summary["wall_s"] - summary["evaluation_s"], "peak_MB": resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024}
     else:
         library, algorithm = name.split("-")
-        clock, version = by_rltools(algorithm.upper(), env_id, variant, seed) if library == "rltools" else by_sb3({"sb3": "stable_baselines3"}.get(library, library), algorithm.upper(), env_id, variant, seed)
+        if name == "rltools-loop":
+            clock, version = by_rltools_loop(seed)
+        elif library == "rltools":
+            clock, version = by_rltools(algorithm.upper(), env_id, variant, seed)
+        else:
+            clock, version = by_sb3({"sb3": "stable_baselines3"}.get(library, library), algorithm.upper(), env_id, variant, seed)
         to = {str(s): next((row["wall_s"] for row in clock.rows if row["success"] >= s), None) for s in SHARES}
         found = {"version": version, "to_s": to, "best": max(row["success"] for row in clock.rows), "wall_s": clock.wall, "cpu_s": clock.cpu, "steps": clock.rows[-1]["steps"],
-                 "start_s": STARTED - start, "peak_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, "curve": clock.rows}
+                 "start_s": STARTED - start, "peak_MB": max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)) / 1024, "curve": clock.rows}
         found["start_s"] = time.monotonic() - start - clock.wall
     print(json.dumps({"tool": name, "task": task, "variant": variant, "seed": seed} | found))
 
@@ -188,14 +213,16 @@ if args.one:
     sys.exit()
 OUT.mkdir(parents=True, exist_ok=True)
 OWN = [(f"flappy-{engine}", "own") for engine in ("lanes", "libtorch")]
-OTHERS = [(tool, variant) for variant in ("recipe", "own") for tool in ("sb3-td3", "sb3-sac", "sb3-ppo", "sbx-td3", "sbx-sac", "rltools-td3", "rltools-sac")]
+OTHERS = [("rltools-loop", "own")] + [(tool, variant) for variant in ("recipe", "own") for tool in ("sb3-td3", "sb3-sac", "sb3-ppo", "sbx-td3", "sbx-sac", "rltools-td3", "rltools-sac")]
 for seed in args.seeds.split(",") if not args.table else []:
     for tool, variant in OWN + OTHERS:
-        for task in TASKS:
+        for task in (t for t in TASKS if (t == "quadrotor") == (tool == "rltools-loop") or tool.startswith("flappy")):
             file = OUT / f"cell_{tool}_{task}_{variant}_{seed}.json"
             if file.exists() or not fnmatch.fnmatch(f"{tool}_{task}_{variant}", args.cells):
                 continue
             print(f"{tool}, {task}, {variant}, seed {seed} ...", end=" ", flush=True)
+            if tool == "rltools-loop":
+                build_rltools_loop()
             done = subprocess.run([sys.executable, __file__, args.bin, args.root, args.out, "--seconds", str(SECONDS), "--one", tool, task, variant, seed], capture_output=True, text=True)
             if done.returncode:
                 print(done.stderr.strip().split("\n")[-1])
