@@ -13,9 +13,9 @@ from . import _core
 class Policy:
     """What acts upon observations: a run folder of `flappy-train`, a C header (.h), which is compiled, ONNX (.onnx) or TorchScript (.pt).
 
-    These two are read by the onnxruntime or torch of this Python, which is imported for it. `policy(observation)`: float32 (n, observations) or
-    (observations,), raw and in SI units, to float32 of as many rows: what is added to the controller's output or, without one, set: V
-    and fractions of a beat. `env.unwrapped.to_action(...)` makes an action of it.
+    These two are read by the onnxruntime or torch of this Python, which is imported for it. `policy(observation)`: float32
+    (n, observations) or (observations,), raw and in SI units, to float32 of as many rows: what is added to the controller's output or,
+    without one, set: V and fractions of a beat. `env.unwrapped.to_action(...)` makes an action of it.
 
     Raises:
         InputError: one line, where the file is no policy, does not compile or fails its own test.
