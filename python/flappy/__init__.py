@@ -10,7 +10,7 @@ from importlib.util import find_spec
 
 from ._core import Batch, Fleet, InputError, Vehicle, Wall, World, diagnose, fly, identify, instruction_sets, write_flight
 from .export import export
-from .flights import Page, read_flight, show
+from .flights import Page, read_flight, show, to_rerun
 from .policy import Policy
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "instruction_sets",
     "read_flight",
     "show",
+    "to_rerun",
     "write_flight",
 ]
 

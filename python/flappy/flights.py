@@ -55,3 +55,38 @@ def show(*flights: str | Path | Mapping[str, Any], vehicle: str | Path | None = 
         raise ValueError("show: no flight is given; accepted: folders of flights, or what read_flight returns")
     paths = [dict(flight) if isinstance(flight, Mapping) else Path(flight) for flight in flights]
     return Page(_core.flights_page(paths, vehicle, goal_m))
+
+
+def to_rerun(flight: str | Path | Mapping[str, Any], file: str | Path, *, name: str = "flight") -> None:
+    """Writes a flight log as a recording of Rerun (.rrd), by Rerun's own SDK (`pip install rerun-sdk`).
+
+    The robot's pose and path by motion capture are /robot and /path; each other column of a stream is a scalar /stream/column, such as
+    /imu/gyro_x_rad_s. The timeline t_s is the log's clock, latencies included.
+
+    Args:
+        flight: a folder, or what `read_flight` returns, arrays or frames.
+        file: where to; the viewer shows it with `rerun FILE`.
+        name: of the recording.
+
+    Raises:
+        InputError: a log that cannot be read.
+        ImportError: the package is missing.
+    """
+    import numpy as np
+    import rerun as rr
+
+    streams = flight if isinstance(flight, Mapping) else read_flight(flight)
+    with rr.RecordingStream(f"flappy-{name}") as recording:
+        recording.save(file)
+        recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        for stream in (each for each in streams if each != "header"):
+            columns = {key: np.asarray(values, dtype=float) for key, values in streams[stream].items()}
+            clock = rr.TimeColumn("t_s", duration=columns.pop("t_s"))
+            if stream == "mocap":
+                at = np.stack([columns[key] for key in ("x_m", "y_m", "z_m")], axis=1)
+                turned = np.stack([columns[key] for key in ("qx", "qy", "qz", "qw")], axis=1)  # Rerun has w last
+                recording.send_columns("/robot", [clock], rr.Transform3D.columns(translation=at, quaternion=turned))
+                recording.log("/robot", rr.TransformAxes3D(0.1), static=True)
+                recording.log("/path", rr.LineStrips3D([at[np.isfinite(at).all(axis=1)]]), static=True)
+            for key, values in columns.items():
+                recording.send_columns(f"/{stream}/{key}", [clock], rr.Scalars.columns(scalars=values))
