@@ -3,7 +3,7 @@
     python examples/python/optuna_sweep.py configs/train/quadrotor.toml --out sweep
     python examples/python/optuna_sweep.py train/quadrotor.toml --job            # by a flappy-server, over DDS
 
-Trials are kept in --storage (default: memory; sqlite:///sweep.db goes on where it was stopped). The programs are those of PATH.
+A run folder stays of each trial, 0.1 to 0.5 GB. Trials are kept in --storage (default: memory; sqlite:///sweep.db goes on where it was stopped). The programs are those of PATH.
 """
 
 import argparse
@@ -40,7 +40,9 @@ class Training:
 
     def __init__(self, config: str, values: list[str], out: Path) -> None:
         self.out = out
-        self.process = subprocess.Popen(["flappy-train", config, "--out", str(out), *sets(values)], stdout=subprocess.DEVNULL)
+        self.process = subprocess.Popen(
+            ["flappy-train", config, "--out", str(out), *sets(values)], stdout=subprocess.DEVNULL, start_new_session=True
+        )
 
     def evaluations(self) -> Iterator[tuple[int, float]]:
         """Yields each as it comes, until the training ends."""
@@ -61,7 +63,7 @@ class Training:
     def stop(self) -> None:
         """Ends what still runs."""
         if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)  # as Ctrl-C: it ends cleanly
+            self.process.send_signal(signal.SIGINT)  # as Ctrl-C, which reaches this process alone: it ends cleanly
         self.process.wait()
 
 
@@ -87,9 +89,9 @@ class Job:
             if success and step > told:
                 told = step
                 yield step, float(success[1]) / 100
-            if job["state"] == "failed":
-                raise RuntimeError(f"job {self.number} failed: {job['message']}")
-            if job["state"] in ("done", "cancelled"):
+            if job["state"] in ("failed", "cancelled"):
+                raise RuntimeError(f"job {self.number} is {job['state']}: {job['message']}")
+            if job["state"] == "done":
                 return
             time.sleep(0.5)
 
@@ -135,7 +137,9 @@ def main() -> None:
 
     how = {"sampler": optuna.samplers.TPESampler(seed=args.seed), "pruner": optuna.pruners.MedianPruner(n_startup_trials=3)}
     study = optuna.create_study(study_name="flappy", storage=args.storage, load_if_exists=True, direction="maximize", **how)
-    study.optimize(objective, n_trials=args.trials)
+    if (there := args.out / f"trial_{len(study.trials)}").exists() and not args.job:
+        sys.exit(f"error: {there}: is there already; accepted: another --out, or the --storage that it was made with")
+    study.optimize(objective, n_trials=args.trials, catch=RuntimeError)  # one that diverges is a failed trial
     pruned = sum(trial.state == optuna.trial.TrialState.PRUNED for trial in study.trials)
     print(f"{len(study.trials)} trials, {pruned} pruned; best success {100 * study.best_value:.1f} %, trial {study.best_trial.number}:")
     for name, value in study.best_params.items():

@@ -61,7 +61,7 @@ def to_rerun(flight: str | Path | Mapping[str, Any], file: str | Path, *, name: 
     """Writes a flight log as a recording of Rerun (.rrd), by Rerun's own SDK (`pip install rerun-sdk`).
 
     The robot's pose and path by motion capture are /robot and /path; each other column of a stream is a scalar /stream/column, such as
-    /imu/gyro_x_rad_s. The timeline t_s is the log's clock, latencies included.
+    /imu/gyro_x_rad_s. The timeline t_s is the log's clock: samples stand where they arrived, later by the latency that the log declares.
 
     Args:
         flight: a folder, or what `read_flight` returns, arrays or frames.
@@ -87,6 +87,10 @@ def to_rerun(flight: str | Path | Mapping[str, Any], file: str | Path, *, name: 
                 turned = np.stack([columns[key] for key in ("qx", "qy", "qz", "qw")], axis=1)  # Rerun has w last
                 recording.send_columns("/robot", [clock], rr.Transform3D.columns(translation=at, quaternion=turned))
                 recording.log("/robot", rr.TransformAxes3D(0.1), static=True)
-                recording.log("/path", rr.LineStrips3D([at[np.isfinite(at).all(axis=1)]]), static=True)
+                seen = np.isfinite(at).all(axis=1)
+                strips = [
+                    at[part] for part in np.split(np.arange(len(at)), np.flatnonzero(np.diff(seen)) + 1) if len(part) and seen[part[0]]
+                ]
+                recording.log("/path", rr.LineStrips3D(strips), static=True)  # with a gap where tracking was lost
             for key, values in columns.items():
                 recording.send_columns(f"/{stream}/{key}", [clock], rr.Scalars.columns(scalars=values))

@@ -5,20 +5,23 @@
 
 A process of its own: training never waits for it. What was told stands in RUN/follow_mlflow.json or RUN/follow_wandb.json, so it goes on
 where it was stopped and tells nothing twice. While a server does not answer, it tries again every --every seconds. It ends when every
-training has.
+training has; one that was stopped has ended, too: follow it again when it is resumed.
 """
 
 import argparse
+import fcntl
 import hashlib
 import json
 import math
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
 import tomllib
+import uuid
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -48,6 +51,28 @@ class Run:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        whole = folder.resolve()
+        name = f"{whole.parent.name}-{whole.name}" if whole.name.startswith("seed_") else whole.name
+        self.name = re.sub(r"[^A-Za-z0-9_.-]", "-", name)  # what both loggers take
+        self.to = ""  # its id at the logger, once this process has begun there
+        self._lock: int | None = None
+        self._made: tuple[int, tempfile.TemporaryDirectory[str], list[tuple[Path, str]]] | None = None
+
+    def lock(self, logger: str) -> None:
+        """Keeps other followers off until this process ends; InputError where there is one."""
+        if self._lock is None:
+            self._lock = os.open(self.folder / f".follow_{logger}.lock", os.O_RDWR | os.O_CREAT, 0o644)
+            try:
+                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                raise InputError(f"{self.folder}: another flappy.follow tells {logger} of this run") from error
+
+    def made(self, programs: Path | None, updates: int) -> list[tuple[Path, str]]:
+        """Headers and page of a training that has ended, made once; and the folder of each at the logger."""
+        if self._made is None or self._made[0] != updates:
+            into = tempfile.TemporaryDirectory()
+            self._made = (updates, into, _exported(self, programs, Path(into.name)))
+        return self._made[2]
 
     def json(self, name: str) -> dict[str, Any]:
         """An empty table if the file is not there yet."""
@@ -55,23 +80,21 @@ class Run:
         found: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
         return found
 
-    def rows(self, after: int) -> list[tuple[int, int, dict[str, float]]]:
+    def rows(self, after: int, began_ms: int) -> list[tuple[int, int, dict[str, float]]]:
         """Update, time in ms since 1970 and metrics of each evaluation after an update.
 
-        The time follows from files alone, so that a row that is told twice is the same row to a server.
+        The time follows from the beginning and the files, so that a row that is told twice is the same row to a server.
         """
         timing = {row["update"]: row for row in self._lines("timing.jsonl")}
-        began_ms = int(1000 * (self.folder / "config").stat().st_mtime) if (self.folder / "config").exists() else 0
         found = []
         for row in self._lines("metrics.jsonl"):
             update = int(row["update"])
             if update <= after or update not in timing:
                 continue
-            values = {
-                key: float(value) for key, value in (timing[update] | row).items() if isinstance(value, int | float) and key != "update"
-            }
-            elapsed_s = values.get("wall_s", 0.0) + values.get("evaluation_s", 0.0)
-            found.append((update, began_ms + int(1000 * elapsed_s), {key: value for key, value in values.items() if math.isfinite(value)}))
+            numbers = {key: value for key, value in (timing[update] | row).items() if isinstance(value, int | float) and key != "update"}
+            elapsed_s = numbers.get("wall_s", 0.0) + numbers.get("evaluation_s", 0.0)
+            values = {key: float(value) for key, value in numbers.items() if math.isfinite(value)}
+            found.append((update, began_ms + int(1000 * elapsed_s), values))
         return found
 
     def ended(self) -> bool:
@@ -94,7 +117,7 @@ class Run:
 
 
 class MlflowServer:
-    """A run of an MLflow server; its id is the server's."""
+    """An experiment of an MLflow server."""
 
     name = "mlflow"
 
@@ -109,16 +132,23 @@ class MlflowServer:
         self._entities = mlflow.entities
         self._client = mlflow.MlflowClient(tracking_uri=uri)
         self._experiment = experiment
-        self.where = uri
+        self.where = f"{uri}, experiment {experiment}"
 
-    def begin(self, run: Run, known: str) -> str:
-        """Returns the id of a run: the known one, or a new one where that is ""."""
-        if known:
-            return known
+    def begin(self, run: Run, key: str) -> str:
+        """Returns the id of the run that has this key, which is made where there is none."""
         found = self._client.get_experiment_by_name(self._experiment)
         experiment = found.experiment_id if found else self._client.create_experiment(self._experiment)
-        tags = {f"flappy.{key}": str(value) for key, value in run.json("run.json").items()}
-        return str(self._client.create_run(experiment, run_name=run.folder.name, tags=tags).info.run_id)
+        same = self._client.search_runs([experiment], f"tags.`flappy.follow` = '{key}'")
+        if same:
+            to = str(same[0].info.run_id)
+            self._client.update_run(to, status="RUNNING")  # it may have been stopped, and resumed
+            return to
+        tags = {f"flappy.{name}": str(value) for name, value in run.json("run.json").items()} | {"flappy.follow": key}
+        return str(self._client.create_run(experiment, run_name=run.name, tags=tags).info.run_id)
+
+    def last(self, to: str, update: int) -> int:
+        """The last update that is safe: all that were told."""
+        return update
 
     def configuration(self, to: str, values: dict[str, Any]) -> None:
         """Tells the configuration."""
@@ -140,7 +170,7 @@ class MlflowServer:
         """Tells the summary of a training that has ended."""
         for key, value in flatten(summary, "summary"):
             if isinstance(value, int | float):
-                self._client.log_metric(to, key, float(value), timestamp=0, step=0)
+                self._client.log_metric(to, key, float(value), timestamp=0, step=int(summary["updates"]))
         self._client.set_terminated(to, "KILLED" if summary.get("stopped") else "FINISHED")
 
     def close(self) -> None:
@@ -148,7 +178,7 @@ class MlflowServer:
 
 
 class WandbProject:
-    """A run of a project of Weights & Biases; its id follows from the folder."""
+    """A project of Weights & Biases."""
 
     name = "wandb"
 
@@ -160,50 +190,53 @@ class WandbProject:
         if not offline and not wandb.api.api_key:
             raise InputError("--wandb: no API key; accepted: one of `wandb login`, or --offline")
         self._wandb, self._project, self._offline = wandb, project, offline
-        self._run: Any = None
-        self.where = project
+        self._runs: dict[str, Any] = {}
+        self.where = f"{project}, offline" if offline else project
 
-    def begin(self, run: Run, known: str) -> str:
-        """Returns the id of a run: the known one, or a new one where that is ""."""
-        to = known or hashlib.sha256(f"{run.folder.resolve()} {run.folder.stat().st_ino}".encode()).hexdigest()[:16]
-        if self._run is None or self._run.id != to:
-            self.close()
-            self._run = self._wandb.init(
-                project=self._project,
-                id=to,
-                name=run.folder.name,
-                resume="allow",
-                mode="offline" if self._offline else "online",
-                dir=str(run.folder),
-                config={"flappy": run.json("run.json")},
-                settings=self._wandb.Settings(console="off", silent=True),
-            )
-        return to
+    def begin(self, run: Run, key: str) -> str:
+        """Returns the id of the run, which is the key."""
+        self._runs[key] = self._wandb.init(
+            project=self._project,
+            id=key,
+            name=run.name,
+            resume="allow",
+            reinit="create_new",
+            mode="offline" if self._offline else "online",
+            dir=str(run.folder),
+            config={"flappy": run.json("run.json")},
+            settings=self._wandb.Settings(console="off", silent=True),
+        )
+        return key
+
+    def last(self, to: str, update: int) -> int:
+        """The last update that is safe: online the client may have lost what it was still sending when it was killed."""
+        return update if self._offline else min(update, int(self._runs[to].starting_step) - 1)
 
     def configuration(self, to: str, values: dict[str, Any]) -> None:
         """Tells the configuration."""
-        self._run.config.update(values, allow_val_change=True)
+        self._runs[to].config.update(values, allow_val_change=True)
 
     def rows(self, to: str, rows: list[tuple[int, int, dict[str, float]]]) -> None:
         """Tells evaluations, as Run.rows has them."""
         for update, _, values in rows:
-            self._run.log(values, step=update)
+            self._runs[to].log(values, step=update, commit=True)
 
     def file(self, to: str, file: Path, folder: str) -> None:
-        """Uploads a file into a folder of the run; "" is its root."""
-        artifact = self._wandb.Artifact(f"{self._run.name}-{(folder + '-' if folder else '') + file.name}", type=folder or "run")
-        artifact.add_dir(str(file)) if file.is_dir() else artifact.add_file(str(file))
-        self._run.log_artifact(artifact)
+        """Uploads a file, as an artefact named RUN-FOLDER-FILE."""
+        run = self._runs[to]
+        artifact = self._wandb.Artifact(f"{run.name}-{(folder + '-' if folder else '') + file.name}", type=folder or "run")
+        artifact.add_file(str(file))
+        run.log_artifact(artifact)
 
     def end(self, to: str, summary: dict[str, Any]) -> None:
-        """Tells the summary of a training that has ended."""
-        self._run.summary.update({key: value for key, value in flatten(summary, "summary")})
+        """Tells the summary of a training that has ended; returns when all is written, or sent."""
+        self._runs[to].summary.update(dict(flatten(summary, "summary")))
+        self._runs.pop(to).finish()
 
     def close(self) -> None:
-        """Writes what is open."""
-        if self._run is not None:
-            self._run.finish()
-            self._run = None
+        """Writes, or sends, what is open."""
+        for run in self._runs.values():
+            run.finish()
 
 
 Logger = MlflowServer | WandbProject
@@ -224,7 +257,8 @@ def _exported(run: Run, programs: Path | None, into: Path) -> list[tuple[Path, s
     for command in ([export, str(run.folder), "--out", str(headers)], [report, str(run.folder), "--out", str(page)]):
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode:
-            print(f"{run.folder}: {' '.join(command[:1])}: {done.stderr.strip().splitlines()[-1]}", file=sys.stderr)
+            reason = (done.stderr.strip().splitlines() or [f"ended with {done.returncode}"])[-1]
+            print(f"{run.folder}: {Path(command[0]).name}: {reason}", file=sys.stderr)
     found += [(file, "headers") for file in sorted(headers.glob("*"))] if headers.exists() else []
     return found + ([(page, "")] if page.exists() else [])
 
@@ -244,15 +278,8 @@ def tell(run: Run, logger: Logger, programs: Path | None = None) -> bool:
         Exception: what the client raises where a server does not answer; what was told until then is kept.
     """
     file = run.folder / f"follow_{logger.name}.json"
-    told: dict[str, Any] = {
-        "to": "",
-        "where": logger.where,
-        "configuration": False,
-        "update": -1,
-        "files": {},
-        "policy_s": 0.0,
-        "ended": -1,
-    }
+    told: dict[str, Any] = {"where": logger.where, "key": "", "began_ms": 0, "configuration": False, "update": -1, "files": {}}
+    told |= {"policy_s": 0.0, "ended": -1}  # time of the last upload of a policy; updates of the summary that was told
     if file.exists():
         told |= json.loads(file.read_text())
         if told["where"] != logger.where:
@@ -267,69 +294,87 @@ def tell(run: Run, logger: Logger, programs: Path | None = None) -> bool:
         name = f"{folder}/{path.name}"
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
         if told["files"].get(name) != digest:
-            logger.file(told["to"], path, folder)
+            logger.file(run.to, path, folder)
             told["files"][name] = digest
             keep()
 
     if not run.json("run.json"):
         return False
+    run.lock(logger.name)
     ended, summary = run.ended(), run.json("summary.json")
     if ended and told["ended"] == summary["updates"]:
         return True
-    to = logger.begin(run, told["to"])
-    if to != told["to"]:
-        told["to"] = to
-        keep()
+    if not told["key"]:
+        told["key"], told["began_ms"] = uuid.uuid4().hex[:16], int(1000 * (run.folder / "run.json").stat().st_mtime)
+        keep()  # before it is used: whatever is lost from here on is found by it
+    if not run.to:
+        to = logger.begin(run, told["key"])
+        told["update"] = logger.last(to, told["update"])
+        run.to = to
     if not told["configuration"]:
-        logger.configuration(to, run.configuration())
+        logger.configuration(run.to, run.configuration())
         told["configuration"] = True
         keep()
     for config in sorted((run.folder / "config").glob("*")):
         upload(config, "config")
-    rows = run.rows(told["update"])
+    rows = run.rows(told["update"], told["began_ms"])
     for k in range(0, len(rows), 50):
-        logger.rows(to, rows[k : k + 50])
+        logger.rows(run.to, rows[k : k + 50])
         told["update"] = rows[min(k + 50, len(rows)) - 1][0]
         keep()
     best = run.folder / "best.json"
     if best.exists() and (ended or time.time() - told["policy_s"] >= POLICY_EVERY_S):
         upload(best, "policy")
         told["policy_s"] = time.time()
+        keep()
     if not ended:
         return False
-    with tempfile.TemporaryDirectory() as into:
-        for path, folder in _exported(run, programs, Path(into)) if best.exists() else []:
-            upload(path, folder)
-    logger.end(to, summary)
+    for path, folder in run.made(programs, summary["updates"]) if best.exists() else []:
+        upload(path, folder)
+    logger.end(run.to, summary)
+    run.to = ""
     told["ended"] = summary["updates"]
     keep()
     return True
 
 
-def follow(runs: list[Run], logger: Logger, every_s: float = 10.0, programs: Path | None = None) -> None:
-    """Tells a logger of runs until each of them has ended. What a server misses is told when it is back."""
+def _runs_of(folder: Path, known: dict[Path, Run]) -> tuple[list[Run], bool]:
+    """Runs of a folder so far, and whether more are to come: flappy-train --seeds makes one after another, then curve.csv."""
+    seeds = sorted(folder.glob("seed_*"))
+    return [known.setdefault(each, Run(each)) for each in seeds or [folder]], bool(seeds) and not (folder / "curve.csv").exists()
+
+
+def follow(folders: list[Path], logger: Logger, every_s: float = 10.0, programs: Path | None = None) -> None:
+    """Tells a logger of run folders, or of those of --seeds, until each training has ended; what a server misses, when it is back."""
+    known: dict[Path, Run] = {}
+    over: set[Path] = set()
+
+    def look(run: Run) -> str:
+        """Tells of a run; returns what is in the way."""
+        try:
+            if tell(run, logger, programs):
+                over.add(run.folder)
+                print(f"{run.folder}: told to {logger.where}", flush=True)
+                return ""
+            return "" if run.json("run.json") else "no run.json yet; it is waited for"
+        except InputError:
+            raise
+        except Exception as error:  # whatever a client raises while its server is away
+            reason = (str(error).strip().splitlines() or [""])[0][:200]
+            return f"not told to {logger.where}; tried again every {every_s:g} s: {type(error).__name__}: {reason}"
+
     said: dict[Path, str] = {}
-    left = list(runs)
     try:
-        while left:
-            for run in list(left):
-                problem = ""
-                try:
-                    if tell(run, logger, programs):
-                        left.remove(run)
-                        print(f"{run.folder}: told to {logger.where}")
-                    elif not run.json("run.json"):
-                        problem = "no run.json yet; it is waited for"
-                except InputError:
-                    raise
-                except Exception as error:  # whatever a client raises while its server is away
-                    reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
-                    problem = f"{logger.where} does not answer; tried again every {every_s:g} s: {reason}"
+        while True:
+            found = [_runs_of(folder, known) for folder in folders]
+            for run in (run for runs, _ in found for run in runs if run.folder not in over):
+                problem = look(run)
                 if problem and said.get(run.folder) != problem:
                     print(f"{run.folder}: {problem}", file=sys.stderr, flush=True)
                 said[run.folder] = problem
-            if left:
-                time.sleep(every_s)
+            if all(run.folder in over for runs, _ in found for run in runs) and not any(to_come for _, to_come in found):
+                return
+            time.sleep(every_s)
     finally:
         logger.close()
 
@@ -355,13 +400,11 @@ def main(arguments: list[str] | None = None) -> int:
             raise InputError("--offline: only with --wandb")
         if args.every <= 0:
             raise InputError(f"--every: {args.every:g}; accepted: more than 0 s")
-        folders: list[Path] = []
         for run in args.runs:
             if not run.is_dir():
                 raise InputError(f"{run}: no such folder; accepted: a run folder of flappy-train")
-            folders += sorted(run.glob("seed_*")) or [run]
         logger: Logger = MlflowServer(args.mlflow, args.experiment) if args.mlflow else WandbProject(args.wandb, args.offline)
-        follow([Run(folder) for folder in folders], logger, args.every, args.programs)
+        follow(args.runs, logger, args.every, args.programs)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -128,7 +128,7 @@ def test_a_server_that_is_away_misses_nothing(growing: Growing, tmp_path: Path) 
     assert follower.poll() is None
     server = serve(tmp_path, port)
     wait_until_told(300)
-    assert f"{uri} does not answer; tried again every 0.3 s" in Path(err.name).read_text()
+    assert f"not told to {uri}, experiment flappy; tried again every 0.3 s: " in Path(err.name).read_text()
     stop(server)
     growing.grow(4)
     time.sleep(2)
@@ -145,9 +145,10 @@ def test_a_server_that_is_away_misses_nothing(growing: Growing, tmp_path: Path) 
         state = json.loads((growing.folder / "follow_mlflow.json").read_text())
         client = mlflow.MlflowClient(tracking_uri=uri)
         runs = client.search_runs([client.get_experiment_by_name("flappy").experiment_id])
-        assert [run.info.run_id for run in runs] == [state["to"]]
-        run = client.get_run(state["to"])
-        history = client.get_metric_history(state["to"], "success_rate")
+        assert [run.data.tags["flappy.follow"] for run in runs] == [state["key"]]
+        to = runs[0].info.run_id
+        run = client.get_run(to)
+        history = client.get_metric_history(to, "success_rate")
         assert [row.step for row in history] == [100 * k for k in range(1, 128)]
         assert [row.value for row in history] == pytest.approx([0.01 * k for k in range(1, 128)])
         assert history[1].timestamp - history[0].timestamp == 1000
@@ -155,10 +156,10 @@ def test_a_server_that_is_away_misses_nothing(growing: Growing, tmp_path: Path) 
         assert run.data.tags["flappy.commit"] == "abc"
         assert run.data.metrics["summary.best_success_rate"] == 0.5
         assert run.info.status == "FINISHED"
-        before = client.get_run(state["to"]).data
+        before = client.get_run(to).data
         subprocess.run(command(growing.folder, "--mlflow", uri), check=True, capture_output=True)
-        assert client.get_run(state["to"]).data.to_dictionary() == before.to_dictionary()
-        assert len(client.get_metric_history(state["to"], "success_rate")) == 127
+        assert client.get_run(to).data.to_dictionary() == before.to_dictionary()
+        assert len(client.get_metric_history(to, "success_rate")) == 127
     finally:
         stop(server)
 
@@ -171,8 +172,9 @@ def test_a_training_is_told_whole(trained: Path, tmp_path: Path) -> None:
     server = serve(tmp_path, port)
     try:
         subprocess.run(command(run, "--mlflow", uri, "--programs", PROGRAMS), check=True)
-        to = json.loads((run / "follow_mlflow.json").read_text())["to"]
         client = mlflow.MlflowClient(tracking_uri=uri)
+        (only,) = client.search_runs([client.get_experiment_by_name("flappy").experiment_id])
+        to = only.info.run_id
 
         def names(path: str = "") -> list[str]:
             return [file.path for file in client.list_artifacts(to, path or None)]
@@ -185,6 +187,36 @@ def test_a_training_is_told_whole(trained: Path, tmp_path: Path) -> None:
         assert len(client.get_metric_history(to, "success_rate")) == len((run / "metrics.jsonl").read_text().splitlines())
     finally:
         stop(server)
+
+
+def test_seeds_are_followed_as_they_come(tmp_path: Path) -> None:
+    """flappy-train --seeds makes the second folder when the first has ended; a stopped training is followed on when it is resumed."""
+    first = Growing(tmp_path / "five" / "seed_0")
+    first.grow(2)
+    first.end()
+    uri = f"sqlite:///{tmp_path}/store.db"
+    follower = subprocess.Popen(command(tmp_path / "five", "--mlflow", uri, "--every", "0.2"), cwd=tmp_path)
+    for _ in range(300):
+        if (first.folder / "follow_mlflow.json").exists() and json.loads((first.folder / "follow_mlflow.json").read_text())["ended"] == 200:
+            break
+        time.sleep(0.1)
+    second = subprocess.run(command(first.folder, "--mlflow", uri), cwd=tmp_path, capture_output=True, text=True)
+    assert second.returncode == 2 and "another flappy.follow tells mlflow of this run" in second.stderr
+    assert follower.poll() is None
+    later = Growing(tmp_path / "five" / "seed_1")
+    later.grow(3)
+    later.end()
+    (tmp_path / "five" / "curve.csv").write_text("")
+    assert follower.wait(60) == 0
+    (first.folder / "summary.json").unlink()  # as --resume does
+    first.grow(3)
+    first.end()
+    subprocess.run(command(tmp_path / "five", "--mlflow", uri), check=True, cwd=tmp_path)
+    client = mlflow.MlflowClient(tracking_uri=uri)
+    runs = {run.info.run_name: run.info.run_id for run in client.search_runs([client.get_experiment_by_name("flappy").experiment_id])}
+    assert sorted(runs) == ["five-seed_0", "five-seed_1"]
+    steps = {name: [row.step for row in client.get_metric_history(to, "success_rate")] for name, to in runs.items()}
+    assert steps == {"five-seed_0": [100, 200, 300, 400, 500], "five-seed_1": [100, 200, 300]}
 
 
 def test_wandb_offline_has_all_of_it(trained: Path, tmp_path: Path) -> None:
@@ -232,5 +264,5 @@ def test_a_line_that_is_being_written_waits(growing: Growing) -> None:
     growing.grow(2)
     with (growing.folder / "metrics.jsonl").open("a") as metrics:
         metrics.write('{"update": 300, "succ')
-    assert [update for update, _, _ in follow.Run(growing.folder).rows(-1)] == [100, 200]
-    assert [update for update, _, _ in follow.Run(growing.folder).rows(100)] == [200]
+    assert [update for update, _, _ in follow.Run(growing.folder).rows(-1, 0)] == [100, 200]
+    assert [update for update, _, _ in follow.Run(growing.folder).rows(100, 0)] == [200]

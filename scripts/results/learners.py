@@ -4,7 +4,7 @@
     scripts/results/learners.py BIN ROOT OUT [--seconds 600] [--cells PATTERN] [--seeds 0,1] [--table]
 
 BIN holds the programs, ROOT is the project, OUT keeps each cell as JSON: what is there is not run again. A cell is a tool, a task, a variant ("own": its
-defaults; "recipe": what it can take of configs/train) and a seed. Only training counts; evaluations do not. Unseen robots: 500 flights of another seed,
+defaults; "recipe": what it can take of configs/train) and a seed. Only training is timed; processor time of ours includes evaluations. Unseen robots: 500 flights of another seed,
 of the same tasks, by each tool's own policy without exploration. The quadrotor is flown by each tool's own simulator (rltools_quadrotor.cpp). Python needs the modules of requirements() and flappy.
 """
 
@@ -14,6 +14,8 @@ import json
 import os
 import pathlib
 import resource
+import shutil
+import statistics
 import subprocess
 import sys
 import time
@@ -140,6 +142,7 @@ def by_rltools_loop(seed):
 
 def by_flappy(engine, config, seed, folder):
     overrides = [f"learn.engine={engine}", f"seed={seed}", f"evaluate.every={250 if config == 'quadrotor' else 1000}", f"evaluate.vehicles={FLIGHTS}"]
+    shutil.rmtree(folder, ignore_errors=True)  # of a cell that was interrupted
     done = subprocess.run([BIN / "flappy-train", ROOT / f"configs/train/{config}.toml", "--out", folder, *(w for o in overrides for w in ("--set", o))], capture_output=True, text=True)
     if done.returncode:
         sys.exit(done.stderr)
@@ -168,7 +171,7 @@ def cell(name, task, variant, seed):
             clock, version = by_sb3({"sb3": "stable_baselines3"}.get(library, library), algorithm.upper(), env_id, variant, seed)
         to = {str(s): next((row["wall_s"] for row in clock.rows if row["success"] >= s), None) for s in SHARES}
         found = {"version": version, "to_s": to, "best": max(row["success"] for row in clock.rows), "wall_s": clock.wall, "cpu_s": clock.cpu, "steps": clock.rows[-1]["steps"],
-                 "start_s": STARTED - start, "peak_MB": max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)) / 1024, "curve": clock.rows}
+                 "peak_MB": max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)) / 1024, "curve": clock.rows}
         found["start_s"] = time.monotonic() - start - clock.wall
     print(json.dumps({"tool": name, "task": task, "variant": variant, "seed": seed} | found))
 
@@ -183,14 +186,14 @@ def table():
         groups.setdefault((row["task"], row["tool"] + " " + row["version"], row["variant"]), []).append(row)
     for (task, tool, variant), same in sorted(groups.items()):
         def middle(values):
-            return sorted(values)[len(values) // 2]
+            return statistics.median_low(values)
 
         def reached(share):
             times = [row["to_s"][str(share)] for row in same]
             shown = [t if t is not None else float("inf") for t in times]
             m = middle(shown)
             text = f"> {min(row['wall_s'] for row in same):.0f}" if m == float("inf") else f"{m:.1f}"
-            return text + (f" ({min(shown):.1f} to {max(shown):.1f})" if len(same) > 1 and m < float("inf") else "")
+            return text + (f" ({min(shown):.1f} to {max(shown):.1f})".replace("inf", "not") if len(same) > 1 and m < float("inf") else "")
 
         print(f"| {task} | {tool} | {variant} | {len(same)} | " + " | ".join(reached(s) for s in SHARES) +
               f" | {100 * middle([r['best'] for r in same]):.1f} | {middle([r['steps'] for r in same]):,} | {middle([r['cpu_s'] for r in same]):.0f} | {middle([r['peak_MB'] for r in same]):.0f} |")
@@ -202,11 +205,10 @@ parser.add_argument("root", type=pathlib.Path)
 parser.add_argument("out", type=pathlib.Path)
 parser.add_argument("--seconds", type=float, default=600, help="of training at most, for each cell of another tool")
 parser.add_argument("--cells", default="*", help="pattern of TOOL_TASK_VARIANT, such as 'sb3-*_escape_*'")
-parser.add_argument("--seeds", default="0", help="numbers")
+parser.add_argument("--seeds", default="0", help="numbers: 0,3 or 0-19")
 parser.add_argument("--table", action="store_true", help="print what is there alone")
 parser.add_argument("--one", nargs=4, help=argparse.SUPPRESS)
 args = parser.parse_args()
-STARTED = time.monotonic()
 BIN, ROOT, OUT, SECONDS = args.bin.resolve(), args.root.resolve(), args.out.resolve(), args.seconds
 if args.one:
     cell(args.one[0], args.one[1], args.one[2], int(args.one[3]))
@@ -214,7 +216,9 @@ if args.one:
 OUT.mkdir(parents=True, exist_ok=True)
 OWN = [(f"flappy-{engine}", "own") for engine in ("lanes", "libtorch")]
 OTHERS = [("rltools-loop", "own")] + [(tool, variant) for variant in ("recipe", "own") for tool in ("sb3-td3", "sb3-sac", "sb3-ppo", "sbx-td3", "sbx-sac", "rltools-td3", "rltools-sac")]
-for seed in args.seeds.split(",") if not args.table else []:
+FIRST, _, LAST = args.seeds.partition("-")
+SEEDS = map(str, range(int(FIRST), int(LAST) + 1)) if LAST else args.seeds.split(",")
+for seed in SEEDS if not args.table else []:
     for tool, variant in OWN + OTHERS:
         for task in (t for t in TASKS if (t == "quadrotor") == (tool == "rltools-loop") or tool.startswith("flappy")):
             file = OUT / f"cell_{tool}_{task}_{variant}_{seed}.json"

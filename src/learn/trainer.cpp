@@ -474,6 +474,7 @@ TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
   if (writes) lock.emplace(options.folder);
   if (writes && !options.from) refuse_run_in(options.folder);
   Trainer trainer(config, options);
+  if (writes) std::filesystem::remove(options.folder / "summary.json");  // that of a stop: the run goes on
   TrainSummary summary = trainer.run();
   if (!writes) return summary;
   summary.policy_sha256 = io::sha256(io::read_text(options.folder / "best.json"));

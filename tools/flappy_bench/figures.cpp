@@ -7,8 +7,8 @@
 
 #include "flappy/batch.hpp"
 #include "io/append_file.hpp"
-#include "io/program.hpp"
 #include "io/parallel.hpp"
+#include "io/program.hpp"
 #include "learn/trainer.hpp"
 
 namespace flappy::bench {
