@@ -3,7 +3,8 @@
     python examples/python/optuna_sweep.py configs/train/quadrotor.toml --out sweep
     python examples/python/optuna_sweep.py train/quadrotor.toml --job            # by a flappy-server, over DDS
 
-A run folder stays of each trial, 0.1 to 0.5 GB. Trials are kept in --storage (default: memory; sqlite:///sweep.db goes on where it was stopped). The programs are those of PATH.
+A run folder stays of each trial, 0.1 to 0.5 GB. Trials are kept in --storage (default: memory; sqlite:///sweep.db goes on where it was
+stopped). The programs are those of PATH.
 """
 
 import argparse
