@@ -53,7 +53,7 @@ class Run:
         self.folder = folder
         whole = folder.resolve()
         name = f"{whole.parent.name}-{whole.name}" if whole.name.startswith("seed_") else whole.name
-        self.name = re.sub(r"[^A-Za-z0-9_.-]", "-", name)  # what both loggers take
+        self.name = re.sub(r"[^A-Za-z0-9_.-]", "-", name)  # MLflow and W&B accept these characters
         self.to = ""  # its id at the logger, once this process has begun there
         self._lock: int | None = None
         self._made: tuple[int, tempfile.TemporaryDirectory[str], list[tuple[Path, str]]] | None = None

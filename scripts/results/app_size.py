@@ -16,7 +16,7 @@ import sys
 
 BIN, ROOT, RUN, OUT = (pathlib.Path(a).resolve() for a in sys.argv[1:5])
 MACHINE = ["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"]
-STEPS = 600  # of 1 ms, two for each control period
+STEPS = 600  # one lasts 1 ms; a control period has two
 RECORD_IN, RECORD_OUT = struct.Struct("<I13f3i"), struct.Struct("<f4i3f4I")
 SHIMS = "FreeRTOS app controller controller_pid debug eventtrigger log param stabilizer_types supervisor task usec_time"
 

@@ -142,7 +142,7 @@ def by_rltools_loop(seed):
 
 def by_flappy(engine, config, seed, folder):
     overrides = [f"learn.engine={engine}", f"seed={seed}", f"evaluate.every={250 if config == 'quadrotor' else 1000}", f"evaluate.vehicles={FLIGHTS}"]
-    shutil.rmtree(folder, ignore_errors=True)  # of a cell that was interrupted
+    shutil.rmtree(folder, ignore_errors=True)  # an interrupted cell left it
     done = subprocess.run([BIN / "flappy-train", ROOT / f"configs/train/{config}.toml", "--out", folder, *(w for o in overrides for w in ("--set", o))], capture_output=True, text=True)
     if done.returncode:
         sys.exit(done.stderr)

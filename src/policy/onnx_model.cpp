@@ -10,7 +10,7 @@
 namespace flappy::policy {
 namespace {
 
-constexpr int kIrVersion = 8;  // of ONNX 1.12, which brought the opset
+constexpr int kIrVersion = 8;  // ONNX 1.12 has this version and brought kOnnxOpset
 
 class Graph {
  public:

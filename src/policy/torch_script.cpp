@@ -8,6 +8,7 @@
 #include <string>
 
 #include "io/files.hpp"
+#include "io/refuse.hpp"
 
 namespace flappy::policy {
 namespace {
@@ -93,9 +94,6 @@ std::string write(const PolicyNetwork& n, const std::string& contract) {
 }
 
 std::unique_ptr<const Policy> load(const std::filesystem::path& path, int observations, int actions) {
-  const auto refuse = [&](const std::string& what, const std::string& accepted) {
-    throw io::InputError(path.string() + ": " + what + "; accepted: " + accepted);
-  };
   std::istringstream file(io::read_text(path));
   at::set_num_threads(1);                       // such small networks are slower on more threads
   torch::jit::setGraphExecutorOptimize(false);  // all calls give the bits of the first one
@@ -103,7 +101,7 @@ std::unique_ptr<const Policy> load(const std::filesystem::path& path, int observ
   try {
     policy = std::make_unique<TorchScript>(torch::jit::load(file), observations, actions);
   } catch (const std::exception& e) {
-    refuse("is no TorchScript file: " + reason(e.what()), "what torch.jit.save writes");
+    io::refuse(path, "is no TorchScript file: " + reason(e.what()), "what torch.jit.save writes");
   }
   const std::string sizes =
       "float[n][" + std::to_string(observations) + "] to float[n][" + std::to_string(actions) + "]";
@@ -113,13 +111,13 @@ std::unique_ptr<const Policy> load(const std::filesystem::path& path, int observ
     if (out.dim() != 2 || out.size(0) != 2 || out.size(1) != actions || out.scalar_type() != torch::kFloat) {
       std::ostringstream what;
       what << "makes " << out.scalar_type() << out.sizes() << " of float[2, " << observations << "]";
-      refuse(what.str(), sizes + ", as the task has");
+      io::refuse(path, what.str(), sizes + ", as the task has");
     }
   } catch (const io::InputError&) {
     throw;
   } catch (const std::exception& e) {
-    refuse("does not take " + std::to_string(observations) + " inputs: " + reason(e.what()),
-           sizes + ", as the task has");
+    io::refuse(path, "does not take " + std::to_string(observations) + " inputs: " + reason(e.what()),
+               sizes + ", as the task has");
   }
   return policy;
 }

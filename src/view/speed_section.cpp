@@ -46,17 +46,14 @@ constexpr Colour kMachines[] = {Colour::blue, Colour::vermillion, Colour::green,
 
 Section speed_section(const std::filesystem::path& file) {
   const Figures all = read_figures(file);
-  std::vector<std::string> commits;  // in the order in which the file first has them
-  for (const auto& [figure, machines] : all)
-    for (const auto& [machine, values] : machines)
-      for (const Measured& m : values)
-        if (std::ranges::find(commits, m.commit) == commits.end()) commits.push_back(m.commit);
-  std::map<std::string, std::string> first;  // date of each
+  std::map<std::string, std::string> first;  // date of each commit's first figure
   for (const auto& [figure, machines] : all)
     for (const auto& [machine, values] : machines)
       for (const Measured& m : values)
         if (std::string& date = first[m.commit]; date.empty() || m.date < date) date = m.date;
-  std::ranges::sort(commits, {}, [&](const std::string& c) { return first.at(c); });
+  std::vector<std::string> commits;
+  for (const auto& [commit, date] : first) commits.push_back(commit);
+  std::ranges::stable_sort(commits, {}, [&](const std::string& c) { return first.at(c); });
   Section section("speed", "Figures of flappy-bench over commits", file.string());
   std::string list;
   for (std::size_t i = 0; i < commits.size(); ++i)

@@ -110,7 +110,7 @@ std::string sentence(const deploy::Inferences& f) {
     text += io::format(" (%s differs by up to %.1f %% of its range)", f.output.c_str(), 100 * f.largest);
   for (const auto& i : f.inputs)
     text += io::format("; %s follows it in %.1f %%", i.name.c_str(), 100 * i.share) +
-            (i.share < 0.95 ? io::format(" (set %+.3g off, median)", i.offset) : "");
+            (i.follows() ? "" : io::format(" (set %+.3g off, median)", i.offset));
   return (f.as_exported() ? "the robot flew what was exported: " : "the robot did not fly what was exported: ") + text;
 }
 

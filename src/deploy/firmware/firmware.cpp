@@ -98,7 +98,7 @@ std::string columns_of(const std::string& stream, const std::vector<Logged>& col
   return text + (scales.empty() ? "" : "[" + stream + ".scale]\n" + scales);
 }
 
-/// What the policy got and gave, and what the log calls it.
+/// The columns of the policy's observations and actions, and the log's variables for them.
 std::vector<Logged> policy_of(const flight::Task& task, const auto& observation_at, const auto& action_at) {
   std::vector<Logged> all;
   const auto observation = task.observation(), action = task.action();
@@ -170,7 +170,7 @@ std::string policy_stream(const std::string& channel, const std::vector<Logged>&
 std::string mapping(const rollout::FlyConfig& config) {
   std::string inputs;
   for (const Channel& c : kFlapper) inputs += (inputs.empty() ? "\"" : ", \"") + std::string(c.input) + "\"";
-  std::string others;  // of the second event on
+  std::string others;  // columns that are logged at another event than the first
   const std::vector<Logged> policy = policy_on_card(config.fleet.task);
   for (std::size_t k = kVariablesOfAnEvent; k < policy.size(); ++k)
     others += (others.empty() ? "[policy.from]\n" : "") + policy[k].column + " = \"" + event_of(k) + "\"\n";
@@ -193,7 +193,7 @@ std::string mapping(const rollout::FlyConfig& config) {
          columns_of("imu", kImu) +
          "\n[power]\nchannel = \"fixedFrequency\"\ncurrents = false\nbattery_nominal_V = 7.4\nlatency_s = 0.0\n"
          "voltage_noise_V = 0.04\n[power.columns]\nbattery_V = \"pm.vbat\"\n" +
-         policy_stream(event_of(0), policy_on_card(config.fleet.task)) + others;
+         policy_stream(event_of(0), policy) + others;
 }
 
 std::map<std::string, std::string> crazyflie_files(const rollout::FlyConfig& config) {

@@ -4,20 +4,17 @@
 #include <cmath>
 #include <optional>
 #include <random>
+#include <utility>
 
 #include "io/refuse.hpp"
+#include "io/statistics.hpp"
 
 namespace flappy::deploy {
 namespace {
 
 constexpr double kSame = 0.99, kFollows = 0.95, kOfRange = 0.01;
 constexpr int kDithers = 8;
-constexpr double kRounding = 1e-6;  ///< of an output's range: sums of single precision
-
-double median(std::vector<double> x) {
-  std::ranges::nth_element(x, x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2));
-  return x[x.size() / 2];
-}
+constexpr double kRounding = 1e-6;  ///< of an output's range: single precision rounds the policy's sums
 
 /// Where each number of the contract is in a row of the log.
 std::vector<std::size_t> places(const std::filesystem::path& folder, const Contract& contract, const OnboardLog& log) {
@@ -38,9 +35,11 @@ std::vector<std::size_t> places(const std::filesystem::path& folder, const Contr
 
 }  // namespace
 
+bool Inferences::Input::follows() const { return share >= kFollows; }
+
 bool Inferences::as_exported() const {
   return rows > 0 && static_cast<double>(same) >= kSame * static_cast<double>(rows) &&
-         std::ranges::all_of(inputs, [](const Input& i) { return i.share >= kFollows; });
+         std::ranges::all_of(inputs, &Input::follows);
 }
 
 Inferences check_inferences(const std::filesystem::path& folder, const Contract& contract, const OnboardLog& log,
@@ -92,9 +91,10 @@ Inferences check_inferences(const std::filesystem::path& folder, const Contract&
     }
   }
   for (std::size_t i = 0; i < inputs.size(); ++i)
-    if (!offsets[i].empty())
-      found.inputs.push_back({inputs[i].name, static_cast<double>(follow[i]) / static_cast<double>(offsets[i].size()),
-                              median(offsets[i])});
+    if (!offsets[i].empty()) {
+      const double share = static_cast<double>(follow[i]) / static_cast<double>(offsets[i].size());
+      found.inputs.push_back({inputs[i].name, share, io::median(std::move(offsets[i]))});
+    }
   return found;
 }
 

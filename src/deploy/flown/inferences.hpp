@@ -12,7 +12,7 @@
 
 namespace flappy::deploy {
 
-/// An input of the log: the last value at or before each inference, in the order of OnboardLog::inferences.
+/// An input of the log: the first value at or after each inference, in the order of OnboardLog::inferences.
 struct LoggedInput {
   std::string name;
   std::vector<double> value;
@@ -23,13 +23,16 @@ struct Inferences {
     std::string name;
     double share = 0;   ///< of the inferences after which it is within 1 % of its range of what they asked for
     double offset = 0;  ///< median of what was set less what was asked for
+
+    /// Whether 95 % of the inferences are followed.
+    bool follows() const;
   };
   std::size_t rows = 0, same = 0;  ///< inferences of the log, and those with the exported policy's outputs
   std::string output;              ///< the output that differs most, and by how much of its range; empty: none
   double largest = 0;
   std::vector<Input> inputs;
 
-  /// Whether 99 % of the inferences are the exported policy's, and of each input 95 % follow.
+  /// Whether 99 % of the inferences are the exported policy's, and each input follows.
   bool as_exported() const;
 };
 
