@@ -2,6 +2,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -48,6 +49,7 @@ c10::intrusive_ptr<c10d::TCPStore> store_of(const Rank& rank, bool serves, std::
 class GlooRanks : public Ranks {
  public:
   explicit GlooRanks(const Rank& rank) : rank_(rank), store_(store_of(rank, rank.rank == 0, kMeeting)) {
+    std::signal(SIGPIPE, SIG_IGN);  // Gloo writes to sockets whose rank may be dead: that is an error, not the end
     auto options = c10d::ProcessGroupGloo::Options::create(kExchange);
     options->devices.push_back(is_loopback(rank.address) ? c10d::GlooDeviceFactory::makeDeviceForHostname(rank.address)
                                                          : c10d::ProcessGroupGloo::createDefaultDevice());
