@@ -12,6 +12,7 @@
 #include <span>
 
 #include "io/text.hpp"
+#include "io/toml_writer.hpp"
 #include "rollout/flight_score.hpp"
 #include "rollout/rollout.hpp"
 
@@ -168,6 +169,12 @@ TuneResult tune(const TuneConfig& config, const std::function<bool(const TuneRes
     if (!progress(result)) break;
   }
   return result;
+}
+
+std::string controller_text(flight::Controller c, const std::string& origin) {
+  std::string text = "# " + origin + "\nschema = 1\nkind = \"" + flight::controller_name(c.kind) + "\"\n";
+  for (const flight::ControllerField& f : fields(c)) text += f.path + " = " + io::toml_number(*f.value) + "\n";
+  return text;
 }
 
 }  // namespace flappy::rollout

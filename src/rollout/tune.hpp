@@ -47,4 +47,7 @@ struct TuneResult {
 /// Calls `progress` after each generation with the best so far; false stops. Gains stay within e^+-3 of their start.
 TuneResult tune(const TuneConfig& config, const std::function<bool(const TuneResult&)>& progress);
 
+/// The file of a controller; `origin`: its first line, a comment.
+std::string controller_text(flight::Controller controller, const std::string& origin);
+
 }  // namespace flappy::rollout

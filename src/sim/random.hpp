@@ -25,6 +25,7 @@ enum class Stream : std::uint32_t {
   target_noise = 12,
   snapshot = 13,
   force_sensor = 14,
+  design = 15,
 };
 
 struct RandomKey {

@@ -25,6 +25,7 @@ ROOMS = {
     "flightlog/import": {"io", "flightlog", "flightlog/ros"},
     "flight": BASE | {"policy"},
     "rollout": FLIGHT | {"flightlog", "flightlog/ros"},
+    "design": ROLLOUT,
     "learn/lanes": BASE | {"policy", "learn"},
     "learn": ROLLOUT | {"learn/lanes"},
     "deploy": {"io"},

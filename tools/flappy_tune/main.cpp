@@ -9,19 +9,6 @@
 #include "io/sha256.hpp"
 #include "rollout/tune.hpp"
 
-namespace {
-
-std::string controller_text(flappy::flight::Controller c, const std::string& origin) {
-  std::string text = "# " + origin + "\nschema = 1\nkind = \"" + flappy::flight::controller_name(c.kind) + "\"\n";
-  for (const auto& f : flappy::flight::fields(c)) {
-    const std::string number = flappy::io::shortest_digits(*f.value);
-    text += f.path + " = " + number + (number.find_first_of(".en") == std::string::npos ? ".0\n" : "\n");
-  }
-  return text;
-}
-
-}  // namespace
-
 int main(int argc, char** argv) {
   using namespace flappy;
   io::Program program("flappy-tune", "Tunes the gains of a controller by an evolution strategy (CMA-ES).", {});
@@ -49,7 +36,7 @@ int main(int argc, char** argv) {
       std::fflush(stdout);
       if (program.writes())
         io::write_atomically(
-            out, controller_text(r.best, "Tuned by flappy-tune, generation " + std::to_string(r.generations) + "."));
+            out, rollout::controller_text(r.best, "Tuned by flappy-tune, generation " + std::to_string(r.generations) + "."));
       return !io::any(config.ranks, io::interrupted());
     });
     program.write_json({{"start_cost", before}, {"cost", result.cost}, {"generations", generation}});

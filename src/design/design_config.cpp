@@ -1,0 +1,78 @@
+#include "design/design_config.hpp"
+
+#include <limits>
+
+namespace flappy::design {
+namespace {
+
+Figure read_figure(const io::Table& t) {
+  const std::string name = t.string("figure");
+  if (const auto figure = figure_named(name)) return *figure;
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < kFigures; ++i) names.emplace_back(info_of(static_cast<Figure>(i)).name);
+  t.fail("figure", "no figure has this name", io::joined(names) + io::did_you_mean(name, names));
+}
+
+rollout::FlyConfig read_flights(const io::Table& root, const std::string& key) {
+  rollout::FlyConfig fly = rollout::read_fly_config(root.file(key));
+  if (fly.fleet.controller.kind != flight::kind_of<flight::PidController>())
+    root.fail(key, "its controller is " + flight::controller_name(fly.fleet.controller.kind),
+              "flights by kind = \"pid\"");
+  if (!(fly.fleet.task.constants.success.by_s > 0) || fly.welded || fly.excitation.acts() || fly.actor)
+    root.fail(key, "its task defines no success, or it is held, excited or flown by an actor",
+              "flights of a controller whose task has [success]");
+  return fly;
+}
+
+}  // namespace
+
+DesignConfig read_design_config(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
+  const io::Config file = io::Config::load(path, overrides);
+  const io::Table root = file.root();
+  root.schema(1);
+  root.accept({"schema", "vehicle", "motors", "hover", "escape", "built", "workshop", "vary", "objective", "limit",
+               "flights", "search", "verify"});
+  DesignConfig c;
+  c.judge.space = read_space(root);
+  c.judge.hover = read_flights(root, "hover");
+  c.judge.escape = read_flights(root, "escape");
+
+  for (const io::Table& t : root.tables("objective")) {
+    t.accept({"figure"});
+    c.search.objectives.push_back(read_figure(t));
+  }
+  if (c.search.objectives.size() < 2) root.fail("objective", "there are too few", "two objectives or more");
+  for (const io::Table& t : root.tables("limit")) {
+    t.accept({"figure", "at_least", "at_most"});
+    constexpr double kNone = std::numeric_limits<double>::infinity();
+    Limit limit{read_figure(t), -kNone, kNone};
+    if (t.has("at_least")) limit.at_least = t.number("at_least");
+    if (t.has("at_most")) limit.at_most = t.number("at_most");
+    if (limit.at_least == -kNone && limit.at_most == kNone) t.fail("", "limits nothing", "at_least or at_most");
+    c.judge.limits.push_back(limit);
+  }
+  const io::Table flights = root.table("flights");
+  c.judge.hover_flights = static_cast<std::size_t>(flights.integer("hover", 1, 100000));
+  c.judge.escape_flights = static_cast<std::size_t>(flights.integer("escape", 1, 100000));
+  c.judge.effect_flights = static_cast<std::size_t>(flights.integer("effects", 1, 100000));
+  const io::Table search = root.table("search");
+  c.search.random = search.choice_or("method", "nsga2", {"nsga2", "random"}) == "random";
+  c.search.population = static_cast<unsigned>(search.integer("population", 8, 100000));
+  if (c.search.population % 4 != 0) search.fail("population", "is no multiple of four", "8, 12, 16, ...");
+  c.search.generations = static_cast<unsigned>(search.integer("generations", 1, 100000));
+  c.search.seed = static_cast<std::uint64_t>(search.integer("seed", 0, INT64_MAX));
+  c.search.threads = static_cast<int>(search.integer_or("threads", 0, 0, 1024));
+  const io::Table verify = root.table("verify");
+  c.verify.tune = rollout::read_tune_config(verify.file("tune"));
+  c.verify.tune.generations = static_cast<unsigned>(verify.integer("generations", 0, 100000));
+  if (c.verify.tune.start.kind != c.judge.hover.fleet.controller.kind)
+    verify.fail("tune", "tunes another kind of controller", "the kind of the flights");
+  c.verify.designs = static_cast<std::size_t>(verify.integer("designs", 0, 1000));
+  c.verify.vehicles = static_cast<std::size_t>(verify.integer("vehicles", 1, 1'000'000));
+  c.verify.step_s = verify.number("step_s", {1e-6, 1e-3});
+  root.finish();
+  c.resolved = file.resolved();
+  return c;
+}
+
+}  // namespace flappy::design

@@ -1,0 +1,80 @@
+// The search for designs that no other design beats in every objective: pagmo's NSGA-II (Deb et al., IEEE T-EC 6, 2002)
+// over the unit cube of the variables, or random points of it. Each point is rounded to the workshop's steps and judged
+// once. A search is a function of its configuration: one that was stopped takes the designs that it judged from its
+// record and goes the same way again.
+#pragma once
+
+#include <functional>
+#include <map>
+
+#include "design/judge.hpp"
+#include "io/ranks.hpp"
+
+namespace flappy::design {
+
+struct SearchConfig {
+  bool random = false;  ///< random points, to compare with
+  unsigned population = 0, generations = 0;
+  std::uint64_t seed = 0;
+  std::vector<Figure> objectives;
+  int threads = 0;
+  io::Ranks* ranks = nullptr;  ///< each rank judges its share of a generation
+};
+
+/// What the record keeps of a judged design.
+struct Record {
+  Values values;
+  Figures figures;
+  Stage reached = Stage::built;
+  double flown_s = 0;
+  std::string refused;
+};
+
+Record record_of(const Judged& judged);
+/// Head and lines of a table of records; a line reads back as the same record.
+std::string record_head();
+std::string record_line(const Record& record);
+/// Throws io::InputError, which names file and line, for anything else.
+std::vector<Record> read_records(const std::filesystem::path& file);
+
+struct Generation {
+  unsigned number = 0;
+  std::size_t designs = 0, front = 0;
+  double flown_s = 0;  ///< of all designs so far
+  double hypervolume = 0;
+};
+
+class Search {
+ public:
+  /// `known`: records of a search that was stopped.
+  Search(const Judge& judge, SearchConfig config, const std::vector<Record>& known = {});
+
+  /// Runs all generations. `progress` is called after each; false ends the search. Returns false if it was stopped.
+  bool run(const std::function<bool(const Generation&)>& progress);
+
+  const SearchConfig& config() const { return config_; }
+  const Record& published() const { return published_; }
+  /// All designs, in the order in which they were asked for.
+  std::vector<Record> records() const;
+  /// Those that no other beats: as good in every objective, better in one. Ordered by the first objective.
+  std::vector<Record> front() const;
+  /// Objectives to be minimised, as changes against the published robot in shares of it; negative: better.
+  std::vector<double> objectives(const Record& record) const;
+  /// Volume of objectives that the front dominates and that dominate the published robot.
+  double hypervolume() const;
+
+ private:
+  struct Problem;
+  std::vector<std::vector<double>> judge_all(const std::vector<std::vector<double>>& points);
+  void judge_missing(const std::vector<Values>& missing);
+  bool report(unsigned number, const std::function<bool(const Generation&)>& progress);
+
+  const Judge& judge_;
+  SearchConfig config_;
+  Stage upto_;
+  Record published_;
+  std::map<Values, Record> known_;
+  std::vector<Values> order_;
+};
+
+}  // namespace flappy::design

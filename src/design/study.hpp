@@ -1,0 +1,40 @@
+// What follows a search: designs of the front are chosen, their gains are tuned, they are flown again with shorter
+// steps, and their sensitivities are measured. The results are files:
+//   designs.csv              all designs of the search;  front.csv: those that no other beats
+//   search.csv               hypervolume over flights, by generation
+//   design.json              what flappy-report shows
+//   designs/NN/              vehicle.toml, controller.toml, hover.toml, escape.toml: flights for flappy-fly; 00: published
+#pragma once
+
+#include "design/design_config.hpp"
+
+namespace flappy::design {
+
+/// A chosen design, verified.
+struct Verified {
+  std::string name;                        ///< "00" is the published robot
+  Record record;                           ///< as the search has it
+  Judged tuned;                            ///< with tuned gains, on other vehicles, with the configuration's step
+  Figures fine;                            ///< the same flights with VerifyConfig::step_s
+  double tuned_cost = 0, fitted_cost = 0;  ///< of flappy-tune; NaN without tuning
+  std::vector<std::string> limited_by;     ///< bounds of variables and limits of figures that it is at
+  /// Change of each objective for 1 % more of each variable, in shares of the published robot; NaN for choices.
+  std::vector<std::vector<double>> sensitivity;  ///< [variable][objective]
+};
+
+/// Designs of the front that are far apart: the best in each objective, then always the one that is farthest from those
+/// chosen. Designs that beat the published robot in every objective come first.
+std::vector<Record> choose(const Search& search, std::size_t count);
+
+Verified verify(const Judge& judge, const Search& search, const DesignConfig& config, const Record& record,
+                const std::string& name);
+
+/// Largest improvement of each objective on the front that costs no other objective; NaN: there is none.
+std::vector<double> given_away(const Search& search);
+
+void write_records(const std::filesystem::path& folder, const Search& search, const std::vector<Generation>& history);
+void write_design(const std::filesystem::path& folder, const Judge& judge, const Verified& design);
+void write_results(const std::filesystem::path& folder, const Judge& judge, const Search& search,
+                   const std::vector<Generation>& history, const std::vector<Verified>& designs);
+
+}  // namespace flappy::design
