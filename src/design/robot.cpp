@@ -280,8 +280,9 @@ Robot build(const Space& space, const Values& values) {
   build_side(space, r, -1, r.vehicle.right, more);
   if (more.second_kg_m2.xx != 0 || more.second_kg_m2.yy != 0 || more.second_kg_m2.zz != 0)
     r.vehicle.torso = body_of(mass_of(was.torso).add(more));
-  r.vehicle.extent.around_m = r.vehicle.left.shoulder_m.y + r.wing.length_m;
-  r.vehicle.extent.above_m = std::max(r.vehicle.left.shoulder_m.z, 1e-3);
+  const auto longer = [&](Quantity q) { return value(q) - value_of(space.built, q); };
+  r.vehicle.extent.around_m += longer(Quantity::wing_length) + longer(Quantity::shoulder_y);
+  r.vehicle.extent.above_m = std::max(0.0, r.vehicle.extent.above_m + longer(Quantity::shoulder_z));
   r.refused = refusal(space, r);
   return r;
 }

@@ -13,7 +13,7 @@ namespace flappy::design {
 namespace {
 
 constexpr int kAmplitudes = 16;               // a block of lanes
-constexpr double kLeastAmplitude = 0.25;      // of the largest
+constexpr double kMinAmplitude = 0.25;        // of the largest
 constexpr int kSettling = 12, kMeasured = 8;  // beats
 constexpr double kSmall = 1.0 / 3;            // of the limits: inputs that give the moments per input
 constexpr double kCopper_K = 0.0039;          // temperature coefficient of its resistance, 1/K at 20 to 25 degrees
@@ -164,7 +164,7 @@ Stand measure(const Robot& robot, const Workshop& workshop, double step_s, doubl
   const model::Driver& d = robot.vehicle.driver;
   std::vector<sim::Input> inputs;
   for (int i = 0; i < kAmplitudes; ++i) {
-    const double share = kLeastAmplitude + (1 - kLeastAmplitude) * i / (kAmplitudes - 1);
+    const double share = kMinAmplitude + (1 - kMinAmplitude) * i / (kAmplitudes - 1);
     inputs.push_back({d.amplitude_limit_V * share, 0, 0, 0});
   }
   Stand s;

@@ -160,6 +160,7 @@ Verified verify(const Judge& judge, const Search& search, const DesignConfig& co
              .tuned = judge.judge(record.values, Stage::effects),
              .fine = {},
              .limited_by = limits_of(judge, record.values, record.figures),
+             .policy = {},
              .sensitivity = sensitivity_of(judge, search, record.values)};
   tune_gains(judge, config, v);
   Judged fine = v.tuned;
@@ -249,6 +250,7 @@ void write_results(const std::filesystem::path& folder, const Judge& judge, cons
                                {"fitted_cost", v.fitted_cost},
                                {"tuned_cost", v.tuned_cost},
                                {"rod_m", v.tuned.robot.rod_m},
+                               {"policy", {v.policy.success, v.policy.low, v.policy.high}},
                                {"limited_by", v.limited_by},
                                {"sensitivity", v.sensitivity}});
   io::write_atomically(folder / "design.json", json.dump(1) + "\n");

@@ -6,9 +6,16 @@
 //   designs/NN/              vehicle.toml, controller.toml, hover.toml, escape.toml: flights for flappy-fly; 00: published
 #pragma once
 
+#include <limits>
+
 #include "design/design_config.hpp"
 
 namespace flappy::design {
+
+/// Success of a trained policy on vehicles that it never saw, with its 95 % interval; NaN without one.
+struct Policy {
+  double success = std::numeric_limits<double>::quiet_NaN(), low = success, high = success;
+};
 
 /// A chosen design, verified.
 struct Verified {
@@ -18,6 +25,7 @@ struct Verified {
   Figures fine;                            ///< the same flights with VerifyConfig::step_s
   double tuned_cost = 0, fitted_cost = 0;  ///< of flappy-tune; NaN without tuning
   std::vector<std::string> limited_by;     ///< bounds of variables and limits of figures that it is at
+  Policy policy;
   /// Change of each objective for 1 % more of each variable, in shares of the published robot; NaN for choices.
   std::vector<std::vector<double>> sensitivity;  ///< [variable][objective]
 };

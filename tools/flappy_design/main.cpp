@@ -7,6 +7,7 @@
 #include "io/progress.hpp"
 #include "io/sha256.hpp"
 #include "io/text.hpp"
+#include "training.hpp"
 
 namespace {
 
@@ -40,7 +41,8 @@ void show(const design::Search& search, const std::vector<double>& most) {
 }
 
 void verify(const design::Judge& judge, const design::Search& search, const design::DesignConfig& config,
-            const std::vector<design::Generation>& history, const std::filesystem::path& folder) {
+            const std::vector<design::Generation>& history, const std::filesystem::path& folder,
+            const std::string& train_config) {
   std::vector<design::Record> chosen = design::choose(search, config.verify.designs);
   chosen.insert(chosen.begin(), search.published());
   std::vector<design::Verified> verified;
@@ -48,7 +50,9 @@ void verify(const design::Judge& judge, const design::Search& search, const desi
   for (std::size_t i = 0; i < chosen.size() && !io::interrupted(); ++i) {
     verified.push_back(design::verify(judge, search, config, chosen[i], io::format("%02zu", i)));
     if (io::interrupted()) return;  // its gains may be half tuned
-    design::write_design(folder / "designs" / verified.back().name, judge, verified.back());
+    const std::filesystem::path own = folder / "designs" / verified.back().name;
+    design::write_design(own, judge, verified.back());
+    if (!train_config.empty()) verified.back().policy = trained(own, train_config);
     design::write_results(folder, judge, search, history, verified);
     line.show(static_cast<double>(i + 1) / static_cast<double>(chosen.size()));
   }
@@ -58,11 +62,12 @@ void verify(const design::Judge& judge, const design::Search& search, const desi
 
 int main(int argc, char** argv) {
   io::Program program("flappy-design", "Searches for the best robots that a workshop can build, by flying them.", {});
-  std::string config_name, out;
+  std::string config_name, out, train_config;
   std::vector<std::string> overrides;
   program.app().option("config", config_name, "what may change and what is wanted: configs/design/*.toml").required();
   program.app().option("--out", out, "folder for the results; one that was stopped goes on").required();
   program.app().option("--set", overrides, "override a key: search.generations=10").one_at_a_time();
+  program.app().option("--train", train_config, "train a policy for each chosen design: configs/train/escape.toml");
   program.takes_ranks();
   return program.run(argc, argv, [&] {
     design::DesignConfig config = design::read_design_config(config_name, overrides);
@@ -96,7 +101,7 @@ int main(int argc, char** argv) {
     const std::vector<double> most = design::given_away(search);
     show(search, most);
     design::write_results(folder, judge, search, history, {});
-    verify(judge, search, config, history, folder);
+    verify(judge, search, config, history, folder, train_config);
     program.write_json({{"designs", history.back().designs},
                         {"front", history.back().front},
                         {"hypervolume", history.back().hypervolume},

@@ -1,0 +1,133 @@
+// Judging and searching.
+#include "design/search.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fixture.hpp"
+#include "io/temporary_folder.hpp"
+#include "refusal.hpp"
+
+namespace flappy::design {
+namespace {
+
+struct Small {
+  DesignConfig config;
+  Judge judge;
+  Search search;
+  std::vector<Generation> history;
+  bool done;
+
+  explicit Small(const std::vector<std::string>& overrides = {}, const std::vector<Record>& known = {},
+                 unsigned until = 1000)
+      : config(small_config(overrides)), judge(config.judge), search(judge, config.search, known) {
+    done = search.run([&](const Generation& g) { return history.push_back(g), g.number < until; });
+  }
+};
+
+std::string lines(const std::vector<Record>& records) {
+  std::string text;
+  for (const Record& r : records) text += record_line(r) + "\n";
+  return text;
+}
+
+const Small& searched() {
+  static const Small made;
+  return made;
+}
+
+TEST(Judge, GainsOfThePublishedRobotAreThoseOfItsFile) {
+  const Judge& judge = searched().judge;
+  const Judged j = judge.judge(judge.config().space.built, Stage::stand);
+  flight::Controller was = judge.config().hover.fleet.controller, now = j.controller;
+  const auto a = fields(was), b = fields(now);
+  for (std::size_t i = 0; i < a.size(); ++i)
+    if (!a[i].path.ends_with("_V")) EXPECT_NEAR(*b[i].value, *a[i].value, 1e-9 * std::abs(*a[i].value)) << a[i].path;
+}
+
+TEST(Judge, GainsGrowWithTheInertia) {
+  const Judge& judge = searched().judge;
+  const Space& space = judge.config().space;
+  Robot robot = build(space, space.built);
+  double flown_s = 0;
+  const Stand stand = measure(robot, space.workshop, 250e-6, 9.81, flown_s);
+  auto before = judge.fitted(robot, stand).constants.of<flight::PidController>();
+  const double was = whole_body(robot.vehicle).inertia_kg_m2.xx;
+  robot.vehicle.torso.inertia_kg_m2.xx += was;
+  auto after = judge.fitted(robot, stand).constants.of<flight::PidController>();
+  EXPECT_NEAR(after.roll.p / before.roll.p, 2, 1e-6);
+  EXPECT_NEAR(after.roll.d / before.roll.d, 2, 1e-6);
+  EXPECT_NEAR(after.yaw.p / before.yaw.p, 1, 1e-6);
+}
+
+TEST(Search, FrontIsWhatNoOtherDesignBeats) {
+  const Search& s = searched().search;
+  ASSERT_TRUE(searched().done);
+  const std::vector<Record> front = s.front(), all = s.records();
+  ASSERT_FALSE(front.empty());
+  const auto beats = [&](const Record& a, const Record& b) {
+    const auto x = s.objectives(a), y = s.objectives(b);
+    return x != y && std::ranges::equal(x, y, std::ranges::less_equal());
+  };
+  for (const Record& f : front) {
+    EXPECT_EQ(f.refused, "");
+    for (const Record& r : all) EXPECT_FALSE(beats(r, f));
+  }
+  for (const Record& r : all) {
+    if (!r.refused.empty()) continue;
+    EXPECT_TRUE(
+        std::ranges::any_of(front, [&](const Record& f) { return beats(f, r) || s.objectives(f) == s.objectives(r); }));
+  }
+}
+
+TEST(Search, ObjectivesAreChangesAgainstThePublishedRobot) {
+  const Search& s = searched().search;
+  for (const double x : s.objectives(s.published())) EXPECT_EQ(x, 0);
+  Record r = s.published();
+  const std::vector<Figure>& which = s.config().objectives;
+  for (const Figure f : which) r.figures[static_cast<std::size_t>(f)] *= 1.1;
+  const std::vector<double> changed = s.objectives(r);
+  for (std::size_t k = 0; k < which.size(); ++k)
+    EXPECT_EQ(changed[k] < 0, info_of(which[k]).more_is_better) << info_of(which[k]).name;
+  r.refused = "cannot be";
+  for (const double x : s.objectives(r)) EXPECT_GT(x, 5);
+}
+
+TEST(Search, GivesTheSameForAnyNumberOfThreadsAndAfterAStop) {
+  const Small one({"search.threads=1"});
+  EXPECT_EQ(lines(one.search.records()), lines(searched().search.records()));
+  const Small stopped({}, {}, 2);
+  EXPECT_FALSE(stopped.done);
+  const Small resumed({}, stopped.search.records());
+  EXPECT_EQ(lines(resumed.search.records()), lines(searched().search.records()));
+  EXPECT_EQ(resumed.history.back().hypervolume, searched().history.back().hypervolume);
+}
+
+TEST(Search, RandomPointsAreOthers) {
+  const Small random({"search.method=random", "search.generations=1"});
+  EXPECT_TRUE(random.done);
+  EXPECT_EQ(random.search.records().size(), 8U);
+}
+
+TEST(Records, ReadBackAsTheyWere) {
+  const io::TemporaryFolder folder;
+  const auto file = folder.path() / "designs.csv";
+  const std::vector<Record> all = searched().search.records();
+  io::write_atomically(file, record_head() + "\n" + lines(all));
+  EXPECT_EQ(lines(read_records(file)), lines(all));
+  io::write_atomically(file, record_head() + "\nrubbish\n");
+  const std::string line = test::refusal([&] { read_records(file); });
+  EXPECT_NE(line.find("line 2 is no record"), std::string::npos) << line;
+}
+
+TEST(Choose, TakesTheBestOfEachObjectiveOnce) {
+  const Search& s = searched().search;
+  const std::vector<Record> front = s.front(), chosen = choose(s, 3);
+  EXPECT_EQ(chosen.size(), std::min<std::size_t>(3, front.size()));
+  for (std::size_t i = 0; i < chosen.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k) EXPECT_NE(chosen[i].values, chosen[k].values);
+}
+
+}  // namespace
+}  // namespace flappy::design

@@ -1,0 +1,86 @@
+// The stand against what can be said without it.
+#include "design/stand.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "fixture.hpp"
+#include "flappy/batch.hpp"
+
+namespace flappy::design {
+namespace {
+
+constexpr double kStep_s = 250e-6, kGravity_m_s2 = 9.81;
+
+struct Measured {
+  DesignConfig config = small_config();
+  Robot robot = build(config.judge.space, config.judge.space.built);
+  double flown_s = 0;
+  Stand stand = measure(robot, config.judge.space.workshop, kStep_s, kGravity_m_s2, flown_s);
+};
+const Measured& published() {
+  static const Measured made;
+  return made;
+}
+
+TEST(Stand, LiftAtTheAmplitudeOfHoverIsTheWeight) {
+  const Stand& s = published().stand;
+  ASSERT_TRUE(s.hovers);
+  const double weight = whole_body(published().robot.vehicle).mass_kg * kGravity_m_s2;
+  EXPECT_NEAR(s.hover.lift_N / weight, 1, 0.01);  // linear between amplitudes 1 V apart
+}
+
+/// In double precision, with short steps, over other beats and by the mean force itself.
+TEST(Stand, LiftIsTheMeanForceOfASimulatorWithShortSteps) {
+  const Stand& s = published().stand;
+  sim::BatchOptions options;
+  options.step_s = 25e-6;
+  options.threads = 1;
+  sim::Batch<double> batch(1, published().robot.vehicle, options);
+  batch.reset(0, {}, sim::Start::welded);
+  batch.set_input(0, {s.hover.amplitude_V, 0, 0, 0});
+  const auto steps = [](double t_s) { return static_cast<int>(std::lround(t_s / 25e-6)); };
+  batch.step(steps(20 / 34.0));
+  const sim::HeldImpulse before = batch.held_impulse(0);
+  batch.step(steps(17 / 34.0));
+  const double lift = (batch.held_impulse(0).force_N_s[2] - before.force_N_s[2]) / (17 / 34.0);
+  EXPECT_NEAR(s.hover.lift_N / lift, 1, 0.01);
+}
+
+TEST(Stand, InputsMoveTheirOwnAxesAndSymmetricRobotsDoNotCouple) {
+  const Stand& s = published().stand;
+  for (std::size_t a = 0; a < kAxes; ++a) {
+    EXPECT_GT(s.authority_Nm[a], 0);
+    for (std::size_t of = 0; of < kAxes; ++of)
+      if (a != of) EXPECT_LT(std::abs(s.moment_per_input[a][of]), 0.1 * std::abs(s.moment_per_input[a][a]));
+  }
+}
+
+/// A motor that cannot turn draws V/R: its losses are A^2/(2 R), all of the power, and its current is at most A/R.
+TEST(Stand, ABlockedMotorDrawsTheVoltageOverItsResistance) {
+  Measured m;
+  for (model::Side* side : {&m.robot.vehicle.left, &m.robot.vehicle.right}) side->stroke.friction_Nm = 10;
+  const Stand s = measure(m.robot, m.config.judge.space.workshop, kStep_s, kGravity_m_s2, m.flown_s);
+  EXPECT_FALSE(s.hovers);
+  const MotorType& motor = *m.robot.motor;
+  const StandPoint& p = s.sweep.front();  // at the larger amplitudes the winding would burn
+  const double V = p.amplitude_V, R = motor.resistance_ohm, rms_A = V / R / std::sqrt(2);
+  EXPECT_NEAR(p.power_W / (2 * V * V / (2 * R)), 1, 0.01);
+  EXPECT_NEAR(p.current_A / (V / R), 1, 0.01);
+  EXPECT_NEAR(p.winding_C, winding_C(rms_A, motor, m.config.judge.space.workshop.ambient_C), 0.5);
+  EXPECT_LT(p.stroke_rad, 1e-3);
+}
+
+TEST(Winding, IsAtTheTemperatureAtWhichItLosesWhatItConducts) {
+  MotorType m;
+  m.resistance_ohm = 10, m.thermal_K_W = 100;
+  EXPECT_DOUBLE_EQ(winding_C(0, m, 20), 20);
+  const double T = winding_C(0.2, m, 20);
+  EXPECT_NEAR((T - 20) / m.thermal_K_W, 0.2 * 0.2 * 10 * (1 + 0.0039 * (T - 25)), 1e-12);
+  EXPECT_TRUE(std::isinf(winding_C(2, m, 20)));
+}
+
+}  // namespace
+}  // namespace flappy::design
