@@ -8,6 +8,7 @@
 
 #include "fixture.hpp"
 #include "flappy/batch.hpp"
+#include "model/wing_beat.hpp"
 
 namespace flappy::design {
 namespace {
@@ -49,6 +50,36 @@ TEST(Stand, LiftIsTheMeanForceOfASimulatorWithShortSteps) {
   EXPECT_NEAR(s.hover.lift_N / lift, 1, 0.01);
 }
 
+/// The losses of both motors by short steps, whose currents are those of their ends.
+TEST(Stand, WindingIsHeatedByTheMeanSquareOfTheCurrent) {
+  const Stand& s = published().stand;
+  const model::Vehicle& v = published().robot.vehicle;
+  const model::Motor& m = v.left.motor;
+  sim::BatchOptions options;
+  options.step_s = 25e-6;
+  options.threads = 1;
+  sim::Batch<double> batch(1, v, options);
+  batch.reset(0, {}, sim::Start::welded);
+  batch.set_input(0, {s.hover.amplitude_V, 0, 0, 0});
+  double square_A2 = 0;
+  long steps = 0;
+  for (long k = 0; k < 1000 * 40; ++k) {
+    const long hold = k / 40;  // of 1 ms
+    batch.step(1);
+    if (hold < 500) continue;
+    double beat = static_cast<double>(hold) * v.driver.hold_s * v.driver.flapping_Hz;
+    beat -= std::round(beat);
+    const double volts = model::wing_beat_voltage<1>(model::WingBeat<double>{s.hover.amplitude_V, 0, 0, 0}, beat, 18.0);
+    const double current =
+        (volts - m.torque_constant_Nm_A * m.gear_ratio * batch.state(0).stroke_rate_rad_s[0]) / m.resistance_ohm;
+    square_A2 += current * current;
+    ++steps;
+  }
+  const double expected = winding_C(std::sqrt(square_A2 / static_cast<double>(steps)), *published().robot.motor,
+                                    published().config.judge.space.workshop.ambient_C);
+  EXPECT_NEAR((s.hover.winding_C - 25) / (expected - 25), 1, 0.01);
+}
+
 TEST(Stand, InputsMoveTheirOwnAxesAndSymmetricRobotsDoNotCouple) {
   const Stand& s = published().stand;
   for (std::size_t a = 0; a < kAxes; ++a) {
@@ -56,6 +87,18 @@ TEST(Stand, InputsMoveTheirOwnAxesAndSymmetricRobotsDoNotCouple) {
     for (std::size_t of = 0; of < kAxes; ++of)
       if (a != of) EXPECT_LT(std::abs(s.moment_per_input[a][of]), 0.1 * std::abs(s.moment_per_input[a][a]));
   }
+}
+
+/// Held, the air pushes as before; a centre of mass that lies d ahead gets the lift's moment -d F_z about y less.
+TEST(Stand, MomentsAreAboutTheCentreOfMass) {
+  Measured m;
+  m.robot.vehicle.torso.com_m.x += 1e-3;
+  const Stand s = measure(m.robot, m.config.judge.space.workshop, kStep_s, kGravity_m_s2, m.flown_s);
+  const double ahead = whole_body(m.robot.vehicle).com_m.x - whole_body(published().robot.vehicle).com_m.x;
+  EXPECT_GT(ahead, 0.5e-3);
+  const StandPoint &was = published().stand.sweep[8], &now = s.sweep[8];
+  EXPECT_NEAR(now.moment_Nm[1] - was.moment_Nm[1], ahead * was.lift_N, 1e-3 * ahead * was.lift_N);
+  EXPECT_NEAR(now.moment_Nm[0], was.moment_Nm[0], 1e-9);
 }
 
 /// A motor that cannot turn draws V/R: its losses are A^2/(2 R), all of the power, and its current is at most A/R.
