@@ -15,6 +15,8 @@ using namespace flappy;
 
 /// Records of an earlier run of the same configuration in `folder`; none where the folder is new.
 std::vector<design::Record> known_records(const std::filesystem::path& folder, const design::DesignConfig& config) {
+  if (std::filesystem::exists(folder) && !std::filesystem::is_directory(folder))
+    throw io::InputError(folder.string() + ": is no folder; accepted: a new folder, or one to go on in");
   const std::filesystem::path file = folder / "config.toml", records = folder / "designs.csv";
   if (!std::filesystem::exists(file)) {
     if (std::filesystem::exists(folder) && !std::filesystem::is_empty(folder))
@@ -72,6 +74,7 @@ int main(int argc, char** argv) {
   return program.run(argc, argv, [&] {
     design::DesignConfig config = design::read_design_config(config_name, overrides);
     const std::filesystem::path folder = out;
+    if (!train_config.empty()) io::read_text(train_config);  // it is needed late
     const std::vector<design::Record> known = known_records(folder, config);
     config.search.ranks = program.ranks("design: " + io::sha256(config.resolved) + "\n");
     io::stop_on_interrupt();
