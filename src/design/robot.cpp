@@ -82,13 +82,19 @@ void build_side(const Space& space, const Robot& robot, int side, model::Side& s
   const model::Side& was = side > 0 ? space.published.left : space.published.right;
   const WingShape was_shape = shape_of(was.planform);
   const auto value = [&](Quantity q) { return value_of(robot.values, q); };
+  Mass edge = mass_of(was.leading_edge);
   if (!is_same(robot.wing, was_shape)) {
     s.planform = planform_of(robot.wing, was.planform.rotational_damping_coefficient);
     s.wing =
         body_of(mass_of(was.wing).add(panel_of(robot.wing, w.panel, side)).add(panel_of(was_shape, w.panel, side), -1));
-    s.leading_edge = body_of(mass_of(was.leading_edge)
-                                 .add(rod_of(robot.wing.length_m, robot.rod_m, w.rod_kg_m3, side))
-                                 .add(rod_of(was_shape.length_m, w.built_rod_m, w.rod_kg_m3, side), -1));
+    edge.add(rod_of(robot.wing.length_m, robot.rod_m, w.rod_kg_m3, side))
+        .add(rod_of(was_shape.length_m, w.built_rod_m, w.rod_kg_m3, side), -1);
+    s.leading_edge = body_of(edge);
+  }
+  if (value(Quantity::gear_ratio) != was.motor.gear_ratio) {
+    const double built_m = w.pinion_m * was.motor.gear_ratio, wheel_m = w.pinion_m * value(Quantity::gear_ratio);
+    edge.add(wheel_of(wheel_m, built_m, w.built_wheel_kg_m2)).add(wheel_of(built_m, built_m, w.built_wheel_kg_m2), -1);
+    s.leading_edge = body_of(edge);
   }
   s.shoulder_m = {value(Quantity::shoulder_x), side * value(Quantity::shoulder_y), value(Quantity::shoulder_z)};
   s.spring.stiffness_positive_Nm_rad = s.spring.stiffness_negative_Nm_rad = value(Quantity::spring);
@@ -118,6 +124,9 @@ std::string refusal(const Space& space, const Robot& r) {
   if (const double apart = 2 * value_of(r.values, Quantity::shoulder_y); !(apart >= w.wing_clearance_m))
     return "the wings are " + millimetres(apart) + " apart at the ends of their strokes, less than " +
            millimetres(w.wing_clearance_m);
+  if (const double wheel_m = w.pinion_m * value_of(r.values, Quantity::gear_ratio);
+      !(wheel_m < value_of(r.values, Quantity::shoulder_y)))
+    return "the wheels of the gears, " + millimetres(wheel_m) + " in radius, do not fit beside each other";
   if (const auto fault = model::physical_fault(r.vehicle)) return fault->path + " " + fault->what;
   model::Vehicle copy = r.vehicle;
   for (const model::Parameter& p : model::parameters(copy))
@@ -137,9 +146,11 @@ MotorType read_motor(const io::Table& t) {
   m.rotor_inertia_kg_m2 = t.number("rotor_inertia_kg_m2", io::positive(1e-3));
   m.friction_Nm = t.number("friction_Nm", io::non_negative(1));
   m.damping_Nm_s = t.number("damping_Nm_s", io::non_negative(1));
-  m.voltage_limit_V = t.number("voltage_limit_V", io::positive(100));
   m.current_limit_A = t.number("current_limit_A", io::positive(100));
-  m.thermal_K_W = t.number("thermal_K_W", io::positive(1e4));
+  m.winding_K_W = t.number("winding_K_W", io::positive(1e4));
+  m.housing_K_W = t.number("housing_K_W", io::positive(1e4));
+  m.winding_s = t.number("winding_s", io::positive(1e5));
+  m.housing_s = t.number("housing_s", io::positive(1e5));
   m.winding_limit_C = t.number("winding_limit_C", io::positive(300));
   return m;
 }
@@ -168,15 +179,18 @@ Workshop read_workshop(const io::Table& root) {
   w.panel.hub_m = built.number("hub_m", io::non_negative(0.1));
   w.panel.sleeve_m = built.number("sleeve_m", io::non_negative(0.1));
   w.built_rod_m = built.number("rod_m", io::positive(0.1));
+  w.built_wheel_kg_m2 = built.number("wheel_kg_m2", io::non_negative(1e-3));
   const io::Table shop = root.table("workshop");
   w.rods_m = shop.numbers("rods_m", io::positive(0.1));
   std::ranges::sort(w.rods_m);
   w.rod_kg_m3 = shop.number("rod_kg_m3", io::positive(1e5));
   w.least_chord_m = shop.number("least_chord_m", io::positive(0.1));
   w.wing_clearance_m = shop.number("wing_clearance_m", io::non_negative(0.1));
+  w.pinion_m = shop.number("pinion_m", io::positive(0.1));
   w.battery_J_kg = shop.number("battery_J_kg", io::positive(1e7));
   w.cell_V = shop.number("cell_V", io::positive(10));
   w.ambient_C = shop.number("ambient_C", {-50, 100});
+  w.flight_s = shop.number("flight_s", io::positive(1e6));
   return w;
 }
 
@@ -271,9 +285,7 @@ Robot build(const Space& space, const Values& values) {
   r.rod_m = rod_for(w, r.wing.length_m, was.left.planform.wing_length_m);
   model::Driver& driver = r.vehicle.driver;
   driver.flapping_Hz = value(Quantity::frequency);
-  double supply_V = was.driver.amplitude_limit_V;
-  if (value(Quantity::cells) > 0) supply_V = w.cell_V * value(Quantity::cells);
-  driver.amplitude_limit_V = std::min(supply_V, r.motor->voltage_limit_V);
+  if (value(Quantity::cells) > 0) driver.amplitude_limit_V = w.cell_V * value(Quantity::cells);
   r.battery_J = w.battery_J_kg * value(Quantity::battery);
   Mass more = point_mass(value(Quantity::battery), w.battery_m);  // than the built torso
   build_side(space, r, +1, r.vehicle.left, more);

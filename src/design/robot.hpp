@@ -18,8 +18,9 @@ struct MotorType {
   std::string name, source;
   double mass_kg = 0;
   double resistance_ohm = 0, torque_constant_Nm_A = 0, rotor_inertia_kg_m2 = 0, friction_Nm = 0, damping_Nm_s = 0;
-  double voltage_limit_V = 0, current_limit_A = 0;
-  double thermal_K_W = 0;  ///< from winding to ambient
+  double current_limit_A = 0;
+  double winding_K_W = 0, housing_K_W = 0;  ///< thermal resistance from winding to housing, from housing to ambient
+  double winding_s = 0, housing_s = 0;      ///< time constants of the two
   double winding_limit_C = 0;
 };
 
@@ -31,11 +32,13 @@ struct Workshop {
   Panel panel;                       ///< its areal density is that of the built wing
   std::vector<double> rods_m;        ///< diameters in stock
   double built_rod_m = 0, rod_kg_m3 = 0;
-  double least_chord_m = 0;     ///< a narrower panel cannot be glued
-  double wing_clearance_m = 0;  ///< least distance between the two leading edges at the ends of the strokes
-  double battery_J_kg = 0;      ///< usable energy per mass
-  double cell_V = 0;            ///< of one cell; batteries are whole numbers of cells
-  double ambient_C = 0;
+  double least_chord_m = 0;      ///< a narrower panel cannot be glued
+  double wing_clearance_m = 0;   ///< least distance between the two leading edges at the ends of the strokes
+  double pinion_m = 0;           ///< pitch radius of the motor's pinion; that of the wheel is so much times the ratio
+  double built_wheel_kg_m2 = 0;  ///< inertia of the built wheel about the stroke's axis
+  double battery_J_kg = 0;       ///< usable energy per mass
+  double cell_V = 0;             ///< of one cell; batteries are whole numbers of cells
+  double ambient_C = 0, flight_s = 0;  ///< a flight so long heats the windings
 };
 
 /// What can be varied, by its name in a configuration.

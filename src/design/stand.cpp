@@ -17,7 +17,7 @@ constexpr double kMinAmplitude = 0.25;        // of the largest
 constexpr int kSettling = 12, kMeasured = 8;  // beats
 constexpr double kSmall = 1.0 / 3;            // of the limits: inputs that give the moments per input
 constexpr double kCopper_K = 0.0039;          // temperature coefficient of its resistance, 1/K at 20 to 25 degrees
-constexpr double kAmbient_C = 25;             // at which catalogues state resistances
+constexpr double kCatalogue_C = 25;           // at which catalogues state resistances
 
 /// Sums of one lane over its beats.
 struct Sums {
@@ -117,7 +117,7 @@ class Held {
                    moment[2] - (com_m_.x * force[1] - com_m_.y * force[0])};
     p.power_W = power_W;
     const double mean_A2 = std::max(s.square_A2[0], s.square_A2[1]) / static_cast<double>(s.samples);
-    p.winding_C = winding_C(std::sqrt(mean_A2), *robot_.motor, workshop_.ambient_C);
+    p.winding_C = winding_C(std::sqrt(mean_A2), *robot_.motor, workshop_.ambient_C, workshop_.flight_s);
     p.current_A = s.largest_A;
     p.stroke_rad = s.stroke_rad;
     p.gear_Nm = s.gear_Nm;
@@ -152,11 +152,12 @@ double at(const std::vector<StandPoint>& sweep, double StandPoint::*quantity, do
 
 }  // namespace
 
-double winding_C(double current_rms_A, const MotorType& m, double ambient_C) {
-  const double loss_W = current_rms_A * current_rms_A * m.resistance_ohm;  // at kAmbient_C
-  const double kept = 1 - kCopper_K * m.thermal_K_W * loss_W;
-  if (!(kept > 0)) return std::numeric_limits<double>::infinity();  // the losses grow faster than the cooling
-  return (ambient_C + m.thermal_K_W * loss_W * (1 - kCopper_K * kAmbient_C)) / kept;
+double winding_C(double current_rms_A, const MotorType& m, double ambient_C, double seconds) {
+  const double heated_K_W =
+      m.winding_K_W * (1 - std::exp(-seconds / m.winding_s)) + m.housing_K_W * (1 - std::exp(-seconds / m.housing_s));
+  const double heated_K = current_rms_A * current_rms_A * m.resistance_ohm * heated_K_W;  // without the copper's growth
+  if (!(kCopper_K * heated_K < 1)) return std::numeric_limits<double>::infinity();
+  return (ambient_C + heated_K * (1 - kCopper_K * kCatalogue_C)) / (1 - kCopper_K * heated_K);
 }
 
 Stand measure(const Robot& robot, const Workshop& workshop, double step_s, double gravity_m_s2, double& flown_s) {

@@ -15,7 +15,7 @@ struct StandPoint {
   double lift_N = 0;                  ///< along z of B
   std::array<double, 3> moment_Nm{};  ///< about the centre of mass, in B
   double power_W = 0;                 ///< electrical, of both motors
-  double winding_C = 0;               ///< of the hotter motor, in the long run
+  double winding_C = 0;               ///< of the hotter motor, after Workshop::flight_s
   double current_A = 0;               ///< largest, of either motor
   double stroke_rad = 0;              ///< largest angle from the middle, of either wing
   double gear_Nm = 0;                 ///< largest torque of the gear on a wing
@@ -39,7 +39,9 @@ struct Stand {
 /// `limits`: what the robot's motors stand. Flies on this thread; adds the flapper-seconds flown to `flown_s`.
 Stand measure(const Robot& robot, const Workshop& workshop, double step_s, double gravity_m_s2, double& flown_s);
 
-/// Temperature of a winding in the long run: the losses i^2 R grow with it, by 0.0039 per K for copper.
-double winding_C(double current_rms_A, const MotorType& motor, double ambient_C);
+/// Temperature of a winding after `seconds` of a current: two bodies, winding and housing,
+///   T = T0 + I^2 R (1 + a (T - 25)) (Rw (1 - exp(-t/tw)) + Rh (1 - exp(-t/th)))        a = 0.0039 for copper, R at 25
+/// degrees. The losses are those of the end, which are the largest. Infinite where they grow faster than the cooling.
+double winding_C(double current_rms_A, const MotorType& motor, double ambient_C, double seconds);
 
 }  // namespace flappy::design

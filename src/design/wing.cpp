@@ -81,6 +81,12 @@ Mass rod_of(double length_m, double diameter_m, double density_kg_m3, int side) 
   return {m, {0, side * m * length_m / 2, 0}, {across, m * length_m * length_m / 3, across, 0, 0, 0}};
 }
 
+Mass wheel_of(double radius_m, double known_radius_m, double known_inertia_kg_m2) {
+  const double m = known_inertia_kg_m2 / (known_radius_m * known_radius_m) * radius_m / known_radius_m;
+  const double half = m * radius_m * radius_m / 2;
+  return {m, {0, 0, 0}, {half, half, 0, 0, 0, 0}};
+}
+
 double stiff_diameter_m(double length_m, double known_length_m, double known_diameter_m) {
   return known_diameter_m * std::sqrt(length_m / known_length_m);
 }

@@ -38,6 +38,10 @@ Mass panel_of(const WingShape& shape, const Panel& panel, int side);
 /// Mass of the rod in the frame of the leading edge.
 Mass rod_of(double length_m, double diameter_m, double density_kg_m3, int side);
 
+/// Mass of a gear's wheel about the stroke's axis: a rim at the pitch radius, as heavy per length as one of the known
+/// radius and inertia, so that its inertia grows with the cube of the radius.
+Mass wheel_of(double radius_m, double known_radius_m, double known_inertia_kg_m2);
+
 /// Diameter of a rod that bends no more, in shares of its length, than one of diameter d0 and length R0 under the same
 /// load F: a cantilever's tip moves by F R^3/(8 E I), I = pi d^4/64, so that d = d0 sqrt(R/R0).
 double stiff_diameter_m(double length_m, double known_length_m, double known_diameter_m);

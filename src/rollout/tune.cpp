@@ -122,9 +122,8 @@ TuneConfig read_tune_config(const std::filesystem::path& path, const std::vector
     c.trials.push_back({read_fly_config(t.file("fly")), static_cast<std::size_t>(t.integer("count", 1, 100000)),
                         t.number("weight", io::positive(1e6))});
     const FlyConfig& fly = c.trials.back().fly;
-    if (fly.welded || fly.actor || fly.excitation.acts() || fly.fleet.task.start.settled)
-      t.fail("fly", "is held on a stand, excited, flown by an actor or starts from hover",
-             "flights of a controller alone from where the task starts");
+    if (fly.welded || fly.actor || fly.excitation.acts())
+      t.fail("fly", "is held on a stand, excited or flown by an actor", "flights of a controller alone");
   }
   if (c.trials.empty()) root.fail("trial", "is missing", "at least one [[trial]]");
   if (c.vary.empty()) root.fail("vary", "is empty", "paths of the controller's file");

@@ -66,6 +66,17 @@ TEST(Robot, ALongerWingGetsAStifferRod) {
   EXPECT_NEAR(r.vehicle.left.wing.com_m.y, -r.vehicle.right.wing.com_m.y, 1e-9);
 }
 
+TEST(Robot, AGearMovesTheInertiaOfItsWheel) {
+  const double J = space().workshop.built_wheel_kg_m2;
+  const Robot r = with({{Quantity::gear_ratio, 11}});
+  EXPECT_EQ(r.refused, "");
+  const auto stroke = [](const model::Vehicle& v) {
+    const model::Sym3<double> P = mass_of(v.left.leading_edge).second_kg_m2;
+    return P.xx + P.yy;
+  };
+  EXPECT_NEAR(stroke(r.vehicle) - stroke(test::nominal()), J * (1.1 * 1.1 * 1.1 - 1), 1e-15);
+}
+
 TEST(Robot, WhatCannotBeIsRefusedWithAReason) {
   const auto refused = [](const std::vector<std::pair<Quantity, double>>& changes, const std::string& why) {
     EXPECT_NE(with(changes).refused.find(why), std::string::npos) << with(changes).refused;
@@ -74,7 +85,8 @@ TEST(Robot, WhatCannotBeIsRefusedWithAReason) {
   refused({{Quantity::wing_length, 0.19}}, "no rod in stock");
   refused({{Quantity::cells, 2}}, "battery without mass");
   refused({{Quantity::battery, 1e-3}}, "battery without cells");
-  refused({{Quantity::shoulder_y, 0.004}}, "apart");
+  refused({{Quantity::shoulder_y, 0.009}}, "apart");
+  refused({{Quantity::gear_ratio, 12}}, "do not fit beside each other");
 }
 
 TEST(Space, RoundsToTheStepsOfTheWorkshop) {

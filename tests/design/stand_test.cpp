@@ -75,8 +75,9 @@ TEST(Stand, WindingIsHeatedByTheMeanSquareOfTheCurrent) {
     square_A2 += current * current;
     ++steps;
   }
-  const double expected = winding_C(std::sqrt(square_A2 / static_cast<double>(steps)), *published().robot.motor,
-                                    published().config.judge.space.workshop.ambient_C);
+  const double expected =
+      winding_C(std::sqrt(square_A2 / static_cast<double>(steps)), *published().robot.motor,
+                published().config.judge.space.workshop.ambient_C, published().config.judge.space.workshop.flight_s);
   EXPECT_NEAR((s.hover.winding_C - 25) / (expected - 25), 1, 0.01);
 }
 
@@ -112,17 +113,41 @@ TEST(Stand, ABlockedMotorDrawsTheVoltageOverItsResistance) {
   const double V = p.amplitude_V, R = motor.resistance_ohm, rms_A = V / R / std::sqrt(2);
   EXPECT_NEAR(p.power_W / (2 * V * V / (2 * R)), 1, 0.01);
   EXPECT_NEAR(p.current_A / (V / R), 1, 0.01);
-  EXPECT_NEAR(p.winding_C, winding_C(rms_A, motor, m.config.judge.space.workshop.ambient_C), 0.5);
+  EXPECT_NEAR(p.winding_C,
+              winding_C(rms_A, motor, m.config.judge.space.workshop.ambient_C, m.config.judge.space.workshop.flight_s),
+              0.5);
   EXPECT_LT(p.stroke_rad, 1e-3);
 }
 
 TEST(Winding, IsAtTheTemperatureAtWhichItLosesWhatItConducts) {
   MotorType m;
-  m.resistance_ohm = 10, m.thermal_K_W = 100;
-  EXPECT_DOUBLE_EQ(winding_C(0, m, 20), 20);
-  const double T = winding_C(0.2, m, 20);
-  EXPECT_NEAR((T - 20) / m.thermal_K_W, 0.2 * 0.2 * 10 * (1 + 0.0039 * (T - 25)), 1e-12);
-  EXPECT_TRUE(std::isinf(winding_C(2, m, 20)));
+  m.resistance_ohm = 10, m.winding_K_W = 30, m.housing_K_W = 70, m.winding_s = 4, m.housing_s = 200;
+  EXPECT_DOUBLE_EQ(winding_C(0, m, 20, 1e9), 20);
+  EXPECT_DOUBLE_EQ(winding_C(0.2, m, 20, 0), 20);
+  const double T = winding_C(0.2, m, 20, 1e9);
+  EXPECT_NEAR((T - 20) / 100, 0.2 * 0.2 * 10 * (1 + 0.0039 * (T - 25)), 1e-12);
+  EXPECT_TRUE(std::isinf(winding_C(2, m, 20, 1e9)));
+  // two bodies integrated in time: the losses are smaller at first, so that the law is above, but not by much
+  double winding = 0, housing = 0;
+  for (double t = 0; t < 60; t += 1e-3) {
+    const double loss = 0.2 * 0.2 * 10 * (1 + 0.0039 * (20 + winding + housing - 25));
+    winding += 1e-3 / m.winding_s * (m.winding_K_W * loss - winding);
+    housing += 1e-3 / m.housing_s * (m.housing_K_W * loss - housing);
+  }
+  EXPECT_GT(winding_C(0.2, m, 20, 60), 20 + winding + housing);
+  EXPECT_NEAR((winding_C(0.2, m, 20, 60) - 20) / (winding + housing), 1, 0.03);
+}
+
+/// The rated currents of the Faulhaber 0816 are those that heat its winding to the limit of its data sheet, 85 degrees.
+TEST(Winding, PredictsTheRatedCurrentsOfADataSheet) {
+  const Workshop& w = published().config.judge.space.workshop;
+  const std::pair<const char*, double> kRated_A[] = {
+      {"faulhaber_0816_003", 0.37}, {"faulhaber_0816_006", 0.19}, {"faulhaber_0816_009", 0.13}};
+  for (const auto& [name, rated_A] : kRated_A) {
+    const auto motor = std::ranges::find(w.motors, name, &MotorType::name);
+    ASSERT_NE(motor, w.motors.end());
+    EXPECT_NEAR(winding_C(rated_A, *motor, 22, 1e9), 85, 6) << name;  // 4 % of a rounded current are 5 K
+  }
 }
 
 }  // namespace

@@ -52,12 +52,12 @@ expect_refused("${WORK}/unknown.toml:2:8: vary: no gain \"attitude.pitsch.p\"; a
   ${WORK}/unknown.toml ${WORK}/out.toml)
 write_config(idle "" "1")
 expect_refused("${WORK}/idle.toml:2:8: vary: is empty; accepted: paths of the controller's file" ${WORK}/idle.toml ${WORK}/out.toml)
-write_config(settled "\"attitude.pitch.p\"" "1")
-file(READ ${WORK}/settled.toml settled)
-string(REPLACE "/hover.toml" "/escape.toml" settled "${settled}")
-file(WRITE ${WORK}/settled.toml "${settled}")
-expect_refused("${WORK}/settled.toml:9:7: trial[0].fly: is held on a stand, excited, flown by an actor or starts from hover; accepted: flights of a controller alone from where the task starts"
-  ${WORK}/settled.toml ${WORK}/out.toml)
+write_config(held "\"attitude.pitch.p\"" "1")
+file(READ ${WORK}/held.toml held)
+string(REPLACE "/hover.toml" "/open_loop.toml" held "${held}")
+file(WRITE ${WORK}/held.toml "${held}")
+expect_refused("${WORK}/held.toml:9:7: trial[0].fly: is held on a stand, excited or flown by an actor; accepted: flights of a controller alone"
+  ${WORK}/held.toml ${WORK}/out.toml)
 write_config(empty "\"attitude.pitch.p\"" "")
 expect_refused("${WORK}/empty.toml: trial: is missing; accepted: at least one [[trial]]" ${WORK}/empty.toml ${WORK}/out.toml)
 expect_refused("${WORK}/gone.toml: cannot be read: No such file or directory" ${WORK}/gone.toml ${WORK}/out.toml)
