@@ -90,14 +90,14 @@ Study study_of(const fs::path& file, const Json& json) {
         {figure, o.at("words"), o.at("unit"), o.at("more_is_better"), number(json.at("published").at(figure))});
   }
   const Json& designs = json.at("designs");
+  if (designs.empty()) refuse_results(file, kWriter, "has no verified design yet");
   for (std::size_t i = 0; i < designs.size() && s.designs.size() <= kMost; ++i) {
     const bool published = designs[i].at("name") == kPublished;
     s.designs.push_back({designs[i], published ? "published" : "design " + designs[i].at("name").get<std::string>(),
                          "/designs/" + std::to_string(i)});
     if (published != (i == 0)) break;
   }
-  if (s.designs.empty() || s.designs[0].name != "published" ||
-      std::ranges::count(s.designs, "published", &Design::name) != 1)
+  if (s.designs[0].name != "published" || std::ranges::count(s.designs, "published", &Design::name) != 1)
     refuse_results(file, kWriter, "its designs do not begin with 00, the published robot");
   return s;
 }
@@ -202,7 +202,8 @@ void add_robots(Section& section, const Study& s, const fs::path& folder) {
       Json{{"kind", "robots"},
            {"robots", std::move(robots)},
            {"note",
-            "All to one scale; drag to turn them. Below, each wing from the shoulder outward, its leading edge above: "
+            "All to one scale; drag, or W A S D, turns them, + and − zoom. Below, each wing from the shoulder outward, "
+            "its leading edge above: "
             "blue the design's, dashed the published one's. A design is limited by a variable at the end of the range "
             "that was searched, or by a figure at its limit: beyond it may lie a better one. Figures are verified."}});
 }

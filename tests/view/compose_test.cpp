@@ -629,11 +629,12 @@ TEST(DesignSection, RefusesWhatIsNoStudy) {
   changed = json;
   changed["designs"][1]["verified"]["mass_kg"] = "light";
   EXPECT_EQ(line(changed), file + ": type must be number, but is string" + wrote);
-  for (const Json& designs :
-       {Json::array(), Json{json.at("designs")[1]}, Json{json.at("designs")[0], json.at("designs")[0]}}) {
+  for (const Json& designs : {Json{json.at("designs")[1]}, Json{json.at("designs")[0], json.at("designs")[0]}}) {
     changed["designs"] = designs;
     EXPECT_EQ(line(changed), file + ": its designs do not begin with 00, the published robot" + wrote);
   }
+  changed["designs"] = Json::array();
+  EXPECT_EQ(line(changed), file + ": has no verified design yet" + wrote);
   io::write_atomically(file, "{\"designs\": 1,\n");
   EXPECT_EQ(refusal([&] { recognised(file); }),
             file + ":2:0: is no JSON; accepted: results of a program, as --json wrote them");

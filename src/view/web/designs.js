@@ -12,7 +12,7 @@ import {Robot, Stage, label, turnByMouse, turningKeys} from "./scene.js";
 
 const kDesigned = "#0072b2", kPublished = "#d55e00";
 const kOutlinePx = 300, kMarkPx = 16, kBar_m = 0.01;
-const kNarrow_deg = 8;  // vertical field of the camera: it sees all robots from the same side
+const kNarrow_deg = 4;  // vertical field of the camera: it sees all robots from the same side
 const kNamePx = 104;  // width of a label, which is four times as wide as high
 const kBetween_m = 0.03;  // between the wing tips of neighbours
 const kHigh_m = 0.16;  // of a robot with its name
@@ -115,8 +115,8 @@ export class Designs {
       element("p", {}, element("b", {}, "Limited by: "), design.limits.length > 0 ? design.limits.join("; ") : "no range and no limit", "."),
       comparison(design, published)));
     this.element = element("figure", {class: "designs wide"},
-      element("div", {class: "controls"}, element("div", {role: "group", "aria-label": "robots shown"}, "Show beside the published robot: ",
-        ...this.buttons.map(({made}) => made))),
+      ...this.robots.length < 2 ? [] : [element("div", {class: "controls"}, element("div", {role: "group", "aria-label": "robots shown"}, "Show beside the published robot: ",
+        ...this.buttons.map(({made}) => made)))],
       this.view, element("figcaption", {}, block.note), element("div", {class: "cards"}, ...this.cards));
     const turn = this.turn.bind(this), keys = turningKeys(turn);
     turnByMouse(this.view, turn);
