@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 constexpr const char* kAccepted =
     "a flight log or a folder of them, a run folder or a folder of runs of flappy-train, JSON of flappy-eval, "
     "flappy-gap diagnose or plan (or its folder) or flappy-identify forces, a folder or score.csv of flappy-blind "
-    "score, figures of flappy-bench (.jsonl)";
+    "score, figures of flappy-bench (.jsonl), the folder or design.json of flappy-design";
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& what) {
   throw io::InputError(path.string() + ": " + what + "; accepted: " + kAccepted);
@@ -30,6 +30,7 @@ Kind recognised_folder(const fs::path& path) {
   if (has("diagnosis.json")) return Kind::diagnosis;
   if (has("plan.json")) return Kind::plan;
   if (has("run.json")) return Kind::run;
+  if (has("design.json")) return Kind::design;
   if (has("score.csv")) return Kind::benchmark;
   if (has("manifest.json")) refuse(path, "is a blind benchmark that is not scored yet");
   std::error_code error;
@@ -46,6 +47,7 @@ Kind recognised_json(const fs::path& path) {
   if (has("effects") && has("choices")) return Kind::plan;
   if (has("policy") && has("success_rate")) return Kind::evaluation;
   if (has("parameters") && has("total_error_after")) return Kind::identification;
+  if (has("designs") && has("given_away")) return Kind::design;
   refuse(path, "is JSON of something else");
 }
 
@@ -123,6 +125,9 @@ std::vector<Section> composed(const std::vector<fs::path>& given, const FlightOp
         break;
       case Kind::benchmark:
         sections.push_back(benchmark_section(path));
+        break;
+      case Kind::design:
+        sections.push_back(design_section(fs::is_directory(path) ? path / "design.json" : path));
         break;
       case Kind::speed:
         sections.push_back(speed_section(path));

@@ -11,11 +11,11 @@
 
 namespace flappy::view {
 
-enum class Kind { flight, run, evaluation, diagnosis, plan, identification, benchmark, speed };
+enum class Kind { flight, run, evaluation, diagnosis, plan, identification, benchmark, speed, design };
 
 /// A flight log; a run folder or a folder of runs; results of flappy-eval, flappy-gap diagnose or plan (or its folder),
-/// flappy-identify forces, flappy-blind score (its folder, or score.csv) or flappy-bench --figures. Throws InputError else, also
-/// for a folder of flight logs, which composed() expands.
+/// flappy-identify forces, flappy-blind score (its folder, or score.csv), flappy-bench --figures or flappy-design (its
+/// folder, or design.json). Throws InputError else, also for a folder of flight logs, which composed() expands.
 Kind recognised(const std::filesystem::path& path);
 
 /// Sections in the order of the paths; all flights share one, at the place of the first. A folder of flight logs gives

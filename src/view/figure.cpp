@@ -38,6 +38,14 @@ std::string quoted(const std::string& text) {
   return q + "'";
 }
 
+/// A word of a row of data; gnuplot knows no escape for what ends it.
+std::string in_double_quotes(const std::string& text) {
+  std::string q = "\"";
+  for (const char c : text)
+    if (c != '"' && c != '\\' && static_cast<unsigned char>(c) >= ' ') q += c;
+  return q + "\"";
+}
+
 /// Breaks a name into lines of about kLine letters, as an expression of gnuplot.
 constexpr std::size_t kLine = 40;
 std::vector<std::string> lines_of(const std::string& name) {
@@ -75,6 +83,7 @@ std::string rows_of(const Figure& f, const Series& s) {
       rows += " " + digits(std::min(base, s.x[i])) + " " + digits(std::max(base, s.x[i])) + " " +
               digits(s.y[i] - half) + " " + digits(s.y[i] + half);
     if (!s.low.empty()) rows += " " + digits(s.low[i]) + " " + digits(s.high[i]);
+    if (!s.labels.empty()) rows += " " + in_double_quotes(s.labels[i]);
     rows += "\n";
   }
   return rows;
@@ -118,6 +127,7 @@ Json json_of(const Figure& f) {
                 {"dashed", s.dashed},
                 {"x", numbers(s.x)}};
     if (!s.y.empty()) one["y"] = numbers(s.y);
+    if (!s.labels.empty()) one["labels"] = s.labels;
     if (!s.low.empty()) one["low"] = numbers(s.low), one["high"] = numbers(s.high);
     series.push_back(std::move(one));
   }
@@ -170,6 +180,7 @@ void draw_on_paper(const std::filesystem::path& folder, const Figure& f, Paper p
     script += block + " << end_of_rows\n" + rows + "end_of_rows\n";
     plots += (plots.empty() ? "plot " : ", ") + block + " " + plot_of(s) +
              (s.name.empty() ? " notitle" : " title " + quoted(s.name));
+    if (!s.labels.empty()) plots += ", " + block + " using 1:2:3 with labels left offset 0.6,0.3 notitle";
   }
   const auto path = folder / (f.id + (paper == Paper::pdf ? ".pdf" : ".svg"));
   if (plots.empty()) return;

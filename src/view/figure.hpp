@@ -22,6 +22,7 @@ struct Series {
   std::vector<double> x, y;       ///< for bars, x is the value and y the place near its category (near_category())
   std::vector<double> low, high;  ///< bounds along y for a band, along x for an interval
   bool dashed = false;
+  std::vector<std::string> labels;  ///< beside points; empty: none
 };
 
 struct Axis {

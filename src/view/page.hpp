@@ -3,8 +3,8 @@
 // A page is a list of sections, a section a list of blocks, which web/ draws by their "kind":
 //   words      {"text", "style": "lead" | "plain" | "note"}
 //   figure     figure.hpp
-//   table      {"title", "head": [...], "rows": [[cell, ...]], "note"}   cell: a text, or {"text", "at": JSON pointer}
-//   flights    flight_section.hpp; anatomy, cases: sections.hpp
+//   table      {"title", "head": [...], "rows": [[cell, ...]], "note"}   cell: a text, or {"text", "at": JSON pointer, "strong"}
+//   flights    flight_section.hpp; anatomy, cases, robots: sections.hpp
 //   matrix     {"title", "rows", "columns", "values": [[x|null]], "texts", "note"}, optional: "least", "most", "marked",
 //              "tilted". Texts fill the cells; values shade them from least (0) to most; marked rings a cell.
 //   heading    {"text"}

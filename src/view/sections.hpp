@@ -16,6 +16,12 @@ Section diagnosis_section(const std::filesystem::path& file);
 /// Adds the validation of a diagnosis that has one: held-out flights, controls, and fits to single flights.
 void add_validation(Section& section, const gap::Diagnosis& diagnosis);
 
+/// A design study of flappy-design: what the published robot gives away, the designs beside it, what they are sensitive
+/// to. `file`: design.json; designs' vehicles are read beside it. The block "robots": {"robots": [{"name",
+/// "shape": shape.hpp, "limits": [text], "worth": [[name, text]], "built": [[name, text]]}], "note"}; the first robot is
+/// the published one, and all have the same names.
+Section design_section(const std::filesystem::path& file);
+
 Section evaluation_section(const std::filesystem::path& file);  ///< of flappy-eval, with or without --effects
 
 Section identification_section(const std::filesystem::path& file);  ///< of flappy-identify forces

@@ -30,7 +30,7 @@ expect_equal("the page of the same results" "${two}" "${one}")
 
 # ---- what is refused
 
-set(accepted "; accepted: a flight log or a folder of them, a run folder or a folder of runs of flappy-train, JSON of flappy-eval, flappy-gap diagnose or plan (or its folder) or flappy-identify forces, a folder or score.csv of flappy-blind score, figures of flappy-bench (.jsonl)")
+set(accepted "; accepted: a flight log or a folder of them, a run folder or a folder of runs of flappy-train, JSON of flappy-eval, flappy-gap diagnose or plan (or its folder) or flappy-identify forces, a folder or score.csv of flappy-blind score, figures of flappy-bench (.jsonl), the folder or design.json of flappy-design")
 expect_refused("flappy-report: path is required; see flappy-report --help")
 expect_refused("${WORK}/none: there is no such file or folder" ${WORK}/none)
 file(MAKE_DIRECTORY ${WORK}/empty)

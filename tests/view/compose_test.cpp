@@ -60,7 +60,7 @@ void expect_cells_of(const Section& section, const Json& results, std::size_t le
     if (block.at("kind") == "table")
       for (const Json& row : block.at("rows"))
         for (const Json& c : row)
-          if (c.is_object()) {
+          if (c.is_object() && c.contains("at")) {
             const Json& there = results.at(Json::json_pointer(c.at("at").get<std::string>()));
             const std::string shown = c.at("text");
             ++cells;
@@ -462,6 +462,195 @@ TEST(BenchmarkSection, HasEveryCase) {
   EXPECT_EQ(cases[3].at("named"), "accelerometer misalignment");
   EXPECT_EQ(cases[3].at("right"), false);
   EXPECT_EQ(cases[3].at("probability"), 0.882);
+}
+
+/// A study of two objectives with one chosen design, and the files that its page reads.
+Json study_in(const fs::path& folder) {
+  const auto figures = [](double power_W, double share, double mass_kg) {
+    return Json{{"mass_kg", mass_kg}, {"hover_power_W", power_W}, {"endurance_s", 0.0}, {"escape_success", share}};
+  };
+  const auto design = [&](const char* name, const Json& values, const Json& searched, const Json& verified) {
+    return Json{{"name", name},
+                {"folder", std::string("designs/") + name},
+                {"values", values},
+                {"figures", searched},
+                {"verified", verified},
+                {"fine", verified},
+                {"tuned_cost", nullptr},
+                {"rod_m", 0.0008},
+                {"limited_by", Json::array()},
+                {"sensitivity", {{0.02, -0.01}, {nullptr, nullptr}}}};
+  };
+  const auto info = [](const char* name, const char* words, const char* unit) {
+    return Json{{"name", name}, {"words", words}, {"unit", unit}};
+  };
+  const Json was{{"wing_length_m", 0.07}, {"motor", "published"}}, is{{"wing_length_m", 0.08}, {"motor", "large"}},
+      other{{"wing_length_m", 0.075}, {"motor", "published"}};
+  const Json published = figures(5, 0.5, 0.0124);
+  Json json{
+      {"objectives",
+       {{{"figure", "hover_power_W"}, {"words", "power"}, {"unit", "W"}, {"more_is_better", false}},
+        {{"figure", "escape_success"}, {"words", "escapes"}, {"unit", "1"}, {"more_is_better", true}}}},
+      {"variables", {{{"name", "wing_length_m"}, {"words", "wing length"}}, {{"name", "motor"}, {"words", "motor"}}}},
+      {"figures",
+       {info("mass_kg", "mass", "kg"), info("hover_power_W", "power", "W"), info("endurance_s", "hover", "s"),
+        info("escape_success", "escapes", "1")}},
+      {"published", published},
+      {"front",
+       {{{"values", is}, {"figures", figures(4, 0.5, 0.013)}},
+        {{"values", other}, {"figures", figures(6, 0.75, 0.012)}}}},
+      {"search", {{"designs", 40}}},
+      {"given_away", {0.2, nullptr}},
+      {"designs",
+       {design("00", was, published, figures(5.25, 0.25, 0.0124)),
+        design("01", is, figures(4, 0.5, 0.013), figures(4.5, 0.625, 0.013))}}};
+  json["designs"][1]["limited_by"] = {"wing_length_m is at its most, 0.08", "hover_power_W is at its limit, at most 4"};
+  json["designs"][1]["sensitivity"] = {{-0.04, 0.001}, {nullptr, nullptr}};
+  model::Vehicle v = model::read_any_vehicle(FLAPPY_SOURCE_DIR "/configs/vehicles/hummingbird_nominal.toml");
+  fs::create_directories(folder / "designs/00");
+  fs::create_directories(folder / "designs/01");
+  io::write_atomically(folder / "designs/00/vehicle.toml", model::vehicle_text(v));
+  v.left.planform.wing_length_m = v.right.planform.wing_length_m = 0.08;
+  io::write_atomically(folder / "designs/01/vehicle.toml", model::vehicle_text(v));
+  io::write_atomically(folder / "design.json", json.dump());
+  return json;
+}
+
+TEST(DesignSection, ShowsDesignsBesideThePublishedRobot) {
+  const io::TemporaryFolder folder;
+  const Json json = study_in(folder.path());
+  EXPECT_EQ(recognised(folder.path()), Kind::design);
+  EXPECT_EQ(recognised(folder.path() / "design.json"), Kind::design);
+  Packing packing;
+  const Section section = composed({folder.path()}, {}, packing)[0];
+  EXPECT_EQ(section.kind(), "design");
+  // a row for the mass, three for each figure that flights change, none for the hover on no battery; two designs
+  expect_cells_of(section, json, 2 + 2 * (1 + 3 + 3));
+  const Json blocks = section.json().at("blocks");
+  EXPECT_EQ(blocks[0].at("text"),
+            "40 designs were judged; nothing beats 2 of them. Without loss elsewhere the published robot could have: "
+            "power lower by 20 %.");
+  std::map<std::string, std::vector<Json>> by_kind;
+  for (const Json& b : blocks) by_kind[b.at("kind")].push_back(b);
+
+  ASSERT_EQ(section.figures().size(), 1u);
+  const Figure& f = section.figures()[0];
+  EXPECT_EQ(f.x.title, "power (W)");
+  EXPECT_EQ(f.y.title, "escapes (-)");
+  EXPECT_EQ(f.note, "Better: to the left, and up. As searched.");
+  const std::vector<std::pair<Colour, double>> expected = {
+      {Colour::vermillion, 5}, {Colour::blue, 4}, {Colour::grey, 6}};
+  for (std::size_t k = 0; k < expected.size(); ++k) {
+    EXPECT_EQ(f.series[k].colour, expected[k].first);
+    EXPECT_EQ(f.series[k].x, std::vector<double>{expected[k].second});
+  }
+  EXPECT_EQ(f.series[1].labels, std::vector<std::string>{"01"});
+
+  ASSERT_EQ(by_kind["robots"].size(), 1u);
+  const Json& robots = by_kind["robots"][0].at("robots");
+  ASSERT_EQ(robots.size(), 2u);
+  EXPECT_EQ(robots[0].at("name"), "published");
+  EXPECT_EQ(robots[0].at("limits").size(), 0u);
+  EXPECT_EQ(robots[1].at("name"), "design 01");
+  EXPECT_EQ(robots[1].at("shape").at("left").at("outline_m").back(), Json({0.08, 0.0}));
+  EXPECT_EQ(robots[1].at("limits"), Json({"wing length is at its most, 80 mm", "power is at its limit, at most 4 W"}));
+  EXPECT_EQ(robots[1].at("worth").dump(), R"([["power","4.5 W"],["escapes","62.5 %"],["mass","13 g"]])");
+  EXPECT_EQ(robots[1].at("built").dump(),
+            R"([["wing length","80 mm"],["motor","large"],["rod of the leading edge, diameter","0.8 mm"]])");
+
+  ASSERT_EQ(by_kind["matrix"].size(), 2u);
+  EXPECT_EQ(by_kind["matrix"][0].at("columns"), Json({"power (%)", "escapes (percentage points)"}));
+  EXPECT_EQ(by_kind["matrix"][0].at("texts").dump(), R"([["+2.00","−1.00"],["–","–"]])");
+  EXPECT_EQ(by_kind["matrix"][1].at("texts").dump(), R"([["−4.00","+0.10"],["–","–"]])");
+  EXPECT_EQ(by_kind["matrix"][0].at("most"), 4.0);  // one shade means the same in all
+
+  ASSERT_EQ(by_kind["table"].size(), 2u);
+  const Json& given = by_kind["table"][0].at("rows");
+  EXPECT_EQ(given[0][2], "4");
+  EXPECT_EQ(given[0][3], "20 %");
+  EXPECT_EQ(given[1][3], "nothing");
+  const Json& rows = by_kind["table"][1].at("rows");
+  ASSERT_EQ(rows.size(), 7u);
+  EXPECT_EQ(rows[0][0].dump(), R"x({"text":"power (W)","strong":true})x");
+  EXPECT_EQ(rows[1][1], "verified");
+  EXPECT_EQ(rows[1][3].dump(), R"({"text":"4.5","at":"/designs/1/verified/hover_power_W"})");
+  EXPECT_EQ(rows[1][0], "");
+  EXPECT_EQ(rows[6][0], "mass (kg)");
+}
+
+TEST(DesignSection, SaysSoWhereNothingIsGivenAway) {
+  const io::TemporaryFolder folder;
+  Json json = study_in(folder.path());
+  json["given_away"] = {nullptr, nullptr};
+  io::write_atomically(folder / "design.json", json.dump());
+  EXPECT_EQ(design_section(folder / "design.json").json().at("blocks")[0].at("text"),
+            "40 designs were judged; nothing beats 2 of them. The published robot gives away nothing: each gain in one "
+            "objective costs another.");
+}
+
+TEST(DesignSection, ShowsTheFirstOfManyDesigns) {
+  const io::TemporaryFolder folder;
+  Json json = study_in(folder.path());
+  for (int i = 2; i < 11; ++i) json["designs"].push_back(json["designs"][1]);
+  io::write_atomically(folder / "design.json", json.dump());
+  const Json shown = design_section(folder / "design.json").json();
+  std::size_t robots = 0, notes = 0;
+  for (const Json& b : shown.at("blocks")) {
+    if (b.at("kind") == "robots") robots = b.at("robots").size();
+    if (b.at("kind") == "words") notes += b.at("text") == "Of 10 chosen designs the first 8 are shown.";
+  }
+  EXPECT_EQ(robots, 9u);
+  EXPECT_EQ(notes, 1u);
+}
+
+TEST(DesignSection, RefusesWhatIsNoStudy) {
+  const io::TemporaryFolder folder;
+  const Json json = study_in(folder.path());
+  const std::string file = folder / "design.json";
+  const auto line = [&](const Json& changed) {
+    io::write_atomically(file, changed.dump());
+    const std::string told = refusal([&] { design_section(file); });
+    EXPECT_EQ(told.find('\n'), std::string::npos);
+    return told;
+  };
+  const auto without = [&](const char* pointer, const char* key) {
+    Json changed = json;
+    changed.at(Json::json_pointer(pointer)).erase(key);
+    return changed;
+  };
+  const std::string wrote = "; accepted: what flappy-design wrote";
+  EXPECT_EQ(line(json), "accepted");
+  EXPECT_EQ(line(without("", "search")), file + ": key 'search' not found" + wrote);
+  EXPECT_EQ(line(without("/designs/1/verified", "hover_power_W")), file + ": key 'hover_power_W' not found" + wrote);
+  EXPECT_EQ(line(without("/designs/1", "sensitivity")), file + ": key 'sensitivity' not found" + wrote);
+  Json changed = json;
+  changed["designs"][1]["sensitivity"].erase(1);
+  EXPECT_EQ(line(changed), file + ": array index 1 is out of range" + wrote);
+  changed = json;
+  changed["designs"][1]["verified"]["mass_kg"] = "light";
+  EXPECT_EQ(line(changed), file + ": type must be number, but is string" + wrote);
+  for (const Json& designs : {Json{json.at("designs")[1]}, Json{json.at("designs")[0], json.at("designs")[0]}}) {
+    changed["designs"] = designs;
+    EXPECT_EQ(line(changed), file + ": its designs do not begin with 00, the published robot" + wrote);
+  }
+  changed["designs"] = Json::array();
+  EXPECT_EQ(line(changed), file + ": has no verified design yet" + wrote);
+  io::write_atomically(file, "{\"designs\": 1,\n");
+  EXPECT_EQ(refusal([&] { recognised(file); }),
+            file + ":2:0: is no JSON; accepted: results of a program, as --json wrote them");
+  fs::remove(folder.path() / "designs/01/vehicle.toml");
+  EXPECT_NE(line(json).find((folder.path() / "designs/01/vehicle.toml").string()), std::string::npos);
+}
+
+TEST(Figure, HasItsLabelsOnPaper) {
+  Figure f{.id = "f", .title = "t", .x = {.title = "x"}, .y = {.title = "y"}};
+  f.series.push_back({.name = "a", .draw = Draw::points, .x = {0, 1}, .y = {1, 2}, .labels = {"it \"is", "`this`"}});
+  EXPECT_EQ(json_of(f).at("series")[0].at("labels").dump(), R"(["it \"is","`this`"])");
+  const io::TemporaryFolder folder;
+  draw_on_paper(folder.path(), f, Paper::svg);
+  const std::string svg = io::read_text(folder.path() / "f.svg");
+  EXPECT_NE(svg.find("it is"), std::string::npos);
+  EXPECT_NE(svg.find("`this`"), std::string::npos);
 }
 
 TEST(Figure, IsTheSameOnPaper) {

@@ -328,6 +328,50 @@ def check_notebook(browser: Browser, page: Path) -> None:
     assert browser.complaints() == []
 
 
+def check_design(browser: Browser, study: dict[str, list[object]]) -> None:
+    """Every robot is drawn; one can be chosen; the mouse turns them, and keys do."""
+    from selenium.webdriver.common.action_chains import ActionChains
+
+    names = ["published", *(f"design {k:02}" for k in range(1, len(study["designs"])))]
+    assert browser.run("return [...document.querySelectorAll('.designs h4')].map((e) => e.textContent)") == names
+    assert browser.run("return document.querySelectorAll('.designs section svg').length") == len(names)
+    assert browser.run("return document.querySelectorAll('canvas').length") == 1 + browser.run("return document.querySelectorAll('figure[data-figure]').length")
+    assert browser.run("return document.querySelectorAll('.matrix').length") == len(names)
+    # wings in the colours of the published robot and of designs, at least a share of the picture
+    coloured = """
+    const canvas = document.querySelector('.designs canvas'), copy = document.createElement('canvas'), pen = copy.getContext('2d');
+    [copy.width, copy.height] = [canvas.width, canvas.height];
+    pen.drawImage(canvas, 0, 0);
+    const {data} = pen.getImageData(0, 0, copy.width, copy.height);
+    let [published, designed] = [0, 0];
+    for (let k = 0; k < data.length; k += 4) {
+      published += data[k] > data[k + 2] + 60;
+      designed += data[k + 2] > data[k] + 60;
+    }
+    return [published, designed].map((n) => n / (data.length / 4));"""
+    published, designed = browser.run(coloured)
+    assert published > 0.002, f"the published robot has {published} of the picture"
+    assert designed > 0.9 * (len(names) - 1) * published, f"designs have {designed} of the picture, the published robot {published}"
+    buttons = browser.driver.find_elements("css selector", ".designs .controls button")
+    assert [b.text for b in buttons] == ["all", *names[1:]]
+    buttons[1].send_keys("\n")
+    browser.settle()
+    assert browser.run("return document.querySelector('.designs section.chosen h4').textContent") == "design 01"
+    near = browser.run(coloured)
+    assert near[0] >= published, "the published robot is no longer shown as large"
+    assert 0.5 < near[1] / near[0] < 0.7 * designed / published, f"not the chosen design alone: {near}"
+    view, picture = browser.driver.find_element("css selector", ".designs .view"), "return document.querySelector('.designs canvas').toDataURL()"
+    before = browser.run(picture)
+    ActionChains(browser.driver).drag_and_drop_by_offset(view, 120, 0).perform()
+    browser.settle()
+    dragged = browser.run(picture)
+    assert dragged != before, "the mouse does not turn the robots"
+    view.send_keys("w")
+    browser.settle()
+    assert browser.run(picture) != dragged, "W does not turn the robots"
+    buttons[0].send_keys("\n")
+
+
 def check_cases(browser: Browser) -> None:
     button = browser.driver.find_element("css selector", ".cases button.open")
     button.send_keys("\n")
@@ -420,6 +464,15 @@ def main() -> None:
         rows = len((SOURCE / "docs/results/blind_reported.csv").read_text().splitlines()) - 1
         told = browser.run("return document.querySelector('.cases').textContent")
         assert f"{rows} of {rows} cases" in told, told[:200]
+
+        small = ("search.population=16", "search.generations=4", "flights.hover=4", "flights.escape=4", "flights.effects=1", "verify.designs=2",
+                 "verify.vehicles=8", "verify.generations=0")
+        program("flappy-design", SOURCE / "configs/design/hummingbird.toml", "--out", WORK / "study", *(word for s in small for word in ("--set", s)))
+        study = json.loads((WORK / "study" / "design.json").read_text())
+        browser.open(report("design", WORK / "study"))
+        check_page(browser, "design")
+        check_numbers(browser, study, 30)
+        check_design(browser, study)
 
         browser.open(report("run", WORK / "runs"))
         check_page(browser, "run")

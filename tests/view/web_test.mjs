@@ -6,8 +6,8 @@ import {deflateSync} from "node:zlib";
 
 const kWeb = new URL("../../src/view/web/", import.meta.url);
 const load = (name) => import(new URL(name, kWeb));
-const [packing, geometry, series, chart, dom, anatomy, {Flight}] = await Promise.all(
-  ["packing.js", "geometry.js", "series.js", "chart.js", "dom.js", "anatomy.js", "flight.js"].map(load));
+const [packing, geometry, series, chart, dom, anatomy, designs, {Flight}] = await Promise.all(
+  ["packing.js", "geometry.js", "series.js", "chart.js", "dom.js", "anatomy.js", "designs.js", "flight.js"].map(load));
 
 const near = (actual, expected, tolerance = 1e-9) => {
   const [a, b] = [[actual].flat(), [expected].flat()];
@@ -102,6 +102,12 @@ test("a figure is drawn with the numbers that it has", () => {
   const keys = options.plugins.legend.labels.generateLabels({data: {datasets}, isDatasetVisible: () => true});
   assert.deepEqual(keys.map((key) => [key.text, key.datasetIndex, key.lineDash.length, key.lineWidth]), [["line", 0, 2, 3], ["band", 2, 0, 9]]);
   const bars = {...figure, categories: ["a", "b"], series: [{name: "", draw: "bars", colour: "#000000", dashed: false, x: [1, 2], y: [0, 1]}]};
+  const long = {...axis, title: "share of drawn vehicles that escape (-)"};
+  assert.deepEqual(chart.chartConfig({...figure, y: long}).options.scales.y.title.text, ["share of drawn vehicles", "that escape (-)"]);
+  const written = [], pen = {save() {}, restore() {}, fillText(...told) { written.push([...told, this.textAlign]); }}, scaled = {getPixelForValue: (v) => 10 * v};
+  chart.chartConfig(figure).plugins[0].afterDatasetsDraw({ctx: pen, scales: {x: scaled, y: scaled}, chartArea: {right: 60}, isDatasetVisible: () => true,
+    data: {datasets: [{own: {labels: ["01", "02"], x: [1, 5], y: [2, 3]}}, {own: {x: [1], y: [1]}}]}});
+  assert.deepEqual(written, [["01", 16, 18, "left"], ["02", 44, 28, "right"]]);
   assert.ok(chart.chartConfig({...bars, series: [{...bars.series[0], draw: "points"}]}).data.datasets[0].clip >= 4, "half a point at the end of an axis");
   const scale = chart.chartConfig(bars).options.scales.y;
   assert.deepEqual(scale.ticks.callback(1), ["b"]);
@@ -113,6 +119,16 @@ test("text is short, and strength grows with noise", () => {
   assert.deepEqual(chart.wrapped("accelerometer misalignment and vibration rectification"),
     ["accelerometer misalignment", "and vibration rectification"]);
   near([0.5, 1, 10, 1000].map(anatomy.strengthOf), [0, 0, 1, 1]);
+});
+
+test("robots stand in a row that the camera sees, and a wing is its outline", () => {
+  near(designs.placesOf(1, 0.2), [0]);
+  near(designs.placesOf(4, 0.2), [-0.3, -0.1, 0.1, 0.3]);
+  const half = Math.tan(5 * Math.PI / 180);
+  near(designs.distanceTo(4, 1, 2, 10), 1 / half);  // as wide as the picture, half as high
+  near(designs.distanceTo(1, 3, 2, 10), 1.5 / half);
+  const side = {shoulder_m: [0, 0, 0], outline_m: [[0.01, 0.02], [0.06, 0.018], [0.07, 0]]};
+  assert.equal(designs.outlinePath(side, 1000), "M10.0 0.0L70.0 0.0L70.0 0.0L60.0 18.0L10.0 20.0Z");
 });
 
 test("a flight is what its log has", () => {

@@ -69,7 +69,7 @@ int main(int argc, char** argv) {
   view::Request r;
   app.option("path", r.paths,
              "flight logs, run folders, results of flappy-eval, flappy-gap diagnose and plan, flappy-identify forces, "
-             "flappy-blind score")
+             "flappy-blind score, folders of flappy-design")
       .required();
   app.option("--out", r.out, "the page").shows_default();
   app.option("--title", r.title, "of the page; its first section's unless told");

@@ -2,6 +2,7 @@
 import {anatomyElement} from "./anatomy.js";
 import {casesElement} from "./cases.js";
 import {figureElement} from "./chart.js";
+import {Designs} from "./designs.js";
 import {cellElement, element} from "./dom.js";
 import {Player} from "./player.js";
 
@@ -74,6 +75,11 @@ export function blockElement(block, bytes, later) {
     later.push(() => player.start());
     window.players = [...window.players ?? [], player];  // for tests and for debugging in the browser
     return player.element;
+  }
+  if (block.kind === "robots") {
+    const designs = new Designs(/** @type {any} */ (block));
+    later.push(() => designs.start());
+    return designs.element;
   }
   /** @type {Record<string, (block: any) => HTMLElement>} */
   const made = {words: wordsElement, heading: headingElement, figure: figureElement, table: tableElement, matrix: matrixElement, anatomy: anatomyElement,

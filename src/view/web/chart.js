@@ -3,7 +3,7 @@ import {element, shortNumber} from "./dom.js";
 
 /**
  * @typedef {{name: string, draw: string, colour: string, dashed: boolean, x: (number | null)[], y?: (number | null)[],
- *   low?: (number | null)[], high?: (number | null)[]}} SeriesJson
+ *   low?: (number | null)[], high?: (number | null)[], labels?: string[]}} SeriesJson
  * @typedef {{title: string, log: boolean, low: number | null, high: number | null}} AxisJson
  * @typedef {{id: string, title: string, note: string, x: AxisJson, y: AxisJson, categories: string[], bar: number,
  *   series: SeriesJson[]}} FigureJson
@@ -12,6 +12,7 @@ import {element, shortNumber} from "./dom.js";
 const kInk = "#24292f", kSoft = "#57606a", kGrid = "#e4e8ec";
 const kLabelled = 0.5;  // bars at least this wide have room for their number
 const kLine = 26;  // letters of a line
+const kUpright = 34;  // letters of a title for which an axis upward has room
 export const kFont = "system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif";
 
 /**
@@ -71,6 +72,7 @@ export function chartConfig(figure) {
     Object.assign(y.ticks, {stepSize: 1, autoSkip: false, color: kInk, callback: (/** @type {number} */ v) => wrapped(figure.categories[v] ?? "")});
     y.afterBuildTicks = (/** @type {any} */ axis) => { axis.ticks = figure.categories.map((_, value) => ({value})); };
   }
+  if (figure.y.title.length > kUpright) y.title.text = wrapped(figure.y.title);
   const x = scaleOf(figure.x);
   // make room for intervals, which reach beyond the points
   const ends = figure.series.filter((s) => s.draw === "interval").flatMap((s) => [...s.low ?? [], ...s.high ?? []]).filter((v) => v !== null).map(Number);
@@ -135,6 +137,20 @@ const barsAndIntervals = {
           ctx.lineTo(x.getPixelForValue(s.high[i]), at);
           ctx.stroke();
         }
+      });
+    });
+    ctx.restore();
+  },
+  afterDatasetsDraw(/** @type {any} */ chart) {
+    const {ctx, scales: {x, y}} = chart;
+    ctx.save();
+    Object.assign(ctx, {font: `12px ${kFont}`, textBaseline: "bottom", fillStyle: kInk});
+    chart.data.datasets.forEach((/** @type {any} */ dataset, /** @type {number} */ k) => {
+      if (!chart.isDatasetVisible(k)) return;
+      dataset.own.labels?.forEach((/** @type {string} */ text, /** @type {number} */ i) => {
+        const at = x.getPixelForValue(dataset.own.x[i]), inside = at > chart.chartArea.right - 8 * text.length - 6;
+        ctx.textAlign = inside ? "right" : "left";
+        ctx.fillText(text, at + (inside ? -6 : 6), y.getPixelForValue(dataset.own.y[i]) - 2);
       });
     });
     ctx.restore();

@@ -1,7 +1,7 @@
 // The player of a page's flights: the robots in 3D, their streams next to them, and the controls of both.
 import {element, shortNumber} from "./dom.js";
 import {Flight, kBlue, kGreen, kPurple, kVermillion} from "./flight.js";
-import {Scene} from "./scene.js";
+import {Scene, turnByMouse, turningKeys} from "./scene.js";
 import {Timeline} from "./timeline.js";
 
 /**
@@ -205,15 +205,15 @@ export class Player {
 
   /** @param {HTMLElement} view element that takes keys and the mouse */
   steer(view) {
+    const turn = this.turn.bind(this);
     view.addEventListener("keydown", (event) => {
       if (event.ctrlKey || event.metaKey || event.altKey) return;
-      const beats = event.shiftKey ? 1 : 0.05, turn = 0.1;
+      const beats = event.shiftKey ? 1 : 0.05;
       /** @type {Record<string, () => void>} */
       const keys = {
         " ": () => this.play(!this.playing), ArrowLeft: () => this.seek(this.now_s - beats * this.beat_s),
         ArrowRight: () => this.seek(this.now_s + beats * this.beat_s), Home: () => this.seek(0), End: () => this.seek(this.duration_s),
-        a: () => this.turn(-turn, 0), d: () => this.turn(turn, 0), w: () => this.turn(0, turn), s: () => this.turn(0, -turn),
-        "+": () => this.turn(0, 0, 0.85), "=": () => this.turn(0, 0, 0.85), "-": () => this.turn(0, 0, 1.18),
+        ...turningKeys(turn),
         c: () => this.look(/** @type {View} */ (kViews[(kViews.findIndex(([, name]) => name === this.scene?.view) + 1) % kViews.length][1])),
       };
       const key = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
@@ -221,18 +221,7 @@ export class Player {
       event.preventDefault();
       key();
     });
-    view.addEventListener("pointerdown", (event) => {
-      view.focus();
-      view.setPointerCapture(event.pointerId);
-    });
-    view.addEventListener("pointermove", (event) => {
-      if (event.buttons !== 0) this.turn(-0.008 * event.movementX, 0.008 * event.movementY);
-    });
-    view.addEventListener("wheel", (event) => {
-      if (document.activeElement !== view) return;  // otherwise the wheel scrolls the page
-      event.preventDefault();
-      this.turn(0, 0, Math.exp(0.001 * event.deltaY));
-    }, {passive: false});
+    turnByMouse(view, turn);
   }
 
   /** @param {number} azimuth_rad @param {number} elevation_rad @param {number} zoom */

@@ -9,6 +9,7 @@ import {rotated, spanOf} from "./geometry.js";
  * @typedef {"chase" | "free" | "front" | "side" | "top"} View
  */
 
+const kField_deg = 35;  // vertical field of the camera
 const kHalfSpan_m = 0.084;
 const kMomentColour = "#0072b2";
 const kChase_m = 0.55;  // distance from which the camera follows a robot
@@ -26,7 +27,7 @@ function sizeOf(vehicle) {
 }
 
 /** One robot, with the wings of the vehicle's file; for a beat-averaged vehicle, the ellipsoid of its mass and inertia. */
-class Robot {
+export class Robot {
   /**
    * @param {Vehicle} vehicle
    * @param {string} colour of its wings, or of the ellipsoid
@@ -152,7 +153,7 @@ class Trail {
  * @param {string} colour
  * @returns {any}
  */
-function label(text, colour) {
+export function label(text, colour) {
   const canvas = document.createElement("canvas");
   canvas.width = 256;
   canvas.height = 64;
@@ -207,7 +208,92 @@ function arrow(colour) {
   return made;
 }
 
-export class Scene {
+/**
+ * Turns by the mouse, and zooms by its wheel, what an element shows.
+ * @param {HTMLElement} view
+ * @param {(azimuth_rad: number, elevation_rad: number, zoom?: number) => void} turn
+ */
+export function turnByMouse(view, turn) {
+  view.addEventListener("pointerdown", (event) => {
+    view.focus();
+    view.setPointerCapture(event.pointerId);
+  });
+  view.addEventListener("pointermove", (event) => {
+    if (event.buttons !== 0) turn(-0.008 * event.movementX, 0.008 * event.movementY);
+  });
+  view.addEventListener("wheel", (event) => {
+    if (document.activeElement !== view) return;  // otherwise the wheel scrolls the page
+    event.preventDefault();
+    turn(0, 0, Math.exp(0.001 * event.deltaY));
+  }, {passive: false});
+}
+
+/**
+ * What keys do that turn and zoom.
+ * @param {(azimuth_rad: number, elevation_rad: number, zoom?: number) => void} turn
+ * @returns {Record<string, () => void>}
+ */
+export function turningKeys(turn) {
+  const step = 0.1;
+  return {a: () => turn(-step, 0), d: () => turn(step, 0), w: () => turn(0, step), s: () => turn(0, -step),
+    "+": () => turn(0, 0, 0.85), "=": () => turn(0, 0, 0.85), "-": () => turn(0, 0, 1.18)};
+}
+
+/** A canvas, its light, and a camera that is turned around a point. */
+export class Stage {
+  /**
+   * Throws where the browser has no WebGL.
+   * @param {HTMLElement} frame that holds the canvas
+   */
+  constructor(frame) {
+    this.renderer = new THREE.WebGLRenderer({antialias: true, preserveDrawingBuffer: true});
+    this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
+    this.renderer.setClearColor(0xf6f8fa);
+    frame.append(this.renderer.domElement);
+    this.frame = frame;
+    this.scene = new THREE.Scene();
+    this.camera = new THREE.PerspectiveCamera(kField_deg, 1, 0.01, 200);
+    this.camera.up.set(0, 0, 1);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0xc8d0d8, 1.25));
+    const sun = new THREE.DirectionalLight(0xffffff, 0.55);
+    sun.position.set(-1, -2, 4);
+    this.scene.add(sun);
+    this.azimuth = this.elevation = 0;
+    this.distance = 1;
+    this.target = [0, 0, 0];
+  }
+
+  /** Adapts the canvas to the size of its frame. */
+  resize() {
+    const {clientWidth: width, clientHeight: height} = this.frame;
+    if (width === 0 || height === 0) return;
+    this.renderer.setSize(width, height);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+  }
+
+  /**
+   * Turns the camera around the point that it looks at.
+   * @param {number} azimuth_rad
+   * @param {number} elevation_rad
+   * @param {number} zoom factor of the distance
+   */
+  turn(azimuth_rad, elevation_rad, zoom = 1) {
+    this.azimuth += azimuth_rad;
+    this.elevation = Math.min(1.55, Math.max(-1.55, this.elevation + elevation_rad));
+    this.distance = Math.min(100, Math.max(0.08, this.distance * zoom));
+  }
+
+  render() {
+    const level = Math.cos(this.elevation);
+    this.camera.position.set(this.target[0] + this.distance * level * Math.cos(this.azimuth),
+      this.target[1] + this.distance * level * Math.sin(this.azimuth), this.target[2] + this.distance * Math.sin(this.elevation));
+    this.camera.lookAt(...this.target);
+    this.renderer.render(this.scene, this.camera);
+  }
+}
+
+export class Scene extends Stage {
   /**
    * Throws where the browser has no WebGL.
    * @param {HTMLElement} frame that holds the canvas
@@ -216,19 +302,7 @@ export class Scene {
    * @param {number[] | null} goal_m
    */
   constructor(frame, robots, place, goal_m) {
-    this.renderer = new THREE.WebGLRenderer({antialias: true, preserveDrawingBuffer: true});
-    this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
-    this.renderer.setClearColor(0xf6f8fa);
-    frame.append(this.renderer.domElement);
-    this.frame = frame;
-    this.scene = new THREE.Scene();
-    this.camera = new THREE.PerspectiveCamera(35, 1, 0.01, 200);
-    this.camera.up.set(0, 0, 1);
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0xc8d0d8, 1.25));
-    const sun = new THREE.DirectionalLight(0xffffff, 0.55);
-    sun.position.set(-1, -2, 4);
-    this.scene.add(sun);
-
+    super(frame);
     const all = robots.flatMap((robot) => robot.path);
     this.low = [0, 1, 2].map((k) => all.reduce((least, p) => Math.min(least, p[k]), Infinity));
     this.high = [0, 1, 2].map((k) => all.reduce((most, p) => Math.max(most, p[k]), -Infinity));
@@ -356,15 +430,6 @@ export class Scene {
     this.scene.add(this.trails[k].group);
   }
 
-  /** Adapts the canvas to the size of its frame. */
-  resize() {
-    const {clientWidth: width, clientHeight: height} = this.frame;
-    if (width === 0 || height === 0) return;
-    this.renderer.setSize(width, height);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
-  }
-
   /** @param {View} view */
   look(view) {
     this.view = view;
@@ -374,18 +439,6 @@ export class Scene {
     else if (view === "front") Object.assign(this, {azimuth: 0, elevation: 0, distance: wide});
     else if (view === "side") Object.assign(this, {azimuth: -Math.PI / 2, elevation: 0, distance: wide});
     else Object.assign(this, {azimuth: -Math.PI / 2, elevation: 1.55, distance: wide});
-  }
-
-  /**
-   * Turns the camera around the point that it looks at.
-   * @param {number} azimuth_rad
-   * @param {number} elevation_rad
-   * @param {number} zoom factor of the distance
-   */
-  turn(azimuth_rad, elevation_rad, zoom = 1) {
-    this.azimuth += azimuth_rad;
-    this.elevation = Math.min(1.55, Math.max(-1.55, this.elevation + elevation_rad));
-    this.distance = Math.min(100, Math.max(0.08, this.distance * zoom));
   }
 
   /**
@@ -431,10 +484,6 @@ export class Scene {
       this.shadow.material.opacity = 0.35 / (1 + 4 * Math.max(0, height));
     }
     this.target = this.view === "chase" ? this.watched : this.middle;
-    const level = Math.cos(this.elevation);
-    this.camera.position.set(this.target[0] + this.distance * level * Math.cos(this.azimuth),
-      this.target[1] + this.distance * level * Math.sin(this.azimuth), this.target[2] + this.distance * Math.sin(this.elevation));
-    this.camera.lookAt(...this.target);
-    this.renderer.render(this.scene, this.camera);
+    this.render();
   }
 }
