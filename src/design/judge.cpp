@@ -72,6 +72,8 @@ void put_stand(const Robot& robot, const Stand& s, double weight_N, Figures& f) 
 
 const FigureInfo& info_of(Figure figure) { return kFigureInfos[static_cast<std::size_t>(figure)]; }
 
+bool is_share(Figure figure) { return std::string_view(info_of(figure).name).ends_with("_success"); }
+
 std::optional<Figure> figure_named(const std::string& name) {
   for (std::size_t i = 0; i < kFigures; ++i)
     if (name == kFigureInfos[i].name) return static_cast<Figure>(i);

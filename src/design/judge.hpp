@@ -44,6 +44,7 @@ struct FigureInfo {
   Stage stage;  ///< the first that computes it
 };
 const FigureInfo& info_of(Figure figure);
+bool is_share(Figure figure);  ///< of drawn vehicles: changes are points, not shares of it
 std::optional<Figure> figure_named(const std::string& name);
 
 /// [figure]; NaN where it was not computed.

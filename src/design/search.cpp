@@ -133,9 +133,7 @@ std::vector<double> Search::objectives(const Record& r) const {
       continue;
     }
     const double was = figure_of(published_.figures, figure), is = figure_of(r.figures, figure);
-    // shares of 1 stay as they are
-    const double scale =
-        std::string(info_of(figure).name).ends_with("_success") || was == 0 || !std::isfinite(was) ? 1 : std::abs(was);
+    const double scale = is_share(figure) || was == 0 || !std::isfinite(was) ? 1 : std::abs(was);
     const double worse = std::isfinite(was) ? (is - was) / scale : is;
     const double change = info_of(figure).more_is_better ? -worse : worse;
     f.push_back(std::isfinite(change) ? std::min(change, kRefused / 2) : kRefused / 2);

@@ -137,7 +137,7 @@ std::vector<Record> choose(const Search& search, std::size_t count) {
   };
   while (chosen.size() < std::min(count, front.size())) {
     std::size_t best = front.size();
-    double most = -1;
+    double most = -std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < front.size(); ++i) {
       if (!eligible(i)) continue;
       double far = std::numeric_limits<double>::infinity();

@@ -19,7 +19,7 @@ using io::format;
 
 constexpr const char* kWriter = "flappy-design";
 constexpr const char* kPublished = "00";  // the published robot among the designs
-constexpr std::size_t kMost = 8;          // designs that are drawn beside the published one
+constexpr std::size_t kMaxDesigns = 8;    // designs that are drawn beside the published one
 constexpr std::pair<const char*, const char*> kJudgements[] = {
     {"figures", "as searched"}, {"verified", "verified"}, {"fine", "short steps"}};
 
@@ -92,7 +92,7 @@ Study study_of(const fs::path& file, const Json& json) {
   }
   const Json& designs = json.at("designs");
   if (designs.empty()) refuse_results(file, kWriter, "has no verified design yet");
-  for (std::size_t i = 0; i < designs.size() && s.designs.size() <= kMost; ++i) {
+  for (std::size_t i = 0; i < designs.size() && s.designs.size() <= kMaxDesigns; ++i) {
     const bool published = designs[i].at("name") == kPublished;
     s.designs.push_back({designs[i], published ? "published" : "design " + designs[i].at("name").get<std::string>(),
                          "/designs/" + std::to_string(i)});

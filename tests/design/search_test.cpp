@@ -122,6 +122,12 @@ TEST(Records, ReadBackAsTheyWere) {
   EXPECT_NE(line.find("line 2 is no record"), std::string::npos) << line;
 }
 
+/// The only design of a front that is worse than the published robot.
+TEST(Choose, TakesWhatThereIs) {
+  const Small one({"search.generations=1", "search.seed=3"});
+  EXPECT_EQ(choose(one.search, 5).size(), std::min<std::size_t>(5, one.search.front().size()));
+}
+
 TEST(Choose, TakesTheBestOfEachObjectiveOnce) {
   const Search& s = searched().search;
   const std::vector<Record> front = s.front(), chosen = choose(s, 3);

@@ -34,11 +34,11 @@ void show(const design::Search& search, const std::vector<double>& most) {
   for (std::size_t k = 0; k < most.size(); ++k) {
     const design::FigureInfo& info = design::info_of(search.config().objectives[k]);
     const double published = design::figure_of(search.published().figures, search.config().objectives[k]);
+    const std::string has = io::format("%s (the published robot: %.4g %s)", info.words, published, info.unit);
     if (most[k] > 0)
-      std::printf("  the published robot gives away %.1f %% of %s (%.4g %s)\n", 100 * most[k], info.words, published,
-                  info.unit);
-    else
-      std::printf("  no design is better in %s without loss elsewhere (%.4g %s)\n", info.words, published, info.unit);
+      std::printf("  %.1f %s better without loss elsewhere: %s\n", 100 * most[k],
+                  design::is_share(search.config().objectives[k]) ? "points" : "%", has.c_str());
+    else std::printf("  no better without loss elsewhere: %s\n", has.c_str());
   }
 }
 
