@@ -506,6 +506,7 @@ TEST_F(Benchmark, FamiliesFlyWhatIsProposed) {
 // A diagnosis that abstains proposes an intervention; its maker makes it, the robot flies the manoeuvre, as near to the ceiling of its room as that is
 // to its own, and all flights are diagnosed.
 TEST_F(Benchmark, FliesWhatADiagnosisProposes) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   ASSERT_TRUE(make(1, "hover"));
   ScoreCommand c = command();
   std::filesystem::copy(kConfigs, root_ / "configs", std::filesystem::copy_options::recursive);

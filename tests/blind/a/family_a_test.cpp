@@ -354,6 +354,7 @@ TEST(FamilyASessions, ShowInMotionCapture) {
 }
 
 TEST(FamilyASessions, CalmFlightsAreSlow) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   Assignment a = assignment();
   a.hover = false;
   a.calm = true;
