@@ -153,6 +153,7 @@ void Smoother::read_imu(const FlightLog& log) {
   const auto follows = [&](std::size_t i) { return s.t_s[i] - s.t_s[i - 1] < 1.5 * interval_s; };
   std::vector<Vector3d> gyro, accel;
   const auto add = [&](double from_s, const Vector3d& rate, const Vector3d& force, bool gap) {
+    sample_.push_back(sample_.empty() ? 0 : sample_.back() + (gap_.back() ? 0 : 1));
     bounds_s_.push_back(from_s);
     gyro.push_back(rate);
     accel.push_back(force);
@@ -350,6 +351,12 @@ std::size_t Smoother::node_before(double t_s) const {
 double Smoother::imu_bound_s(double t_s) const {
   const std::size_t k = last_not_after(bounds_s_, t_s);
   return k + 1 < bounds_s_.size() && bounds_s_[k + 1] - t_s < t_s - bounds_s_[k] ? bounds_s_[k + 1] : bounds_s_[k];
+}
+
+std::optional<std::size_t> Smoother::imu_sample(double t_s) const {
+  const std::size_t k = last_not_after(bounds_s_, t_s);
+  if (k >= gap_.size() || gap_[k]) return std::nullopt;
+  return sample_[k];
 }
 
 Vector3d Smoother::mean(const BeatAveragedSpline& signal, double from_s, double to_s) const {

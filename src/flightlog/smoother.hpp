@@ -16,6 +16,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <filesystem>
+#include <optional>
 #include <vector>
 
 #include "flightlog/beat_averaged_spline.hpp"
@@ -51,6 +52,8 @@ class Smoother {
 
   /// Bounds of the IMU's intervals, gaps included.
   const std::vector<double>& bounds_s() const { return bounds_s_; }
+  /// The sample of imu.csv whose interval contains a time; none in a gap.
+  std::optional<std::size_t> imu_sample(double t_s) const;
   /// Mean of the measured specific force over a time, bias included, in the turning frame B.
   Eigen::Vector3d mean_force_m_s2(double from_s, double to_s) const { return mean(accel_, from_s, to_s); }
   /// Mean of the measured rate over a time, bias included, in B.
@@ -106,9 +109,10 @@ class Smoother {
   static void displace(State& x, const Eigen::Matrix<double, 15, 1>& error);
 
   double gravity_m_s2_, longest_unseen_s_;
-  Eigen::Vector3d arm_m_;         // position of the IMU, in B
-  std::vector<double> bounds_s_;  // bounds of the IMU's intervals
-  std::vector<char> gap_;         // for each interval, whether it has no sample
+  Eigen::Vector3d arm_m_;            // position of the IMU, in B
+  std::vector<double> bounds_s_;     // bounds of the IMU's intervals
+  std::vector<char> gap_;            // for each interval, whether it has no sample
+  std::vector<std::size_t> sample_;  // for each interval, its sample of imu.csv; in a gap, the one after it
   BeatAveragedSpline gyro_, accel_;
   std::vector<Node> nodes_;  // at every bound and every pose
   std::vector<double> pose_s_;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <random>
 
+#include "flightlog/some_log.hpp"
 #include "io/csv.hpp"
 #include "rollout/fly.hpp"
 #include "rollout/fly_fixture.hpp"
@@ -278,6 +279,25 @@ TEST(Smoother, GoesOnOverGaps) {
   while (smoother.pose_s()[i] < 1.01) ++i;
   EXPECT_GT(smoother.covariance(i)(6, 6), 20 * smoother.covariance(i - 20)(6, 6));
   EXPECT_LT(off(smoother, smoother.pose_s()[i]), 4 * std::sqrt(smoother.covariance(i).diagonal().segment<3>(6).sum()));
+}
+
+TEST(Smoother, KnowsTheSampleOfEachInterval) {
+  FlightLog log = test::some_log();
+  ImuStream& imu = log.imu;
+  for (Column* c : {&imu.t_s, &imu.gyro_x_rad_s, &imu.gyro_y_rad_s, &imu.gyro_z_rad_s, &imu.accel_x_m_s2,
+                    &imu.accel_y_m_s2, &imu.accel_z_m_s2})
+    c->erase(c->begin() + 100, c->begin() + 110);
+  const Smoother smoother(log, "here");
+  const std::vector<double>& bounds_s = smoother.bounds_s();
+  std::size_t seen = 0;
+  for (std::size_t k = 0; k + 1 < bounds_s.size(); ++k) {
+    const auto sample = smoother.imu_sample((bounds_s[k] + bounds_s[k + 1]) / 2);
+    EXPECT_EQ(sample.has_value(), k != 100) << k;
+    if (!sample) continue;
+    EXPECT_EQ(*sample, seen++);
+    EXPECT_NEAR(smoother.mean_force_m_s2(bounds_s[k], bounds_s[k + 1]).x(), imu.accel_x_m_s2[*sample], 1e-12);
+  }
+  EXPECT_EQ(seen, imu.t_s.size());
 }
 
 TEST(Smoother, RefusesStreamsThatShareNoTime) {

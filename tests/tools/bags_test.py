@@ -36,7 +36,7 @@ OWN = {
 }
 STANDARD = """builtin_interfaces/Time builtin_interfaces/Duration std_msgs/Header std_msgs/Float64MultiArray std_msgs/MultiArrayLayout
     std_msgs/MultiArrayDimension geometry_msgs/Point geometry_msgs/Quaternion geometry_msgs/Vector3 geometry_msgs/Pose geometry_msgs/PoseStamped
-    geometry_msgs/PoseWithCovariance geometry_msgs/Twist geometry_msgs/TwistWithCovariance geometry_msgs/Transform geometry_msgs/TransformStamped
+    geometry_msgs/PoseWithCovariance geometry_msgs/Accel geometry_msgs/AccelStamped geometry_msgs/Twist geometry_msgs/TwistWithCovariance geometry_msgs/Transform geometry_msgs/TransformStamped
     nav_msgs/Odometry sensor_msgs/Imu sensor_msgs/JointState sensor_msgs/BatteryState tf2_msgs/TFMessage rosgraph_msgs/Clock
     diagnostic_msgs/KeyValue diagnostic_msgs/DiagnosticStatus diagnostic_msgs/DiagnosticArray""".split()
 

@@ -7,6 +7,7 @@
 #include "flightlog/check/data_faults.hpp"
 #include "gap/diagnose/diagnose_command.hpp"
 #include "gap/diagnose/learn_command.hpp"
+#include "gap/diagnose/mcap_command.hpp"
 #include "gap/plan/plan_command.hpp"
 #include "import_command.hpp"
 #include "io/config.hpp"
@@ -194,6 +195,13 @@ int main(int argc, char** argv) {
                 "give the corrected vehicle what is left, as a smooth load without a cause");
   diagnose.option("--out", command.out, "folder for diagnosis.json, the corrected vehicle, tables and figures");
   diagnose.option("--threads", command.settings.threads, "0: one for each processor").range(0, 1024);
+  io::Command mcap =
+      program.app().command("mcap", "a diagnosed flight and its predictions for Foxglove and PlotJuggler");
+  std::string flight, declared, diagnosis, topics;
+  mcap.option("flight", flight, "folder of the flight log").required();
+  mcap.option("--vehicle", declared, "the vehicle's file, as it was diagnosed").required();
+  mcap.option("--diagnosis", diagnosis, "folder that flappy-gap diagnose wrote").required();
+  mcap.option("--out", topics, "file for the topics, X.mcap; layouts are written with it").required();
   io::Command plan = program.app().command("plan", "before any flight: which effects flights could tell apart");
   gap::PlanCommand planned;
   plan.option("--vehicle", planned.settings.vehicle, "the vehicle's file, as it is believed").required();
@@ -246,6 +254,8 @@ int main(int argc, char** argv) {
       program.write_json(gap::list_effects(beat_averaged));
     } else if (import.given()) {
       program.write_json(gap::run_import(import_command));
+    } else if (mcap.given()) {
+      program.write_json(gap::run_mcap({flight, declared, diagnosis, topics}));
     } else if (plan.given()) {
       program.write_json(gap::run_plan(planned));
     } else if (learn.given()) {

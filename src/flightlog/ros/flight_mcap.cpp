@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <functional>
 #include <limits>
 
@@ -34,6 +35,12 @@ void put_variance(Members& m, const std::string& path, double sd) {
   for (const int i : {0, 4, 8}) m[path + "[" + std::to_string(i) + "]"] = sd * sd;
 }
 
+using Vector = std::array<double, 3>;
+
+void put_vector(Members& m, const std::string& path, const Vector& v) {
+  m[path + ".x"] = v[0], m[path + ".y"] = v[1], m[path + ".z"] = v[2];
+}
+
 struct Feed {
   const Column* t_s;
   std::function<void(std::size_t i)> write;
@@ -42,16 +49,25 @@ struct Feed {
 
 class FlightFile {
  public:
-  FlightFile(const std::filesystem::path& path, const FlightLog& log) : log_(log), file_(path) {
+  FlightFile(const std::filesystem::path& path, const FlightLog& log, const std::vector<VehicleTopics>& vehicles)
+      : log_(log), file_(path) {
     feeds_ = {{&log.command.t_s, [this](std::size_t i) { write_command(i); }},
               {&log.mocap.t_s, [this](std::size_t i) { write_mocap(i); }},
               {&log.imu.t_s, [this](std::size_t i) { write_imu(i); }}};
     if (log.power && log.header.power) feeds_.push_back({&log.power->t_s, [this](std::size_t i) { write_power(i); }});
     if (log.wings && log.header.wings) feeds_.push_back({&log.wings->t_s, [this](std::size_t i) { write_wings(i); }});
+    for (const VehicleTopics& v : vehicles) {
+      Column& imu_s = times_.emplace_back();
+      for (const VehicleTopics::Imu& i : v.imu) imu_s.push_back(log.imu.t_s[i.sample]);
+      feeds_.push_back({&imu_s, [this, &v](std::size_t i) { write_predicted_imu(v.name, v.imu[i]); }});
+      Column& beat_s = times_.emplace_back();
+      for (const VehicleTopics::Beat& b : v.beats) beat_s.push_back(b.t_s + log.header.imu.latency_s);
+      feeds_.push_back({&beat_s, [this, &v](std::size_t i) { write_beat(v.name, v.beats[i]); }});
+    }
   }
 
   /// Writes all samples in the order of their arrival, as a recorder would have.
-  void write() {
+  std::uint64_t write() {
     while (true) {
       Feed* first = nullptr;
       for (Feed& feed : feeds_)
@@ -61,6 +77,7 @@ class FlightFile {
       first->write(first->next++);
     }
     file_.finish();
+    return file_.messages();
   }
 
  private:
@@ -119,21 +136,42 @@ class FlightFile {
     send("/tf", type_name::kTFMessage, t_s, late_s, tf);
   }
 
-  void write_imu(std::size_t i) {
-    const ImuStream& s = log_.imu;
+  void write_imu(std::size_t i) { send_imu("/imu", i, rate_of(i), force_of(i)); }
+
+  Vector rate_of(std::size_t i) const {
+    return {log_.imu.gyro_x_rad_s[i], log_.imu.gyro_y_rad_s[i], log_.imu.gyro_z_rad_s[i]};
+  }
+  Vector force_of(std::size_t i) const {
+    return {log_.imu.accel_x_m_s2[i], log_.imu.accel_y_m_s2[i], log_.imu.accel_z_m_s2[i]};
+  }
+
+  void send_imu(const std::string& topic, std::size_t sample, const Vector& rate_rad_s, const Vector& force_m_s2) {
     const ImuHeader& h = log_.header.imu;
-    Members m = {{"angular_velocity.x", s.gyro_x_rad_s[i]},
-                 {"angular_velocity.y", s.gyro_y_rad_s[i]},
-                 {"angular_velocity.z", s.gyro_z_rad_s[i]},
-                 {"linear_acceleration.x", s.accel_x_m_s2[i]},
-                 {"linear_acceleration.y", s.accel_y_m_s2[i]},
-                 {"linear_acceleration.z", s.accel_z_m_s2[i]},
-                 {"orientation.w", 1.0},
+    const double t_s = log_.imu.t_s[sample];
+    Members m = {{"orientation.w", 1.0},
                  {"orientation_covariance[0]", -1.0}};  // -1: no orientation, as sensor_msgs/Imu specifies
-    put_header(m, to_ns(s.t_s[i] - h.latency_s), kTorso);
+    put_vector(m, "angular_velocity", rate_rad_s);
+    put_vector(m, "linear_acceleration", force_m_s2);
+    put_header(m, to_ns(t_s - h.latency_s), kTorso);
     put_variance(m, "angular_velocity_covariance", h.gyro_noise_rad_s);
     put_variance(m, "linear_acceleration_covariance", h.accel_noise_m_s2);
-    send("/imu", type_name::kImu, s.t_s[i], h.latency_s, m);
+    send(topic, type_name::kImu, t_s, h.latency_s, m);
+  }
+
+  void write_predicted_imu(const std::string& vehicle, const VehicleTopics::Imu& left) {
+    Vector rate = rate_of(left.sample), force = force_of(left.sample);
+    for (std::size_t k = 0; k < 3; ++k) rate[k] -= left.rate_rad_s[k], force[k] -= left.force_m_s2[k];
+    send_imu("/" + vehicle + "/imu", left.sample, rate, force);
+    send_imu("/" + vehicle + "/residual", left.sample, left.rate_rad_s, left.force_m_s2);
+  }
+
+  void write_beat(const std::string& vehicle, const VehicleTopics::Beat& left) {
+    Members m;
+    put_vector(m, "accel.linear", left.force_m_s2);
+    put_vector(m, "accel.angular", left.turning_rad_s2);
+    put_header(m, to_ns(left.t_s), kTorso);
+    const double late_s = log_.header.imu.latency_s;
+    send("/" + vehicle + "/beat_residual", type_name::kAccelStamped, left.t_s + late_s, late_s, m);
   }
 
   void write_power(std::size_t i) {
@@ -171,14 +209,16 @@ class FlightFile {
   const FlightLog& log_;
   McapWriter file_;
   std::map<std::string, Topic> topics_;
+  std::deque<Column> times_;  ///< of the vehicles' feeds
   std::vector<Feed> feeds_;
 };
 
 }  // namespace
 
-void write_flight_mcap(const std::filesystem::path& path, const FlightLog& log) {
+std::uint64_t write_flight_mcap(const std::filesystem::path& path, const FlightLog& log,
+                                const std::vector<VehicleTopics>& vehicles) {
   require_voltages(log, path.string());
-  FlightFile(path, log).write();
+  return FlightFile(path, log, vehicles).write();
 }
 
 }  // namespace flappy::flightlog::ros

@@ -7,16 +7,42 @@
 //   /motors       JointState     where power is logged: effort is the current in A of left_motor and right_motor
 //   /joint_states JointState     where wings are logged: left_stroke, left_rotation, right_stroke, right_rotation
 //
+// And for each vehicle that is said to have flown, what it predicts (docs/reference/formats.md):
+//
+//   /NAME/imu            Imu           what the robot's IMU would have measured
+//   /NAME/residual       Imu           /imu less /NAME/imu
+//   /NAME/beat_residual  AccelStamped  the mean of a beat: specific force and angular acceleration, in B
+//
 // A message's log time is the arrival of its sample; its stamp is earlier by the declared latency.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "flightlog/flight_log.hpp"
 
 namespace flappy::flightlog::ros {
 
-/// InputError where the file cannot be written, or the flight has no voltages.
-void write_flight_mcap(const std::filesystem::path& path, const FlightLog& log);
+/// How a vehicle predicts a flight: residuals are measured less predicted, in B.
+struct VehicleTopics {
+  struct Imu {
+    std::size_t sample;  ///< of the log's imu
+    std::array<double, 3> force_m_s2, rate_rad_s;
+  };
+  struct Beat {
+    double t_s;  ///< measured time of its middle
+    std::array<double, 3> force_m_s2, turning_rad_s2;
+  };
+  std::string name;
+  std::vector<Imu> imu;
+  std::vector<Beat> beats;
+};
+
+/// Returns the number of messages. InputError where the file cannot be written, or the flight has no voltages.
+std::uint64_t write_flight_mcap(const std::filesystem::path& path, const FlightLog& log,
+                                const std::vector<VehicleTopics>& vehicles = {});
 
 }  // namespace flappy::flightlog::ros

@@ -21,6 +21,8 @@ constexpr Text kTexts[] = {
     {"geometry_msgs/msg/PoseStamped", "std_msgs/Header header\nPose pose\n"},
     {"geometry_msgs/msg/PoseWithCovariance", "Pose pose\nfloat64[36] covariance\n"},
     {"geometry_msgs/msg/Twist", "Vector3 linear\nVector3 angular\n"},
+    {"geometry_msgs/msg/Accel", "Vector3 linear\nVector3 angular\n"},
+    {"geometry_msgs/msg/AccelStamped", "std_msgs/Header header\nAccel accel\n"},
     {"geometry_msgs/msg/TwistWithCovariance", "Twist twist\nfloat64[36] covariance\n"},
     {"geometry_msgs/msg/Transform", "Vector3 translation\nQuaternion rotation\n"},
     {"geometry_msgs/msg/TransformStamped", "std_msgs/Header header\nstring child_frame_id\nTransform transform\n"},

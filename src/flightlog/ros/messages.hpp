@@ -20,7 +20,8 @@ namespace type_name {
 inline constexpr const char *kPoseStamped = "geometry_msgs/msg/PoseStamped", *kImu = "sensor_msgs/msg/Imu",
                             *kJointState = "sensor_msgs/msg/JointState",
                             *kBatteryState = "sensor_msgs/msg/BatteryState", *kTFMessage = "tf2_msgs/msg/TFMessage",
-                            *kClock = "rosgraph_msgs/msg/Clock", *kWingInput = "flappy_msgs/msg/WingInput";
+                            *kClock = "rosgraph_msgs/msg/Clock", *kWingInput = "flappy_msgs/msg/WingInput",
+                            *kAccelStamped = "geometry_msgs/msg/AccelStamped";
 }  // namespace type_name
 
 }  // namespace flappy::flightlog::ros

@@ -1,6 +1,7 @@
 #include "gap/replay/reset_prediction.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -20,6 +21,9 @@ constexpr std::size_t kSignals = kBattery, kMetered = sim::kMeterRows;
 static_assert(kPathX == kSignals + kMetered);
 static_assert(kTorqueX == int{kTurning} && kForceX == int{kForce} && kStrokeLeft == int{kStroke} &&
               kSignals == kResetRows);
+
+/// Samples of all lanes.
+constexpr std::size_t kSample = kSignals * kVehicles, kMeter = kMetered * kVehicles;
 
 /// Rounding error of a time, in steps.
 constexpr double kSameStep = 1e-3;
@@ -233,10 +237,16 @@ bool ResetPrediction::covers(std::size_t beat, int channel) const {
   return imu_.covers(beat);
 }
 
-std::vector<Rows> ResetPrediction::predict(const std::vector<const VehicleHypothesis*>& vehicles) const {
+struct ResetPrediction::Replay {
+  std::vector<Flown> samples;  ///< [interval][signal][lane]
+  std::vector<double> power;   ///< [sample of power.csv][metered][lane]
+  std::array<bool, kVehicles> diverged{};
+};
+
+/// Lanes beyond the given vehicles repeat the last one.
+ResetPrediction::Replay ResetPrediction::replay(const std::vector<const VehicleHypothesis*>& vehicles) const {
   const Recording& r = recording_;
   const ResetBlock reset = *reset_block_kernels[sim::place_of("")];
-  const ProjectBlock project = *project_block_kernels[sim::place_of("")];
   const auto driven = [&](std::size_t i) {
     model::Vehicle vehicle = vehicles[std::min(i, vehicles.size() - 1)]->vehicle;
     apply(r.log.header.changes, vehicle);
@@ -262,12 +272,10 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const VehicleHypoth
 
   const int longest = *std::ranges::max_element(r.steps);
   std::vector<Flown> voltages_V(static_cast<std::size_t>(longest) * 2 * kVehicles);
-  constexpr std::size_t kSample = kSignals * kVehicles;
-  std::vector<Flown> samples(r.intervals() * kSample);
+  Replay result;
+  result.samples.resize(r.intervals() * kSample);
   // readings of the last step before an interval, then of each step of the interval
-  constexpr std::size_t kMeter = kMetered * kVehicles;
   std::vector<Flown> meter(r.log.power ? (static_cast<std::size_t>(longest) + 1) * kMeter : 0);
-  std::vector<double> power;
   std::size_t step = 0, metered = 0;
   for (std::size_t k = 0; k < r.intervals(); ++k) {
     for (std::size_t lane = 0; lane < kVehicles; ++lane) {
@@ -280,27 +288,35 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const VehicleHypoth
     if (r.log.power) in_force.meter = meter.data() + kMeter;
     storage.kernel(block, in_force, plan, 0, r.steps[k], {});
     reset(block, &r.torso[k], r.torso[k + 1], r.interval_s(k), imu_m, r.world.gravity_m_s2, kept);
-    std::copy_n(&kept.rows[0][0], kSample, &samples[k * kSample]);
+    std::copy_n(&kept.rows[0][0], kSample, &result.samples[k * kSample]);
     for (; metered < power_step_.size() && power_step_[metered] + 1 < step; ++metered) {
       const double late = power_late_[metered];
       const Flown* now = &meter[(power_step_[metered] + 1 + static_cast<std::size_t>(r.steps[k]) - step) * kMeter];
       for (std::size_t i = 0; i < kMeter; ++i) {
         const double here = now[i], sample = here + late * (here - double{now[i + kMeter]});
-        power.push_back(i < kVehicles ? r.full * r.log.header.power->battery_nominal_V * sample : sample);
+        result.power.push_back(i < kVehicles ? r.full * r.log.header.power->battery_nominal_V * sample : sample);
       }
     }
     if (r.log.power) std::copy_n(&meter[static_cast<std::size_t>(r.steps[k]) * kMeter], kMeter, meter.data());
   }
+  for (std::size_t lane = 0; lane < kVehicles; ++lane) result.diverged[lane] = (batch.status(lane) & sim::kFrozen) != 0;
+  return result;
+}
 
+std::vector<Rows> ResetPrediction::predict(const std::vector<const VehicleHypothesis*>& vehicles) const {
+  const Recording& r = recording_;
+  const ProjectBlock project = *project_block_kernels[sim::place_of("")];
+  const Replay seen = replay(vehicles);
   std::vector<Flown> together(r.beats * kCoefficients * kSample, 0);
   imu_.for_each([&](std::size_t sample, std::size_t beat, const double(&weights)[kCoefficients]) {
-    project(&samples[sample * kSample], weights, kCoefficients, kSignals, &together[beat * kCoefficients * kSample]);
+    project(&seen.samples[sample * kSample], weights, kCoefficients, kSignals,
+            &together[beat * kCoefficients * kSample]);
   });
   Rows metered_together(r.log.power ? r.beats * kCoefficients * kMetered * kVehicles : 0, 0);
-  if (r.log.power) power_.project(power.data(), kMetered * kVehicles, metered_together.data());
+  if (r.log.power) power_.project(seen.power.data(), kMetered * kVehicles, metered_together.data());
   std::vector<Rows> result(vehicles.size());
   for (std::size_t lane = 0; lane < vehicles.size(); ++lane) {
-    if (batch.status(lane) & sim::kFrozen) continue;
+    if (seen.diverged[lane]) continue;
     Rows& rows = result[lane];
     rows.resize(r.beats * kRowsPerBeat);
     put_channels(together, r.beats, kSignals, kVehicles, lane, 0, rows);
@@ -308,6 +324,27 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const VehicleHypoth
     if (r.log.power) put_channels(metered_together, r.beats, kMetered, kVehicles, lane, kBattery, rows);
   }
   return result;
+}
+
+std::vector<ImuResidual> ResetPrediction::imu_residuals(const VehicleHypothesis& vehicle) const {
+  const Recording& r = recording_;
+  const Replay seen = replay({&vehicle});
+  std::vector<ImuResidual> list;
+  for (std::size_t k = 0; !seen.diverged[0] && k < r.intervals(); ++k) {
+    const auto sample = r.smoother.imu_sample(r.end_s[k] - r.interval_s(k) / 2);
+    if (!sample || !r.valid[k] || r.beat[k] < kSpinUpBeats) continue;
+    if (!list.empty() && list.back().sample == *sample) continue;  // a gap of the IMU, cut into pieces
+    ImuResidual left{*sample, r.force_m_s2[k], Eigen::Vector3d::Zero()};
+    for (int i = 0; i < 3; ++i) {
+      const auto predicted = [&](int row) {
+        return double{seen.samples[k * kSample + static_cast<std::size_t>(row + i) * kVehicles]};
+      };
+      left.force_m_s2[i] -= predicted(kForceX);
+      left.rate_rad_s[i] = -r.interval_s(k) * predicted(kTorqueX);
+    }
+    list.push_back(left);
+  }
+  return list;
 }
 
 template <class Value>

@@ -13,6 +13,13 @@
 
 namespace flappy::gap {
 
+/// What the IMU measured in one of its intervals, less what a vehicle predicts: specific force, and the rate that the
+/// vehicle gains in this interval alone, both in B.
+struct ImuResidual {
+  std::size_t sample = 0;  ///< of imu.csv
+  Eigen::Vector3d force_m_s2, rate_rad_s;
+};
+
 class ResetPrediction final : public PredictedFlight {
  public:
   explicit ResetPrediction(Recording recording);
@@ -28,6 +35,8 @@ class ResetPrediction final : public PredictedFlight {
   const Rows& signal() const override { return signal_; }
   /// Takes 1 to kVehicles vehicles (reset_kernel.hpp). The rows of a vehicle whose simulation diverges are empty.
   std::vector<Rows> predict(const std::vector<const VehicleHypothesis*>& vehicles) const override;
+  /// In the intervals whose sample and motion are known, once the wings have spun up; empty if the simulation diverges.
+  std::vector<ImuResidual> imu_residuals(const VehicleHypothesis& vehicle) const;
   void weigh(Rows& rows) const override;
   Rows declared_noise(std::uint64_t seed) const override;
   std::vector<RegimeFunction> functions() const override;
@@ -47,6 +56,8 @@ class ResetPrediction final : public PredictedFlight {
   template <class Value>
   std::vector<double> each(const Value& value) const;
   Rows rows_of(const std::vector<double>& samples) const;
+  struct Replay;
+  Replay replay(const std::vector<const VehicleHypothesis*>& vehicles) const;
 
   void lay_power(std::size_t first_beat);
   void put_power(const std::vector<double>& samples, Rows& rows) const;
