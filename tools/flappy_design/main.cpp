@@ -104,7 +104,7 @@ int main(int argc, char** argv) {
     const std::vector<double> most = design::given_away(search);
     show(search, most);
     design::write_results(folder, judge, search, history, {});
-    verify(judge, search, config, history, folder, train_config);
+    if (config.verify.designs > 0) verify(judge, search, config, history, folder, train_config);
     program.write_json({{"designs", history.back().designs},
                         {"front", history.back().front},
                         {"hypervolume", history.back().hypervolume},
