@@ -24,6 +24,8 @@ namespace {
 
 constexpr const char* kStages[] = {"built", "stand", "hover", "escape", "effects"};
 constexpr double kCrossover = 0.9, kCrossoverIndex = 10, kMutationIndex = 20;  // Deb's, for real variables
+constexpr double kAway = 0.1;                   // sd of first designs about the published one, in shares of each range
+constexpr std::uint32_t kNearBuilt = 1U << 31;  // takes the place of a generation in the keys of their random numbers
 constexpr double kRefused =
     10;  // an objective of refused designs, more for each stage that they miss: worse than any other
 
@@ -211,7 +213,13 @@ bool Search::run(const std::function<bool(const Generation&)>& progress) try {
     return true;
   }
   std::vector<std::vector<double>> first = points(0);
-  first[0] = judge_.config().space.unit(judge_.config().space.built);
+  const std::vector<double> built = judge_.config().space.unit(judge_.config().space.built);
+  for (unsigned i = 0; i < config_.population / 2; ++i)
+    for (std::size_t k = 0; k < n; ++k) {
+      const sim::RandomKey key{config_.seed, i, kNearBuilt, sim::Stream::design};
+      const double away = i == 0 ? 0 : kAway * sim::normal(key, static_cast<std::uint32_t>(k));
+      first[i][k] = std::clamp(built[k] + away, 0.0, 1.0);
+    }
   const std::vector<std::vector<double>> values = judge_all(first);
   pagmo::population population(pagmo::problem(Problem{this}), 0, static_cast<unsigned>(config_.seed));
   for (std::size_t i = 0; i < first.size(); ++i) population.push_back(first[i], values[i]);

@@ -1,5 +1,6 @@
 // The search for designs that no other design beats in every objective: pagmo's NSGA-II (Deb et al., IEEE T-EC 6, 2002)
-// over the unit cube of the variables, or random points of it. Each point is rounded to the workshop's steps and judged
+// over the unit cube of the variables, half of whose first generation is near the published robot; or random points
+// of it. Each point is rounded to the workshop's steps and judged
 // once. A search is a function of its configuration: one that was stopped takes the designs that it judged from its
 // record and goes the same way again.
 #pragma once
