@@ -131,7 +131,7 @@ void write_for_runtimes(Export& e, const Request& request, const learn::Finished
     e.files["policy.pt"] = policy::torch_script(network, deploy::contract_text(run.fly, run.info));
     try_out("policy.pt", "TorchScript", "torch_script_error");
   } else {
-    std::printf("policy.pt is not written: this build has no LibTorch\n");
+    std::printf("policy.pt is not written: this build has no LibTorch (package flappy-torch)\n");
   }
   if (policy::writes_onnx()) {
     e.files["policy.onnx"] =
