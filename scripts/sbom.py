@@ -13,12 +13,12 @@ import subprocess
 import sys
 import uuid
 import zipfile
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from email import message_from_bytes
 from importlib.metadata import version
 from pathlib import Path
 
-from cyclonedx.model import HashAlgorithm, HashType
+from cyclonedx.model import HashAlgorithm, HashType, Property
 from cyclonedx.model.bom import Bom
 from cyclonedx.model.component import Component, ComponentType
 from cyclonedx.output import make_outputter
@@ -66,7 +66,7 @@ def needs_of_wheel(wheel: Path) -> set[Component]:
     found = {library(PackageURL("pypi", None, "nanobind", version("nanobind")))}
     with zipfile.ZipFile(wheel) as archive:
         for name in archive.namelist():
-            if "/sboms/" in name:
+            if ".dist-info/sboms/" in name and name.endswith(".json"):
                 for each in json.loads(archive.read(name))["components"]:
                     if each["purl"].startswith("pkg:deb"):
                         found.add(library(PackageURL.from_string(each["purl"])))
@@ -80,15 +80,10 @@ def needs_of_wheel(wheel: Path) -> set[Component]:
 def main(build: Path, out: Path) -> None:
     number = re.search(r"project\(flappy VERSION ([\d.]+)", Path("CMakeLists.txt").read_text())[1]
     commit = said("git", "rev-parse", "HEAD").strip()
-    whole = Component(
-        name="flappy",
-        version=number,
-        type=ComponentType.APPLICATION,
-        bom_ref="flappy",
-        purl=PackageURL("generic", None, "flappy", number, {"vcs_url": f"git@{commit}"}),
-    )
+    whole = Component(name="flappy", version=number, type=ComponentType.APPLICATION, bom_ref="flappy")
+    whole.properties.add(Property(name="flappy:commit", value=commit))
     bom = Bom(serial_number=uuid.uuid5(uuid.NAMESPACE_OID, commit))
-    bom.metadata.timestamp = datetime.fromtimestamp(int(os.environ["SOURCE_DATE_EPOCH"]), timezone.utc)
+    bom.metadata.timestamp = datetime.fromtimestamp(int(os.environ["SOURCE_DATE_EPOCH"]), UTC)
     bom.metadata.component = whole
     known: dict[str, Component] = {}
     built_from = compiled_in(build)
