@@ -4,7 +4,7 @@ install(FILES LICENSE DESTINATION share/doc/libflappy-dev RENAME copyright COMPO
 install(FILES README.md CHANGELOG.md packaging/flappy-server.service DESTINATION share/doc/flappy COMPONENT programs)
 install(DIRECTORY docs DESTINATION share/doc/flappy COMPONENT programs)
 # licences of what is compiled in, as Debian states them
-foreach(name IN ITEMS libeigen3-dev libtomlplusplus-dev libcli11-dev nlohmann-json3-dev librandom123-dev libpagmo-dev libboost1.74-dev libspdlog-dev libjs-three libjs-chart.js)
+foreach(name IN ITEMS libeigen3-dev libtomlplusplus-dev libcli11-dev nlohmann-json3-dev librandom123-dev libpagmo-dev libspdlog-dev libjs-three libjs-chart.js)
   if(EXISTS /usr/share/doc/${name}/copyright)
     install(FILES /usr/share/doc/${name}/copyright DESTINATION share/doc/flappy/licences RENAME ${name} COMPONENT programs)
   endif()

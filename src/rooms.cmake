@@ -51,7 +51,11 @@ function(flappy_plugin name source)
   target_link_libraries(flappy_${name} PRIVATE flappy_io ${ARGN} flappy_options flappy_hardening)
   target_compile_options(flappy_${name} PRIVATE $<$<CONFIG:Release>:-O1>)  # their work is done in the libraries that they open
   set_property(GLOBAL APPEND PROPERTY flappy_installed flappy_${name})
-  install(TARGETS flappy_${name} LIBRARY DESTINATION lib/flappy COMPONENT $<IF:$<STREQUAL:${name},onnx>,programs,torch>)
+  set(component torch)
+  if(name STREQUAL "onnx")
+    set(component programs)
+  endif()
+  install(TARGETS flappy_${name} LIBRARY DESTINATION lib/flappy COMPONENT ${component})
 endfunction()
 
 # Objects of one source compiled once for each instruction set, with further options. The second time round, with a suffix, only v3
