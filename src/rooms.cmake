@@ -10,6 +10,11 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   target_compile_options(flappy_options INTERFACE --param=ggc-min-heapsize=1000000)
 endif()
 
+# What guards a program that reads what others wrote. Kernels read nothing, and go without, as their speed is all they have.
+add_library(flappy_hardening INTERFACE)
+target_compile_options(flappy_hardening INTERFACE $<$<CONFIG:Release>:-U_FORTIFY_SOURCE -D_FORTIFY_SOURCE=2 -fstack-protector-strong>)
+target_link_options(flappy_hardening INTERFACE -Wl,-z,relro -Wl,-z,now $<$<STREQUAL:$<TARGET_PROPERTY:TYPE>,EXECUTABLE>:-pie>)
+
 # A folder is a room, and a room is a static library; headers are included from src/ and include/. Its sources are all of the
 # folders given, but for those of kernels, which are compiled once for each instruction set.
 function(flappy_room name)
@@ -26,7 +31,7 @@ function(flappy_room name)
     $<BUILD_INTERFACE:${CMAKE_CURRENT_FUNCTION_LIST_DIR}> $<BUILD_INTERFACE:${CMAKE_CURRENT_FUNCTION_LIST_DIR}/../include>
     $<INSTALL_INTERFACE:include>)
   target_include_directories(${name} SYSTEM PUBLIC $<BUILD_INTERFACE:${RANDOM123_INCLUDE}>)
-  target_link_libraries(${name} PRIVATE $<BUILD_INTERFACE:flappy_options>)
+  target_link_libraries(${name} PRIVATE $<BUILD_INTERFACE:flappy_options> $<BUILD_INTERFACE:flappy_hardening>)
 endfunction()
 
 # One C++ source that holds text files, of this folder or by their full paths, by their names, in the map that a header declares.
@@ -43,9 +48,14 @@ endfunction()
 function(flappy_plugin name source)
   add_library(flappy_${name} MODULE ${source})
   set_target_properties(flappy_${name} PROPERTIES PREFIX "" OUTPUT_NAME ${name} LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/flappy)
-  target_link_libraries(flappy_${name} PRIVATE flappy_io ${ARGN} flappy_options)
+  target_link_libraries(flappy_${name} PRIVATE flappy_io ${ARGN} flappy_options flappy_hardening)
   target_compile_options(flappy_${name} PRIVATE $<$<CONFIG:Release>:-O1>)  # their work is done in the libraries that they open
-  install(TARGETS flappy_${name} LIBRARY DESTINATION lib/flappy)
+  set_property(GLOBAL APPEND PROPERTY flappy_installed flappy_${name})
+  set(component torch)
+  if(name STREQUAL "onnx")
+    set(component programs)
+  endif()
+  install(TARGETS flappy_${name} LIBRARY DESTINATION lib/flappy COMPONENT ${component})
 endfunction()
 
 # Objects of one source compiled once for each instruction set, with further options. The second time round, with a suffix, only v3

@@ -9,11 +9,9 @@ import flappy
 
 chunk = pytest.importorskip("rerun.chunk")
 
-CONFIG = Path(__file__).parents[2] / "configs" / "fly" / "hover.toml"
-
 
 def test_a_flight_comes_back(tmp_path: Path) -> None:
-    flappy.fly(CONFIG, log=tmp_path / "flight", overrides=["flight.duration_s=0.3"])
+    flappy.fly("fly/hover.toml", log=tmp_path / "flight", overrides=["flight.duration_s=0.3"])
     flight = flappy.read_flight(tmp_path / "flight")
     flappy.to_rerun(tmp_path / "flight", tmp_path / "flight.rrd")
     read = {}

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "io/installation.hpp"
 #include "io/renamed_keys.hpp"
 #include "io/schema.hpp"
 #include "io/toml.hpp"
@@ -526,7 +527,8 @@ void Table::finish() const { refuse_unasked(*section_); }
 Config::Config(std::shared_ptr<Document> document) : document_(std::move(document)) {}
 
 Config Config::load(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
-  return parse(read_text(path), path.string(), overrides);
+  const std::filesystem::path file = shipped(path);
+  return parse(read_text(file), file.string(), overrides);
 }
 
 Config Config::parse(std::string_view text, const std::string& name, const std::vector<std::string>& overrides) {

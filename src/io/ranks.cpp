@@ -126,7 +126,7 @@ std::unique_ptr<Ranks> meet(const Rank& rank, bool allow_network, const std::str
   static const auto* const functions =
       plugin<RanksFunctions>("ranks", "flappy_ranks_functions",
                              "several ranks need LibTorch with Gloo (libtorch-dev, libgloo-dev), which this build has "
-                             "not; accepted: one rank");
+                             "not; accepted: one rank, or the package flappy-torch");
   std::unique_ptr<Ranks> ranks = functions->meet(rank);
   const auto all = ranks->gather(std::as_bytes(std::span(agreed)));
   const auto text = [&](std::size_t r) {

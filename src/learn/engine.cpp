@@ -227,10 +227,10 @@ class TorchEngine : public LearnerEngine {
 }  // namespace
 
 const TorchLearnerFunctions& torch_functions() {
-  static const auto* const functions =
-      io::plugin<TorchLearnerFunctions>(kPlugin, "flappy_torch_learner_functions",
-                                        "learn.engine: libtorch is not in this build; accepted: \"lanes\", or all that "
-                                        "scripts/build builds where libtorch-dev is installed");
+  static const auto* const functions = io::plugin<TorchLearnerFunctions>(
+      kPlugin, "flappy_torch_learner_functions",
+      "learn.engine: libtorch is not in this build; accepted: \"lanes\", the package "
+      "flappy-torch, or all that scripts/build builds where libtorch-dev is installed");
   return *functions;
 }
 

@@ -119,7 +119,8 @@ class Reader {
     const io::Table t = root_.table("learn");
     const bool on_libtorch = t.choice_or("engine", "lanes", {"lanes", "libtorch"}) == "libtorch";
     if (on_libtorch && !has_libtorch())
-      t.fail("engine", "is libtorch, which this build has not", "\"lanes\", or a build with libtorch-dev installed");
+      t.fail("engine", "is libtorch, which this build has not",
+             "\"lanes\", the package flappy-torch, or a build with libtorch-dev installed");
     c_.engine = on_libtorch ? EngineKind::libtorch : EngineKind::lanes;
     l.weight_decay = t.number_or("weight_decay", 0, {0, 1});
     l.gradient_clip = t.number_or("gradient_clip", 0, {0, 1e6});

@@ -165,7 +165,7 @@ std::unique_ptr<const Policy> load_torch_script(const fs::path& path, int observ
   if (reads_torch_script()) return torch().load(path, observations, actions);
   io::read_text(path);
   refuse(path, "cannot be read by this build, which has no LibTorch",
-         "a C header (.h), or a build with libtorch-dev installed");
+         "a C header (.h), the package flappy-torch, or a build with libtorch-dev installed");
 }
 
 }  // namespace flappy::policy

@@ -151,8 +151,8 @@ TEST(TorchScriptPolicy, IsNotReadWithoutLibTorch) {
   const std::string name = folder.write("p.pt", "");
   EXPECT_EQ(message([&] { policy::load_policy(name, 3, 2); }),
             name +
-                ": cannot be read by this build, which has no LibTorch; accepted: a C header (.h), or a build with "
-                "libtorch-dev installed");
+                ": cannot be read by this build, which has no LibTorch; accepted: a C header (.h), the "
+                "package flappy-torch, or a build with libtorch-dev installed");
 }
 #endif
 

@@ -28,7 +28,7 @@ if(TORCH)
   list(APPEND expected policy.pt)
   expect_match("stdout" "${out}" "TorchScript differs by at most, % of an output's range: amplitude [0-9.e-]+ ")
 else()
-  expect_match("stdout" "${out}" "policy.pt is not written: this build has no LibTorch\n")
+  expect_match("stdout" "${out}" "policy.pt is not written: this build has no LibTorch .package flappy-torch.\n")
 endif()
 if(ONNX)
   list(APPEND expected policy.onnx)
@@ -142,13 +142,21 @@ run(${WORK}/run --out ${WORK}/blocked)
 expect_equal("stderr" "${err}" "${WORK}/blocked/flappy_policy.h: cannot be written: Is a directory\n")
 file(GLOB there RELATIVE ${WORK}/blocked ${WORK}/blocked/* ${WORK}/blocked/.*)
 expect_equal("files" "${there}" "flappy_policy.h")
-# nothing that is not proven
-execute_process(COMMAND ${CMAKE_COMMAND} -E env PATH=${WORK} ${PROGRAM} ${WORK}/run --out ${WORK}/unproven OUTPUT_QUIET
+# where there is no compiler
+execute_process(COMMAND ${CMAKE_COMMAND} -E env PATH=${WORK} ${PROGRAM} ${WORK}/run --out ${WORK}/unproven --prove OUTPUT_QUIET
   ERROR_VARIABLE err RESULT_VARIABLE code)
-expect_equal("stderr" "${err}" "cc: is not in PATH, and nothing is written that is not proven; accepted: a C compiler\n")
+expect_equal("stderr" "${err}" "--prove: there is no compiler in PATH; accepted: a C compiler\n")
 expect_equal("exit code" "${code}" 2)
 file(GLOB there ${WORK}/unproven/*)
 expect_equal("files" "${there}" "")
+execute_process(COMMAND ${CMAKE_COMMAND} -E env PATH=${WORK} ${PROGRAM} ${WORK}/run --out ${WORK}/unproven OUTPUT_VARIABLE out
+  ERROR_VARIABLE err RESULT_VARIABLE code)
+expect_equal("stderr" "${err}" "")
+expect_equal("exit code" "${code}" 0)
+expect_match("stdout" "${out}" "flappy_policy.h is not proven: cc is not in PATH; its self-test is to pass on the target\n")
+file(SHA256 ${WORK}/unproven/flappy_policy.h unproven)
+file(SHA256 ${WORK}/out/flappy_policy.h proven)
+expect_equal("header" "${unproven}" "${proven}")
 
 # ---- what it refuses, and leaves nothing of
 
