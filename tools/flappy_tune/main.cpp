@@ -35,8 +35,8 @@ int main(int argc, char** argv) {
       std::printf("generation %u of %u: cost %.4f, %.0f s\n", ++generation, config.generations, r.cost, wall_s);
       std::fflush(stdout);
       if (program.writes())
-        io::write_atomically(
-            out, rollout::controller_text(r.best, "Tuned by flappy-tune, generation " + std::to_string(r.generations) + "."));
+        io::write_atomically(out, rollout::controller_text(r.best, "Tuned by flappy-tune, generation " +
+                                                                       std::to_string(r.generations) + "."));
       return !io::any(config.ranks, io::interrupted());
     });
     program.write_json({{"start_cost", before}, {"cost", result.cost}, {"generations", generation}});
