@@ -54,7 +54,7 @@ def against_random(seeds):
     print("|---|---|---|---|---|")
     shares = []
     for seed in seeds:
-        nsga2, random = searched(seed, "nsga2", 20), searched(seed, "random", 160)
+        nsga2, random = searched(seed, "nsga2", 45), searched(seed, "random", 400)
         budget = nsga2[-1][0]
         if random[-1][0] < budget:
             sys.exit(f"seed {seed}: random points flew less than NSGA-II: more generations")
