@@ -99,7 +99,7 @@ TEST_F(FlownTest, FindsEachMistakeAgain) {
   EXPECT_EQ(right.share, 1);
   int number = 0, tried = 0, found = 0, silent = 0;
   for (const Mistake& m : mistakes_of(check_->contract(), *exact_, false)) {
-    if (number++ % 16 != 0 && !test::full()) continue;  // each takes half a second
+    if (number++ % 8 != 0 && !test::full()) continue;  // each takes half a second
     std::vector<double> p = m.starts.empty() ? std::vector<double>() : m.starts.front();
     for (std::size_t k = 0; k < p.size(); ++k) p[k] += 0.7 * m.scales[k];  // not where the search begins
     Wiring wiring;
