@@ -47,7 +47,7 @@ double inertia(const WholeBody& body, Axis axis) {
 }
 
 void put_stand(const Robot& robot, const Stand& s, double weight_N, Figures& f) {
-  const auto put = [&](Figure which, double value) { f[static_cast<std::size_t>(which)] = value; };
+  const auto put = [&](Figure which, double value) { figure_of(f, which) = value; };
   put(Figure::lift_over_weight, s.most_lift_N / weight_N);
   if (!s.hovers) return;
   put(Figure::stroke, s.hover.stroke_rad);
@@ -146,19 +146,20 @@ void Judge::fly(const rollout::FlyConfig& config, std::size_t count, std::uint32
     time_s.push_back(o.success() ? o.captured_s : kInfinity);
     if (o.success()) power_W.push_back(o.energy_J / o.manoeuvre_s);
   }
-  const auto put = [&](Figure which, double value) { into.figures[static_cast<std::size_t>(which)] = value; };
   const double share = static_cast<double>(successes) / static_cast<double>(count);
   if (stage == Stage::escape) {
-    put(Figure::escape_success, share);
-    put(Figure::escape_time, io::median(time_s));
+    figure_of(into.figures, Figure::escape_success) = share;
+    figure_of(into.figures, Figure::escape_time) = io::median(time_s);
   } else {
-    put(Figure::hover_success, share);
-    put(Figure::hover_power, power_W.empty() ? kInfinity : io::mean(power_W));
-    put(Figure::endurance, power_W.empty() ? 0 : into.robot.battery_J / io::mean(power_W));
+    const double mean_W = power_W.empty() ? kInfinity : io::mean(power_W);
+    figure_of(into.figures, Figure::hover_success) = share;
+    figure_of(into.figures, Figure::hover_power) = mean_W;
+    figure_of(into.figures, Figure::endurance) = into.robot.battery_J / mean_W;
   }
 }
 
-Judged Judge::judge(const Values& values, Stage upto, std::uint32_t first_flapper) const {
+Judged Judge::judge(const Values& values, Stage upto) const {
+  constexpr std::uint32_t first_flapper = rollout::kTrainingFlappers;
   Judged j{.robot = build(config_.space, values),
            .controller = config_.hover.fleet.controller,
            .figures = {},
@@ -167,7 +168,7 @@ Judged Judge::judge(const Values& values, Stage upto, std::uint32_t first_flappe
   j.refused = j.robot.refused;
   if (!j.refused.empty()) return j;
   const WholeBody body = whole_body(j.robot.vehicle);
-  j.figures[static_cast<std::size_t>(Figure::mass)] = body.mass_kg;
+  figure_of(j.figures, Figure::mass) = body.mass_kg;
   if (!allowed(j, Stage::built) || upto == Stage::built) return j;
 
   const rollout::FlyConfig& hover = config_.hover;
@@ -202,7 +203,7 @@ Judged Judge::judge(const Values& values, Stage upto, std::uint32_t first_flappe
     j.flown_s += with.flown_s;
     ++effects;
   }
-  j.figures[static_cast<std::size_t>(Figure::effects_success)] = successes / static_cast<double>(effects);
+  figure_of(j.figures, Figure::effects_success) = successes / static_cast<double>(effects);
   allowed(j, Stage::effects);
   return j;
 }

@@ -1,5 +1,5 @@
-// What a robot is worth: figures of its construction, of the stand, and of closed-loop flights of many vehicles drawn
-// about it, with a controller fitted to it.
+// Judges a robot by its figures: of its construction, of the stand, and of closed-loop flights. The flights are of many
+// vehicles drawn about it, under gains that are fitted to it.
 #pragma once
 
 #include <array>
@@ -44,11 +44,13 @@ struct FigureInfo {
   Stage stage;  ///< the first that computes it
 };
 const FigureInfo& info_of(Figure figure);
-bool is_share(Figure figure);  ///< of drawn vehicles: changes are points, not shares of it
+/// Whether the figure is a share of the drawn vehicles, whose changes are counted in points.
+bool is_share(Figure figure);
 std::optional<Figure> figure_named(const std::string& name);
 
 /// [figure]; NaN where it was not computed.
 using Figures = std::array<double, kFigures>;
+inline double& figure_of(Figures& f, Figure which) { return f[static_cast<std::size_t>(which)]; }
 inline double figure_of(const Figures& f, Figure which) { return f[static_cast<std::size_t>(which)]; }
 
 struct Judged {
@@ -78,15 +80,15 @@ class Judge {
   explicit Judge(JudgeConfig config);
 
   const JudgeConfig& config() const { return config_; }
-  /// Judges on one thread, up to a stage, or up to the first limit that is not met. `first_flapper`: of the vehicles.
-  Judged judge(const Values& values, Stage upto, std::uint32_t first_flapper = rollout::kTrainingFlappers) const;
+  /// Judges on one thread, up to a stage, or up to the first limit that is not met.
+  Judged judge(const Values& values, Stage upto) const;
   /// The flights of a robot with a controller: `which` is the configuration's hover or escape.
   rollout::FlyConfig flights(const rollout::FlyConfig& which, const Robot& robot,
                              const flight::Controller& controller) const;
   /// The gains of the configuration's controller, which were tuned on the built robot, scaled so that with the moments
   /// and inertias of this one errors lead to the same accelerations.
   flight::Controller fitted(const Robot& robot, const Stand& stand) const;
-  /// Figures of hover flights, or of escapes, as `figures` shall have them.
+  /// Flies hovers or escapes, as `stage` says, and puts their figures and the time flown into `into`.
   void fly(const rollout::FlyConfig& config, std::size_t count, std::uint32_t first_flapper, Stage stage,
            Judged& into) const;
 
@@ -94,7 +96,7 @@ class Judge {
   bool allowed(Judged& judged, Stage stage) const;
 
   JudgeConfig config_;
-  Stand built_;  ///< of the published robot
+  Stand built_;  ///< what the stand measures of the published robot
 };
 
 }  // namespace flappy::design

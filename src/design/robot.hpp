@@ -1,4 +1,4 @@
-// What a workshop can build: a published robot, what may be changed of it, and the vehicle that follows.
+// Builds the vehicle of a design: a published robot, changed in what a workshop can change.
 //
 // Everything that is not varied stays as published. A change moves mass by laws: of the wing's panel and rod
 // (design/wing.hpp), of the motor from the catalogue, and of the battery, each as what the new part has minus what the
@@ -28,20 +28,21 @@ struct MotorType {
 struct Workshop {
   std::vector<MotorType> motors;
   std::size_t built_motor = 0;
-  model::Triple motor_m, battery_m;  ///< of the left motor relative to its shoulder (mirrored on the right); in B
-  Panel panel;                       ///< its areal density is that of the built wing
-  std::vector<double> rods_m;        ///< diameters in stock
+  model::Triple motor_m;       ///< from the left shoulder to the left motor, in B; mirrored on the right
+  model::Triple battery_m;     ///< in B
+  Panel panel;                 ///< its areal density is that of the built wing
+  std::vector<double> rods_m;  ///< diameters in stock
   double built_rod_m = 0, rod_kg_m3 = 0;
   double least_chord_m = 0;      ///< a narrower panel cannot be glued
   double wing_clearance_m = 0;   ///< least distance between the two leading edges at the ends of the strokes
   double pinion_m = 0;           ///< pitch radius of the motor's pinion; that of the wheel is so much times the ratio
   double built_wheel_kg_m2 = 0;  ///< inertia of the built wheel about the stroke's axis
   double battery_J_kg = 0;       ///< usable energy per mass
-  double cell_V = 0;             ///< of one cell; batteries are whole numbers of cells
+  double cell_V = 0;             ///< voltage of a cell; a battery is a whole number of cells in series
   double ambient_C = 0, flight_s = 0;  ///< a flight so long heats the windings
 };
 
-/// What can be varied, by its name in a configuration.
+/// The quantities of a robot that a search can vary; info_of() names them.
 enum class Quantity {
   wing_length,
   mean_chord,
@@ -83,7 +84,7 @@ struct Space {
   model::Vehicle published;
   Workshop workshop;
   std::vector<Variable> variables;
-  Values built;  ///< of the published robot
+  Values built;  ///< values that the published robot has
 
   /// Values of a point of the unit cube, [variable], rounded to their steps.
   Values values(const std::vector<double>& unit) const;

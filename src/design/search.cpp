@@ -68,6 +68,10 @@ Record read_record(const std::string& line) {
 
 }  // namespace
 
+bool beats_published(const std::vector<double>& objectives) {
+  return std::ranges::all_of(objectives, [](double x) { return x < 0; });
+}
+
 Record record_of(const Judged& j) { return {j.robot.values, j.figures, j.reached, j.flown_s, j.refused}; }
 
 std::string record_head() {
@@ -240,7 +244,7 @@ std::vector<Record> Search::records() const {
   std::vector<Record> list;
   const std::set<Values> ordered(order_.begin(), order_.end());
   for (const Values& v : order_) list.push_back(known_.at(v));
-  for (const auto& [v, record] : known_)  // of a generation that was stopped, or of a record that goes on
+  for (const auto& [v, record] : known_)  // a stopped generation judged some that no point has asked for since
     if (!ordered.contains(v)) list.push_back(record);
   return list;
 }
@@ -265,7 +269,7 @@ double Search::hypervolume() const {
   std::vector<std::vector<double>> better;
   for (const Record& r : front()) {
     const std::vector<double> f = objectives(r);
-    if (std::ranges::all_of(f, [](double x) { return x < 0; })) better.push_back(f);
+    if (beats_published(f)) better.push_back(f);
   }
   if (better.empty()) return 0;
   return pagmo::hypervolume(better, true).compute(std::vector<double>(config_.objectives.size(), 0));

@@ -22,7 +22,7 @@ struct SearchConfig {
   io::Ranks* ranks = nullptr;  ///< each rank judges its share of a generation
 };
 
-/// What the record keeps of a judged design.
+/// A judged design, as designs.csv keeps it.
 struct Record {
   Values values;
   Figures figures;
@@ -45,6 +45,9 @@ struct Generation {
   double hypervolume = 0;
 };
 
+/// Whether objectives, as Search::objectives() gives them, are all better than those of the published robot.
+bool beats_published(const std::vector<double>& objectives);
+
 class Search {
  public:
   /// `known`: records of a search that was stopped.
@@ -54,6 +57,7 @@ class Search {
   bool run(const std::function<bool(const Generation&)>& progress);
 
   const SearchConfig& config() const { return config_; }
+  Stage upto() const { return upto_; }  ///< the last stage that objectives and limits need
   const Record& published() const { return published_; }
   /// All designs, in the order in which they were asked for.
   std::vector<Record> records() const;

@@ -25,10 +25,6 @@ double distance(const std::vector<double>& a, const std::vector<double>& b, cons
   return sum;
 }
 
-bool beats_published(const std::vector<double>& objectives) {
-  return std::ranges::all_of(objectives, [](double x) { return x < 0; });
-}
-
 std::vector<std::string> limits_of(const Judge& judge, const Values& values, const Figures& figures) {
   std::vector<std::string> list;
   for (const Variable& v : judge.config().space.variables) {
@@ -79,15 +75,13 @@ Figures fly_again(const Judge& judge, const DesignConfig& config, Judged& j, dou
 
 std::vector<std::vector<double>> sensitivity_of(const Judge& judge, const Search& search, const Values& at) {
   std::vector<std::vector<double>> list;
-  Stage upto = Stage::built;
-  for (const Figure f : search.config().objectives) upto = std::max(upto, info_of(f).stage);
   const auto& variables = judge.config().space.variables;
   std::vector<Record> ends(2 * variables.size());
   io::parallel_for(ends.size(), search.config().threads, [&](std::size_t i) {
     const Variable& v = variables[i / 2];
     Values values = at;
     value_of(values, v.quantity) *= 1 + (i % 2 == 0 ? -kShare : kShare);
-    if (v.choices.empty()) ends[i] = record_of(judge.judge(values, upto));
+    if (v.choices.empty()) ends[i] = record_of(judge.judge(values, search.upto()));
   });
   for (std::size_t i = 0; i < variables.size(); ++i) {
     list.emplace_back(search.config().objectives.size(), kMissing);

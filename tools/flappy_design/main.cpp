@@ -96,8 +96,8 @@ int main(int argc, char** argv) {
       return !io::interrupted();
     });
     if (!program.writes()) return;
-    design::write_records(folder, search, history);
     if (!done) {
+      design::write_records(folder, search, history);
       std::printf("stopped; the same command goes on\n");
       return;
     }
