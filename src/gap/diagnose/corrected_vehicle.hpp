@@ -8,8 +8,8 @@ namespace flappy::gap {
 
 /// The vehicle with the parameters and effects of inference.predicting(): the conclusion's, and perhaps further effects.
 /// Its posterior has their uncertainty. The conclusion none leaves the vehicle as it is, except for its name.
-/// `uncertain` has the minor draws of the inference (set_minors); they shift parameters and do not enter the posterior.
+/// The minor draws of `inference` shift parameters and do not enter the posterior.
 model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Inference& inference,
-                                 const sim::Randomisation& uncertain);
+                                 sim::Randomisation uncertain);
 
 }  // namespace flappy::gap

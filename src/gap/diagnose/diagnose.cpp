@@ -144,7 +144,7 @@ namespace {
 /// Reference flights and their fit, for all sets that are compared with them.
 struct Reference {
   Flights flights;
-  std::unique_ptr<const RobotFit> fit;
+  std::unique_ptr<const ReferenceFit> fit;
 };
 
 Diagnosed diagnose_flights(const DiagnosisRequest& request, const std::vector<std::string>& tests, Reference& reference,
@@ -175,8 +175,7 @@ Diagnosed diagnose_flights(const DiagnosisRequest& request, const std::vector<st
   options.progress = progress;
   if (references > 0 && !reference.fit) {
     if (progress) progress(0, "fitting the reference");
-    reference.fit = std::unique_ptr<const RobotFit>(new RobotFit(RobotFit::of_references(
-        reference.flights, request.uncertain, options.discrepancy, options.withheld, options.threads)));
+    reference.fit = std::make_unique<const ReferenceFit>(reference.flights, request.uncertain, options);
   }
   d.inference = infer(d.flights, request.uncertain, options, reference.fit.get());
   d.uncertain = request.uncertain;
@@ -184,7 +183,7 @@ Diagnosed diagnose_flights(const DiagnosisRequest& request, const std::vector<st
   d.result = result_of(tests, d.flights, *d.uncertain, d.inference);
   d.result.reference = request.settings.reference;
   if (references > 0) d.result.warnings = contrast_warnings(headers, d.flights);
-  if (d.inference.complete) d.corrected = corrected_vehicle(request.vehicle, d.inference, *d.uncertain);
+  if (d.inference.complete) d.corrected = corrected_vehicle(request.vehicle, d.inference, request.uncertain);
   return d;
 }
 

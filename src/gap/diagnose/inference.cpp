@@ -30,30 +30,38 @@ class Progress {
   bool stopped_ = false;
 };
 
-VectorXd without_background(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit) {
-  if (fitter.evidence().contrasts()) {  // with the parameters of the reference
-    VectorXd at = fit.mean();
-    at.head(hypothesis.shared()) = fit.at.head(hypothesis.shared());
-    return hypothesis.bounded(at);
-  }
-  if (!fitter.evidence().policy().background_in_corrected)
-    return fitter.joint_fit(hypothesis, fit, fitter.all_flights(), false).at;
-  VectorXd at = fitter.refit_without_background(hypothesis, fit).at;
+/// The corrected vehicle has no background magnitudes, so its parameters are fitted without them.
+CorrectedParameters without_background(const RobotFit& robot, const Fitter& fitter, const Hypothesis& hypothesis,
+                                       const Fit& fit) {
+  const Fitter without = fitter.without_background();
+  const bool moves = fitter.evidence().policy().background_in_corrected;
+  const Fitter::JointFit joint =
+      without.joint_fit(hypothesis, moves ? without.refit_effects(hypothesis, fit) : fit, fitter.all_flights());
+  CorrectedParameters c{joint.at, robot.minors_given(joint)};
   // parameters are fitted one by one, so together they may describe a body that cannot exist
-  for (int n = 0; n < kMaxHalvings && model::physical_fault(hypothesis.vehicle(at).vehicle); ++n)
-    at = (at + fit.at) / 2;
-  return at;
+  sim::Randomisation uncertain = robot.uncertain();
+  uncertain.set_minors(c.minors);
+  c.minors = uncertain.minors();
+  const Hypothesis h(uncertain, hypothesis.effects());
+  for (int n = 0; n < kMaxHalvings && model::physical_fault(h.vehicle(c.at).vehicle); ++n) c.at = (c.at + fit.at) / 2;
+  return c;
 }
 
-/// Sets the coordinates of the corrected vehicle, and the errors of the sensors given the conclusion.
-void correct(const RobotFit& robot, const Fitter& fitter, Inference& d) {
+/// Parameters and effects of the corrected vehicle. In a contrast, the parameters are those of the references.
+CorrectedParameters correct(const RobotFit& robot, const Fitter& fitter, const ReferenceFit* reference,
+                            const Inference& d) {
   const ScoredHypothesis& answer = d.predicting();
-  const Hypothesis h(robot.uncertain(), answer.effects);
-  const bool fitted = answer.fitted();
-  d.sensors = fitted ? robot.sensors(fitter, h, answer.fit) : robot.sensors(fitter, robot.no_effects(), d.parameters);
-  if (fitted) d.corrected = without_background(fitter, h, answer.fit);
-  else if (answer.kind == HypothesisKind::effect) d.corrected = h.bounded(answer.fit.mean());
-  else d.corrected = without_background(fitter, robot.no_effects(), d.parameters);
+  const bool has_effects = answer.kind == HypothesisKind::effect;
+  const Hypothesis h(robot.uncertain(), has_effects ? answer.effects : std::vector<std::string>{});
+  if (reference != nullptr) {
+    CorrectedParameters c = reference->corrected;
+    VectorXd at = has_effects ? answer.fit.mean() : h.start();
+    at.head(h.shared()) = c.at;
+    c.at = h.bounded(std::move(at));
+    return c;
+  }
+  if (has_effects && !answer.fitted()) return {h.bounded(answer.fit.mean()), d.minors};
+  return without_background(robot, fitter, h, has_effects ? answer.fit : d.parameters);
 }
 
 }  // namespace
@@ -91,14 +99,23 @@ VerdictRule rule_of(const InferenceOptions& options, const RobotFit& robot) {
 
 }  // namespace
 
+ReferenceFit::ReferenceFit(const Flights& flights, const sim::Randomisation& uncertain, const InferenceOptions& options)
+    : fit(RobotFit::of_references(flights, uncertain, options.discrepancy, options.withheld, options.threads)),
+      corrected{fit.parameters().at, fit.uncertain().minors()} {
+  if (uncertain.nominal().beat_averaged) return;
+  // a contrast needs no description of what the model gets wrong, but the parameters of a corrected vehicle do
+  const RobotFit alone(flights, uncertain, options.discrepancy, options.withheld, options.threads);
+  corrected = without_background(alone, alone.fitter(), alone.no_effects(), alone.parameters());
+}
+
 Inference infer(const Flights& flights, const sim::Randomisation& uncertain, InferenceOptions options,
-                const RobotFit* reference) {
+                const ReferenceFit* reference) {
   const int threads = io::thread_count(options.threads);
   Progress progress(options);
 
   progress(0, "fitting parameters");
   const RobotFit robot = reference != nullptr
-                             ? RobotFit(*reference, flights)
+                             ? RobotFit(reference->fit, flights)
                              : RobotFit(flights, uncertain, options.discrepancy, options.withheld, threads);
   const VerdictRule& rule = options.rule = rule_of(options, robot);
   const Baselines baselines = weigh_baselines(robot, rule);
@@ -128,7 +145,11 @@ Inference infer(const Flights& flights, const sim::Randomisation& uncertain, Inf
 
   hold_out(fitter, robot.uncertain(), flights, threads, d);
   decide(robot, fitter, flights, rule, d);
-  correct(robot, fitter, d);
+  const ScoredHypothesis& predicting = d.predicting();
+  d.sensors = predicting.fitted()
+                  ? robot.sensors(fitter, Hypothesis(robot.uncertain(), predicting.effects), predicting.fit)
+                  : robot.sensors(fitter, robot.no_effects(), d.parameters);
+  d.corrected = correct(robot, fitter, reference, d);
   if (options.residual && d.complete) d.residual = fit_residual_load(robot, fitter, flights, threads, d);
   if (robot.evidence().policy().validate && reference == nullptr)
     d.validation = validate(fitter, robot.uncertain(), flights, d, threads);

@@ -42,9 +42,15 @@ struct ScoredHypothesis {
   double explained() const { return log_evidence - log_prior; }
 };
 
+/// Parameters and effects of the corrected vehicle.
+struct CorrectedParameters {
+  Eigen::VectorXd at;          ///< coordinates of the Hypothesis of predicting()'s effects
+  std::vector<double> minors;  ///< variates for sim::Randomisation::set_minors
+};
+
 /// A smooth load on the torso that describes what is left (gap/diagnose/residual_load.hpp).
 struct ResidualLoad {
-  Hypothesis hypothesis;                 ///< the effects of Inference::predicting(), and the load
+  std::vector<std::string> effects;      ///< those of Inference::predicting(), and the load
   Eigen::VectorXd at;                    ///< coordinates of the corrected vehicle, the load's last
   Eigen::MatrixXd covariance;            ///< posterior covariance of the load's coordinates
   std::map<std::string, double> limits;  ///< largest flown velocity or rate, by name of the load's limit
@@ -70,11 +76,9 @@ struct Inference {
   std::size_t concluded = 0;            ///< index of the most probable hypothesis of the verdict
   std::vector<std::string> untestable;  ///< effects that change no row; only for a beat-averaged vehicle
   Fit parameters;                       ///< the parameters fitted without effects
-  /// Coordinates of the corrected vehicle, fitted without background magnitudes: of the Hypothesis of `uncertain` with
-  /// `minors` and the effects of predicting().
-  Eigen::VectorXd corrected;
-  std::vector<double> minors;            ///< variates for sim::Randomisation::set_minors
-  std::vector<SensorFinding> sensors;    ///< errors of declared sensors, given the conclusion
+  CorrectedParameters corrected;
+  std::vector<double> minors;          ///< variates for sim::Randomisation::set_minors, at which hypotheses are fitted
+  std::vector<SensorFinding> sensors;  ///< errors of declared sensors, given the conclusion
   std::optional<ResidualLoad> residual;  ///< only if asked for
   std::optional<Validation> validation;  ///< only for a beat-averaged vehicle (DiagnosisPolicy::validate)
   Residuals nominal;                     ///< residuals of the vehicle file
@@ -86,9 +90,17 @@ struct Inference {
   const ScoredHypothesis& predicting() const;
 };
 
+/// What a contrast takes from its reference flights.
+struct ReferenceFit {
+  /// Keeps a reference to `flights`.
+  ReferenceFit(const Flights& flights, const sim::Randomisation& uncertain, const InferenceOptions& options);
+  RobotFit fit;                   ///< as RobotFit::of_references
+  CorrectedParameters corrected;  ///< without effects
+};
+
 /// Runs all stages on the flights of one robot. After a stop it decides among the hypotheses fitted by then.
-/// `reference`: the fit of the reference flights among them (RobotFit::of_references); null: there are none.
+/// `reference`: of the reference flights among them; null: there are none.
 Inference infer(const Flights& flights, const sim::Randomisation& uncertain, InferenceOptions options,
-                const RobotFit* reference = nullptr);
+                const ReferenceFit* reference = nullptr);
 
 }  // namespace flappy::gap

@@ -43,10 +43,12 @@ std::optional<ResidualLoad> fit_residual_load(const RobotFit& robot, const Fitte
   const ScoredHypothesis& answer = d.predicting();
   std::vector<std::string> effects = answer.effects;
   effects.emplace_back(kResidual);
-  const Hypothesis h(robot.uncertain(), effects);
-  const Index named = d.corrected.size(), load = h.size() - named;
+  sim::Randomisation uncertain = robot.uncertain();
+  uncertain.set_minors(d.corrected.minors);
+  const Hypothesis h(uncertain, effects);
+  const Index named = d.corrected.at.size(), load = h.size() - named;
   VectorXd without = VectorXd::Zero(h.size());
-  without.head(named) = d.corrected;
+  without.head(named) = d.corrected.at;
   const Fit corrected =
       fitter.linearise(h, without, Fitter::axes(h), std::vector<BasisCoefficients>(static_cast<std::size_t>(named)));
   if (!corrected.flown() || Fitter::own_regressors(corrected).columns.size() != static_cast<std::size_t>(load))
@@ -60,7 +62,7 @@ std::optional<ResidualLoad> fit_residual_load(const RobotFit& robot, const Fitte
   };
   const Posterior all = load_given(fitter, corrected, tests);
   const Flights asked = tests_of(flights);
-  ResidualLoad l{h, with(all.mean), all.covariance, flown_limits(asked), {}, {}};
+  ResidualLoad l{effects, with(all.mean), all.covariance, flown_limits(asked), {}, {}};
   if (asked.size() < 2) return l;
   Residuals before, after;
   for (std::size_t f = 0; f < flights.size(); ++f) {

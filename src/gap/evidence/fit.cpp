@@ -28,7 +28,7 @@ constexpr double kMaxDistance = 2;
 /// A change follows a function of the place if its square along it is at least this share of the largest.
 constexpr double kFollows = 0.1;
 constexpr int kMaxEffectSteps = 2;
-constexpr int kMaxWithoutBackground = 6;
+constexpr int kMaxEffectRefits = 6;
 
 }  // namespace
 
@@ -179,6 +179,12 @@ Fitter Fitter::with_scales(Scales scales) const {
   return f;
 }
 
+Fitter Fitter::without_background() const {
+  Fitter f = *this;
+  f.nuisances_.resize(places_.size());  // background magnitudes come last
+  return f;
+}
+
 int Fitter::place_of(const std::string& effect) const {
   const auto at = std::ranges::find(effects_, effect);
   return at == effects_.end() ? -1 : static_cast<int>(at - effects_.begin());
@@ -312,12 +318,8 @@ BasisCoefficients Fitter::discrepancy_sd(const Hypothesis& hypothesis, const Fit
   return (evidence_->discrepancy_sd(scales_).cwiseAbs2() + law_sd(hypothesis, fit).cwiseAbs2()).cwiseSqrt();
 }
 
-Fitter::JointFit Fitter::joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use,
-                                   bool with_background) const {
-  const Regressors all = regressors(fit);
-  Regressors r;
-  for (std::size_t i = 0; i < all.columns.size(); ++i)
-    if (with_background || all.effects[i] < 0) r.add(*all.columns[i], all.prior_means[i]);
+Fitter::JointFit Fitter::joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const {
+  const Regressors r = regressors(fit);
   const Posterior p = Evidence::posterior(
       evidence_->reduce(fit.statistics, r.columns, use, discrepancy_sd(hypothesis, fit)), r.all, r.prior_mean(), false);
   VectorXd along = VectorXd::Zero(static_cast<Index>(fit.columns.size()));
@@ -325,8 +327,12 @@ Fitter::JointFit Fitter::joint_fit(const Hypothesis& hypothesis, const Fit& fit,
   for (std::size_t d = 0; d < fit.columns.size(); ++d)
     if (fit.columns[d].size() > 0) along[static_cast<Index>(d)] = p.mean[k++];
   JointFit joint{hypothesis.bounded(fit.at + fit.directions.axes * along),
-                 BasisCoefficients::Zero(kGroups, evidence_->basis().size())};
-  for (; k < p.mean.size(); ++k) joint.nuisances += p.mean[k] * *r.columns[static_cast<std::size_t>(k)];
+                 BasisCoefficients::Zero(kGroups, evidence_->basis().size()),
+                 {}};
+  for (std::size_t n = 0; k < p.mean.size(); ++k, ++n) {
+    joint.nuisances += p.mean[k] * *r.columns[static_cast<std::size_t>(k)];
+    if (n < places_.size()) joint.means.emplace_back(places_[n], p.mean[k]);
+  }
   return joint;
 }
 
@@ -484,10 +490,8 @@ Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int max_itera
   return improve(hypothesis, std::move(result), max_iterations, nullptr, false);
 }
 
-Fit Fitter::refit_without_background(const Hypothesis& hypothesis, const Fit& before) const {
-  Fitter without = *this;
-  without.nuisances_.resize(places_.size());  // background magnitudes come last
-  return without.improve(hypothesis, before, kMaxWithoutBackground, &before, true);
+Fit Fitter::refit_effects(const Hypothesis& hypothesis, const Fit& before) const {
+  return improve(hypothesis, before, kMaxEffectRefits, &before, true);
 }
 
 /// Gauss-Newton. Columns are kept while steps stay close; the last point gets its own. `columns_are_here`: `fit` has

@@ -53,6 +53,7 @@ class Fitter {
   /// Columns of magnitudes that act linearly and need not be simulated.
   Fitter with_linear_magnitudes(LinearMagnitudes magnitudes) const;
   Fitter with_scales(Scales scales) const;
+  Fitter without_background() const;
 
   const Evidence& evidence() const { return *evidence_; }
   const Scales& scales() const { return scales_; }
@@ -84,9 +85,9 @@ class Fitter {
   struct JointFit {
     Eigen::VectorXd at;
     BasisCoefficients nuisances;
+    std::vector<std::pair<std::size_t, double>> means;  ///< of nuisance regressors: place in with_nuisances, mean
   };
-  JointFit joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use,
-                     bool with_background = true) const;
+  JointFit joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
   /// The part of a fit's residual that everything explains by linear columns, learnt from some flights alone: in a
   /// contrast, changes of the parameters, and what the model gets wrong in both sessions or sessions differ by. Effects
   /// follow the laws of the catalogue.
@@ -113,7 +114,8 @@ class Fitter {
   Fit fit_effects(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters) const;
   /// This and the next continue another fit, along its directions.
   Fit refit(const Hypothesis& hypothesis, const Fit& before, int max_iterations) const;
-  Fit refit_without_background(const Hypothesis& hypothesis, const Fit& before) const;
+  /// Finds new columns of the effects at each point; keeps those of the parameters.
+  Fit refit_effects(const Hypothesis& hypothesis, const Fit& before) const;
   /// A linear fit without a residual, around the magnitudes of the vehicle file. `effects`: columns of the unknowns of
   /// the effects; an unknown with an empty column is not fitted.
   Fit fit_linear(const Hypothesis& hypothesis, const Fit& parameters,

@@ -230,6 +230,13 @@ bool RobotFit::refit_with_minors() {
   return gain > kMinGain_nats;
 }
 
+std::vector<double> RobotFit::minors_given(const Fitter::JointFit& joint) const {
+  std::vector<double> minors = uncertain_.minors();
+  for (const auto& [place, mean] : joint.means)
+    if (place >= sensor_errors_.size()) minors[place - sensor_errors_.size()] += mean;
+  return minors;
+}
+
 Regressors RobotFit::nuisance_regressors() const {
   Regressors r;
   for (const BasisCoefficients& e : sensor_errors_) r.add(e, 0);

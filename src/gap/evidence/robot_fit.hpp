@@ -56,7 +56,10 @@ class RobotFit {
   /// Nats by which an effect's magnitudes are more probable a priori than as its background.
   /// `magnitudes`: in prior standard deviations. Positive favours the effect.
   double beyond_background(const std::string& effect, const Eigen::VectorXd& magnitudes, const Scales& scales) const;
-  /// The IMU's lag, then each error of declared sensors on which the flights have information, given a fit. `fitter`: with the scales of the fit.
+  /// Minor draws of the vehicle given a joint fit of all flights.
+  std::vector<double> minors_given(const Fitter::JointFit& joint) const;
+  /// The IMU's lag, then each error of declared sensors on which the flights have information, given a fit.
+  /// `fitter`: with the scales of the fit.
   std::vector<SensorFinding> sensors(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit) const;
 
   /// Evidence of a hypothesis with its own scales, searched from `start` and from prior scales of its effects'

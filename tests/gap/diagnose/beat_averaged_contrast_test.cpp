@@ -98,7 +98,7 @@ Inference contrast(const Robot& before, const Robot& after, std::vector<std::str
                            .discrepancy = read_model_discrepancy(configs + "beat_averaged/contrast_discrepancy.toml"),
                            .rule = read_verdict_rule(configs + "contrast_verdict.toml")};
   options.discrepancy.session = read_session_variation(configs + "beat_averaged/session_variation.toml");
-  const RobotFit fit = RobotFit::of_references(references, uncertain, options.discrepancy, options.withheld, 0);
+  const ReferenceFit fit(references, uncertain, options);
   return infer(flights, uncertain, std::move(options), &fit);
 }
 

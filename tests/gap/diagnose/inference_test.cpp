@@ -73,7 +73,7 @@ TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
   for (Index i = 0; i < none.shared(); ++i)
     if (none.unknowns()[static_cast<std::size_t>(i)].name.find("rest_angle") != std::string::npos)
       EXPECT_LT(std::sqrt(covariance(i, i)), 0.1);
-  // an effect that changes nothing, here a wall where there is none, exnones just as much given the same parameters
+  // an effect that changes nothing, here a wall where there is none, explains just as much given the same parameters
   const Hypothesis wall(prior, {"wall_effect"});
   Eigen::VectorXd at = wall.start();
   at[wall.shared()] = 1;
@@ -172,7 +172,7 @@ TEST(Screening, FindsALongDelayAndFliesWhatIsLeftWithoutIt) {
 
   // given background magnitudes, the parameters leave to these what they take; a vehicle without them is flown again
   const Fit& given = robot.parameters();
-  const Fit without = robot.fitter().refit_without_background(robot.no_effects(), given);
+  const Fit without = robot.fitter().without_background().refit_effects(robot.no_effects(), given);
   EXPECT_GT((without.at - given.at).cwiseAbs().maxCoeff(), 0.1);
   EXPECT_EQ(robot.no_effects().bounded(without.at), without.at);
   EXPECT_EQ(residuals(flights, {robot.no_effects().vehicle(without.at)}, 2)[0], without.residual);

@@ -111,7 +111,7 @@ TEST_F(Fits, IsGivenNuisances) {
   EXPECT_EQ(*columns.back(), 4 * wind);
   EXPECT_EQ(*scaled.unscaled_regressors(parameters).columns.back(), wind);
   const Fitter::JointFit all = scaled.joint_fit(none, parameters, {1, 1}),
-                         bare = scaled.joint_fit(none, parameters, {1, 1}, false);
+                         bare = scaled.without_background().joint_fit(none, parameters, {1, 1});
   EXPECT_GT(all.nuisances.norm(), bare.nuisances.norm());
 }
 

@@ -47,6 +47,17 @@ TEST_F(RobotFits, FitsParametersAndMinorDraws) {
   EXPECT_LT(refit, nominal);
 }
 
+// A joint fit also moves the minor draws, so a corrected vehicle needs both.
+TEST_F(RobotFits, GivesMinorDrawsOfAJointFit) {
+  const RobotFit robot = RobotFit::planned(*flights_, *priors_, read_model_discrepancy(), 2);
+  const Hypothesis& h = robot.no_effects();
+  const Fitter without = robot.fitter().without_background();
+  const Fitter::JointFit joint =
+      without.joint_fit(h, without.linearise(h, h.start(), Fitter::axes(h)), without.all_flights());
+  EXPECT_EQ(robot.uncertain().minors().at(0), 0);
+  EXPECT_NEAR(robot.minors_given(joint).at(0), 1.5, 0.5);
+}
+
 TEST_F(RobotFits, KnowsWhatMagnitudesChange) {
   const std::vector<MagnitudeColumn>& all = robot_->magnitudes();
   const auto wind = std::ranges::find(all, "wind", &MagnitudeColumn::effect);
