@@ -1,6 +1,7 @@
 """A policy of any Python library as a C header for a microcontroller, proven before it is written."""
 
 import json
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -93,7 +94,7 @@ def export(
     Args:
         module: a torch.nn.Sequential from observations (n, observations) to actions (n, actions) in [-1, 1]. What it makes beyond that
             is clipped, as environments of many libraries do.
-        task: configuration of flappy-fly or the name of one of the package's own, or an environment of it.
+        task: configuration of flappy-fly, as a file or one of the package's own ("fly/hover_direct.toml"), or an environment of it.
         out: folder.
         overrides: as `--set` takes them; an environment has its own.
         mean: (observations,): the module sees clip((observation - mean) * scale, -clip, clip), as running normalisation leaves it.
@@ -103,10 +104,11 @@ def export(
 
     Returns:
         "files"; "largest_difference" to the module on observations of 64 flights, of [-1, 1]; "parity", a row for each compiler:
-        numbers compared ("outputs") and those of which a bit differs ("differing": none).
+        numbers compared ("outputs") and those of which a bit differs ("differing": none). Without a compiler it warns, and the row
+        has "available": False.
 
     Raises:
-        ValueError: a module that cannot be exported, or of other sizes than the task's.
+        ValueError: a module that cannot be exported, or of other sizes than the task's; `everywhere` without a compiler.
         RuntimeError: what was exported does not compute what the module does; nothing is written.
     """
     import torch
@@ -137,4 +139,6 @@ def export(
     if not largest <= TOLERANCE:
         raise RuntimeError(f"the header differs from the module by {largest:.2g}; nothing is written")
     parity = json.loads(result.prove(everywhere))
+    if not any(row["available"] for row in parity):
+        warnings.warn("flappy_policy.h is not proven: cc is not in PATH; its self-test is to pass on the target", stacklevel=2)
     return {"files": result.write(Path(out)), "largest_difference": largest, "parity": parity}

@@ -80,8 +80,8 @@ class PyExport {
     vectors.action = deploy::evaluate(network_, vectors.observation);
     const std::vector<deploy::Parity> rows =
         deploy::prove(work / "", vectors, everywhere ? deploy::Reach::everywhere : deploy::Reach::here);
-    if (std::ranges::none_of(rows, &deploy::Parity::available))
-      throw io::InputError("cc: is not in PATH, and nothing is written that is not proven; accepted: a C compiler");
+    if (everywhere && std::ranges::none_of(rows, &deploy::Parity::available))
+      throw io::InputError("everywhere: there is no compiler in PATH; accepted: a C compiler");
     if (std::ranges::any_of(rows, &deploy::Parity::failed))
       throw std::runtime_error("flappy_policy.h does not compute what the network does; nothing is written:\n" +
                                deploy::table_of(rows));
