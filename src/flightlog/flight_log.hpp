@@ -257,6 +257,9 @@ FlightLog parse_flight_log(const LogFiles& files, const std::filesystem::path& f
 /// InputError "place: ..." where the log has declared inputs. A log with voltages always has an IMU with a gyro.
 void require_voltages(const FlightLog& log, const std::string& place);
 
+/// The folder itself if it is a flight log, else the flight logs in it by name; none: empty.
+std::vector<std::filesystem::path> flights_in(const std::filesystem::path& folder);
+
 /// InputError where one folder is given twice, even under two names.
 void check_each_once(const std::vector<std::string>& folders);
 

@@ -70,6 +70,16 @@ struct SiblingFolder {
 
 }  // namespace
 
+std::vector<fs::path> flights_in(const fs::path& folder) {
+  std::error_code error;
+  if (fs::exists(folder / kHeader, error)) return {folder};
+  std::vector<fs::path> flights;
+  for (const fs::directory_entry& e : fs::directory_iterator(folder, error))
+    if (fs::exists(e.path() / kHeader, error)) flights.push_back(e.path());
+  std::ranges::sort(flights);
+  return flights;
+}
+
 void check_each_once(const std::vector<std::string>& folders) {
   for (std::size_t i = 0; i < folders.size(); ++i)
     for (std::size_t k = 0; k < i; ++k)
@@ -91,6 +101,8 @@ FlightLog read_flight_log(const fs::path& folder) {
     if (!nearest.empty()) files[name] = io::read_text(entry.path());
   }
   if (error) refuse(folder, "cannot be read: " + error.message(), "");
+  if (const std::vector<fs::path> inside = flights_in(folder); !inside.empty() && inside.front() != folder)
+    refuse(folder, "is no flight, but a folder of " + std::to_string(inside.size()), (folder / "*").string());
   for (const auto& name : {kHeader, kCommand, kMocap}) files[name] = io::read_text(folder / name);
   FlightLog log = parse_flight_log(files, folder);
   const auto warn = [&](const char* table, const std::string& name) {

@@ -79,9 +79,6 @@ void Command::renamed_flag(const std::string& name, const std::string& now) cons
   app_->add_flag_callback(name, [=] { throw InputError(name + ": has another name now; accepted: " + now); })
       ->group("");
 }
-Command Command::hidden_command(const std::string& name) const {
-  return Command(app_->add_subcommand(name)->group("")->allow_extras()->fallthrough(false));
-}
 void Command::expect_commands(std::size_t least, std::size_t most) const { app_->require_subcommand(least, most); }
 bool Command::given() const { return app_->parsed(); }
 

@@ -49,8 +49,6 @@ class Command {
   /// Accepts the old name of a flag, hidden from --help, and throws InputError with its new name.
   void renamed_flag(const std::string& name, const std::string& now) const;
   Command command(const std::string& name, const std::string& help) const;
-  /// A command hidden from --help that takes any arguments, to report the new name of a renamed command.
-  Command hidden_command(const std::string& name) const;
   void expect_commands(std::size_t least, std::size_t most) const;
 
   bool given() const;

@@ -55,12 +55,7 @@ Kind recognised_json(const fs::path& path) {
 std::vector<fs::path> expanded(const std::vector<fs::path>& paths, std::string& notes) {
   std::vector<fs::path> all;
   for (const fs::path& path : paths) {
-    std::vector<fs::path> flights;
-    std::error_code error;
-    if (!fs::exists(path / "flight.toml", error))
-      for (const auto& entry : fs::directory_iterator(path, error))
-        if (fs::exists(entry.path() / "flight.toml", error)) flights.push_back(entry.path());
-    std::ranges::sort(flights);
+    std::vector<fs::path> flights = flightlog::flights_in(path);
     if (flights.size() > kMaxFlights) {
       notes += "Of " + std::to_string(flights.size()) + " flights in " + path.string() + " the first " +
                std::to_string(kMaxFlights) + " are shown. ";

@@ -505,6 +505,17 @@ TEST_F(FlightLogFolder, RefusesWhatIsNotThere) {
   EXPECT_EQ(read_message(folder_), (folder_ / "flight.toml").string() + ": cannot be read: No such file or directory");
 }
 
+TEST_F(FlightLogFolder, NamesTheFlightsOfAFolderThatIsNone) {
+  write_flight_log(root_ / "robot" / "flight_2", sample_log());
+  write_flight_log(root_ / "robot" / "flight_1", sample_log());
+  const fs::path robot = root_ / "robot";
+  EXPECT_EQ(flightlog::flights_in(robot), (std::vector<fs::path>{robot / "flight_1", robot / "flight_2"}));
+  EXPECT_EQ(flightlog::flights_in(robot / "flight_1"), std::vector<fs::path>{robot / "flight_1"});
+  EXPECT_TRUE(flightlog::flights_in(root_ / "none").empty());
+  EXPECT_EQ(message([&] { read_flight_log(robot); }),
+            robot.string() + ": is no flight, but a folder of 2; accepted: " + robot.string() + "/*");
+}
+
 // Three poses with markers taken for others are left out; a body that is carried elsewhere and stays there is not.
 TEST(Readings, LeaveOutSwappedMarkers) {
   FlightLog log = test::some_log(4);

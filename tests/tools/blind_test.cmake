@@ -75,7 +75,6 @@ expect_refused("${WORK}/note.txt: is no policy; accepted: an actor (.json), Torc
 expect_refused("${SOURCE}/configs/fly/hover.toml: is nothing that this robot can fly; accepted: a PID at 500 Hz, a task with a goal that stands still and a success"
   ${escape} --policy ${WORK}/policy.h --config ${SOURCE}/configs/fly/hover.toml)
 
-expect_refused("oracle: has another name now; accepted: detectability" oracle --vehicle ${vehicle})
 
 # Before hours of work, not after.
 expect_refused("--family d: no such family; accepted: a, b or c" make --family d --set development --out ${WORK}/c)

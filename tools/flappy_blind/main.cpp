@@ -199,7 +199,6 @@ int main(int argc, char** argv) {
       .shows_default();
   detectability.option("--out", command.out, "file for what is found").required();
   detectability.option("--threads", command.threads, "0: one for each processor").range(0, 1024);
-  const io::Command oracle = program.app().hidden_command("oracle");  // former name, refused with a hint
   io::Command make = program.app().command("make", "flies the cases of a benchmark and seals what they are");
   benchmark::MakeCommand made;
   std::string set;
@@ -266,7 +265,6 @@ int main(int argc, char** argv) {
   program.takes_ranks();
   return program.run(argc, argv, [&] {
     using blind::Programme;
-    if (oracle.given()) throw io::InputError("oracle: has another name now; accepted: detectability");
     if (make.given()) {
       made.plan.reported = set == "reported";
       const sim::Randomisation uncertain =

@@ -235,13 +235,9 @@ int main(int argc, char** argv) {
   io::Command effects = program.app().command("effects", "lists the catalogue of effects: parameters, ranges, sources");
   bool beat_averaged = false;
   effects.flag("--beat-averaged", beat_averaged, "of a beat-averaged vehicle");
-  const io::Command blind = program.app().hidden_command("blind");  // the benchmark's old place
   program.app().expect_commands(1, 1);
   bool faulty = false;
   const int code = program.run(argc, argv, [&] {
-    if (blind.given())
-      throw io::InputError(
-          "flappy-gap blind: is a program of its own now; accepted: flappy-blind make, flappy-blind score");
     if (check.given() && !exported.empty()) {
       const nlohmann::ordered_json found = gap::check_flown(exported, folders);
       faulty = !found["as_exported"];

@@ -18,14 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Folders of flights in a folder, or the folder itself if it is a flight.
 std::vector<fs::path> flights_of(const fs::path& robot) {
-  if (fs::exists(robot / "flight.toml")) return {robot};
-  std::vector<fs::path> flights;
-  std::error_code error;
-  for (const fs::directory_entry& e : fs::directory_iterator(robot, error))
-    if (fs::exists(e.path() / "flight.toml")) flights.push_back(e.path());
-  std::ranges::sort(flights);
+  std::vector<fs::path> flights = flightlog::flights_in(robot);
   if (flights.empty()) throw io::InputError(robot.string() + ": no flight; accepted: a folder of flight logs");
   return flights;
 }
