@@ -95,9 +95,10 @@ std::string refusal(const Space& space, const Robot& r) {
   if (const double apart = 2 * value_of(r.values, Quantity::shoulder_y); !(apart >= w.wing_clearance_m))
     return "the wings are " + millimetres(apart) + " apart at the ends of their strokes, less than " +
            millimetres(w.wing_clearance_m);
-  if (const double wheel_m = w.pinion_m * value_of(r.values, Quantity::gear_ratio);
-      !(wheel_m < value_of(r.values, Quantity::shoulder_y)))
-    return "the wheels of the gears, " + millimetres(wheel_m) + " in radius, do not fit beside each other";
+  const double wheel_m = w.pinion_m * value_of(r.values, Quantity::gear_ratio) + w.module_m;
+  if (!(2 * wheel_m + w.wheel_clearance_m <= 2 * value_of(r.values, Quantity::shoulder_y)))
+    return "the wheels of the gears, " + millimetres(wheel_m) +
+           " in radius with their teeth, do not fit beside each other";
   if (const auto fault = model::physical_fault(r.vehicle)) return fault->path + " " + fault->what;
   model::Vehicle copy = r.vehicle;
   for (const model::Parameter& p : model::parameters(copy))

@@ -88,6 +88,8 @@ Workshop read_workshop(const io::Table& root) {
   w.least_chord_m = shop.number("least_chord_m", io::positive(0.1));
   w.wing_clearance_m = shop.number("wing_clearance_m", io::non_negative(0.1));
   w.pinion_m = shop.number("pinion_m", io::positive(0.1));
+  w.module_m = shop.number("module_m", io::positive(0.01));
+  w.wheel_clearance_m = shop.number("wheel_clearance_m", io::non_negative(0.1));
   w.battery_J_kg = shop.number("battery_J_kg", io::positive(1e7));
   w.cell_V = shop.number("cell_V", io::positive(10));
   w.ambient_C = shop.number("ambient_C", {-50, 100});

@@ -86,7 +86,9 @@ TEST(Robot, WhatCannotBeIsRefusedWithAReason) {
   refused({{Quantity::cells, 2}}, "battery without mass");
   refused({{Quantity::battery, 1e-3}}, "battery without cells");
   refused({{Quantity::shoulder_y, 0.009}}, "apart");
-  refused({{Quantity::gear_ratio, 12}}, "do not fit beside each other");
+  // 2 (1.2 N + 0.2) + 0.4 mm of teeth between shoulders that are 27.9 mm apart
+  refused({{Quantity::gear_ratio, 11.3}}, "do not fit beside each other");
+  EXPECT_EQ(with({{Quantity::gear_ratio, 11.25}}).refused, "");
 }
 
 TEST(Space, RoundsToTheStepsOfTheWorkshop) {
