@@ -18,7 +18,7 @@ import sys
 import time
 
 SHIPPED = "configs/design/hummingbird.toml"
-GENERATIONS = 45  # of that file
+GENERATIONS = 45  # search.generations of SHIPPED
 
 
 def design(out, *more):

@@ -36,7 +36,7 @@ struct Workshop {
   double least_chord_m = 0;      ///< a narrower panel cannot be glued
   double wing_clearance_m = 0;   ///< least distance between the two leading edges at the ends of the strokes
   double pinion_m = 0;           ///< pitch radius of the motor's pinion; that of the wheel is so much times the ratio
-  double module_m = 0;           ///< of the gears: by how much teeth rise above the pitch radius
+  double module_m = 0;           ///< of the gear: its teeth rise so far above the pitch radius
   double wheel_clearance_m = 0;  ///< least distance of the teeth of the two wheels
   double built_wheel_kg_m2 = 0;  ///< inertia of the built wheel about the stroke's axis
   double battery_J_kg = 0;       ///< usable energy per mass
