@@ -16,9 +16,9 @@ import statistics
 import subprocess
 import sys
 import time
+import tomllib
 
 SHIPPED = "configs/design/hummingbird.toml"
-GENERATIONS = 45  # search.generations of SHIPPED
 
 
 def design(out, *more):
@@ -92,7 +92,7 @@ def to_build(designs):
 
 def gained(designs, objectives):
     """The largest gain in one objective without loss in the others, of the designs flown again."""
-    better = {"hover_power_W": -1, "escape_time_s": -1, "lift_over_weight": 1}
+    better = {o["figure"]: 1 if o["more_is_better"] else -1 for o in objectives}
     published = designs[0]["verified"]
     for o in objectives:
         gains = []
@@ -123,6 +123,7 @@ parser.add_argument("--seeds", default="0-4")
 parser.add_argument("--train", action="store_true")
 options = parser.parse_args()
 BIN, ROOT, OUT = (f.resolve() for f in options.folders)
+GENERATIONS = tomllib.loads((ROOT / SHIPPED).read_text())["search"]["generations"]
 OUT.mkdir(parents=True, exist_ok=True)
 first, last = options.seeds.split("-")
 against_random(range(int(first), int(last) + 1))

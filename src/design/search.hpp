@@ -41,7 +41,7 @@ std::vector<Record> read_records(const std::filesystem::path& file);
 struct Generation {
   unsigned number = 0;
   std::size_t designs = 0, front = 0;
-  double flown_s = 0;  ///< of all designs so far
+  double flown_s = 0;  ///< time that all designs have flown so far
   double hypervolume = 0;
 };
 

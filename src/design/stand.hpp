@@ -15,7 +15,7 @@ struct StandPoint {
   double lift_N = 0;                  ///< along z of B
   std::array<double, 3> moment_Nm{};  ///< about the centre of mass, in B
   double power_W = 0;                 ///< electrical, of both motors
-  double winding_C = 0;               ///< of the hotter motor, after Workshop::flight_s
+  double winding_C = 0;               ///< temperature of the hotter winding after Workshop::flight_s
   double current_A = 0;               ///< largest, of either motor
   double stroke_rad = 0;              ///< largest angle from the middle, of either wing
   double gear_Nm = 0;                 ///< largest torque of the gear on a wing

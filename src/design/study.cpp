@@ -16,8 +16,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-constexpr double kShare = 0.02;  // of a variable, by which it is changed to both sides
-constexpr double kClose = 0.01;  // of a range or limit: what is so close is at it
+constexpr double kShare = 0.02;  // by which a variable is changed to either side, for its sensitivity
+constexpr double kClose = 0.01;  // a value so close to an end of its range, or to a limit, is at it
 
 double distance(const std::vector<double>& a, const std::vector<double>& b, const std::vector<double>& scale) {
   double sum = 0;

@@ -23,7 +23,7 @@ struct Verified {
   Record record;                           ///< as the search has it
   Judged tuned;                            ///< with tuned gains, on other vehicles, with the configuration's step
   Figures fine;                            ///< the same flights with VerifyConfig::step_s
-  double tuned_cost = 0, fitted_cost = 0;  ///< of flappy-tune; NaN without tuning
+  double tuned_cost = 0, fitted_cost = 0;  ///< costs by flappy-tune; NaN without tuning
   std::vector<std::string> limited_by;     ///< bounds of variables and limits of figures that it is at
   Policy policy;
   /// Change of each objective for 1 % more of each variable, in shares of the published robot; NaN for choices.

@@ -196,7 +196,7 @@ std::vector<Fitter::NuisanceEstimate> Fitter::nuisances(const Fit& fit) const {
   std::vector<NuisanceEstimate> list;
   for (std::size_t k = 0; k < places_.size(); ++k) {
     const Index i = static_cast<Index>(r.columns.size() - nuisances_.size() + k);
-    list.push_back({places_[k], p.mean[i], std::sqrt(p.covariance(i, i))});
+    list.push_back({{places_[k], p.mean[i]}, std::sqrt(p.covariance(i, i))});
   }
   return list;
 }
@@ -331,7 +331,7 @@ Fitter::JointFit Fitter::joint_fit(const Hypothesis& hypothesis, const Fit& fit,
                  {}};
   for (std::size_t n = 0; k < p.mean.size(); ++k, ++n) {
     joint.nuisances += p.mean[k] * *r.columns[static_cast<std::size_t>(k)];
-    if (n < places_.size()) joint.means.emplace_back(places_[n], p.mean[k]);
+    if (n < places_.size()) joint.means.push_back({places_[n], p.mean[k]});
   }
   return joint;
 }

@@ -63,10 +63,13 @@ class Fitter {
   int place_of(const std::string& effect) const;
   std::vector<char> all_flights() const { return std::vector<char>(flights_->size(), 1); }
 
-  /// Posterior of a nuisance regressor, given a fit.
-  struct NuisanceEstimate {
+  struct NuisanceMean {
     std::size_t place;  ///< index in `nuisances` of with_nuisances
-    double mean, sd;
+    double mean;        ///< posterior mean of the regressor's coefficient
+  };
+  /// Posterior of a nuisance regressor, given a fit.
+  struct NuisanceEstimate : NuisanceMean {
+    double sd;
   };
   /// Posteriors of all nuisance regressors that were not left out.
   std::vector<NuisanceEstimate> nuisances(const Fit& fit) const;
@@ -85,7 +88,7 @@ class Fitter {
   struct JointFit {
     Eigen::VectorXd at;
     BasisCoefficients nuisances;
-    std::vector<std::pair<std::size_t, double>> means;  ///< of nuisance regressors: place in with_nuisances, mean
+    std::vector<NuisanceMean> means;  ///< of all nuisance regressors that were not left out
   };
   JointFit joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
   /// The part of a fit's residual that everything explains by linear columns, learnt from some flights alone: in a

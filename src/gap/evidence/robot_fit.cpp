@@ -210,9 +210,7 @@ bool RobotFit::refit_with_minors() {
   const std::vector<double> minors = uncertain_.minors();
   const Fit parameters = parameters_;
   const double before = log_evidence();
-  std::vector<double> there = minors;
-  for (const Fitter::NuisanceEstimate& n : fitter_.nuisances(parameters_))
-    if (n.place >= sensor_errors_.size()) there[n.place - sensor_errors_.size()] += n.mean;
+  const std::vector<double> there = minors_moved_by(fitter_.nuisances(parameters_));
   const auto take = [&](const std::vector<double>& variates, Fit fit) {
     uncertain_.set_minors(variates);
     set_nuisances();
@@ -228,13 +226,6 @@ bool RobotFit::refit_with_minors() {
     take_scales();
   }
   return gain > kMinGain_nats;
-}
-
-std::vector<double> RobotFit::minors_given(const Fitter::JointFit& joint) const {
-  std::vector<double> minors = uncertain_.minors();
-  for (const auto& [place, mean] : joint.means)
-    if (place >= sensor_errors_.size()) minors[place - sensor_errors_.size()] += mean;
-  return minors;
 }
 
 Regressors RobotFit::nuisance_regressors() const {

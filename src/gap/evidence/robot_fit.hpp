@@ -57,7 +57,7 @@ class RobotFit {
   /// `magnitudes`: in prior standard deviations. Positive favours the effect.
   double beyond_background(const std::string& effect, const Eigen::VectorXd& magnitudes, const Scales& scales) const;
   /// Minor draws of the vehicle given a joint fit of all flights.
-  std::vector<double> minors_given(const Fitter::JointFit& joint) const;
+  std::vector<double> minors_given(const Fitter::JointFit& joint) const { return minors_moved_by(joint.means); }
   /// The IMU's lag, then each error of declared sensors on which the flights have information, given a fit.
   /// `fitter`: with the scales of the fit.
   std::vector<SensorFinding> sensors(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit) const;
@@ -90,6 +90,14 @@ class RobotFit {
   void set_nuisances();
   void widen_effects();
   bool refit_with_minors();
+  /// The minor draws moved by the means of their nuisance regressors. `means`: of Fitter::NuisanceMean.
+  template <class Means>
+  std::vector<double> minors_moved_by(const Means& means) const {
+    std::vector<double> minors = uncertain_.minors();
+    for (const Fitter::NuisanceMean& n : means)
+      if (n.place >= sensor_errors_.size()) minors[n.place - sensor_errors_.size()] += n.mean;
+    return minors;
+  }
   void take_scales() { fitter_ = fitter_.with_scales(find_scales(no_effects_, parameters_, fitter_.scales())); }
   void take_evidence(Evidence evidence) {
     fitter_ = fitter_.with_evidence(std::make_shared<const Evidence>(std::move(evidence)));
