@@ -104,7 +104,7 @@ ReferenceFit::ReferenceFit(const Flights& flights, const sim::Randomisation& unc
       corrected{fit.parameters().at, fit.uncertain().minors()} {
   if (uncertain.nominal().beat_averaged) return;
   // a contrast needs no description of what the model gets wrong, but the parameters of a corrected vehicle do
-  const RobotFit alone(flights, uncertain, options.discrepancy, options.withheld, options.threads);
+  const RobotFit alone = fit.with_nuisances();
   corrected = without_background(alone, alone.fitter(), alone.no_effects(), alone.parameters());
 }
 
