@@ -10,13 +10,14 @@ model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Inference&
   uncertain.set_minors(inference.corrected.minors);
   const ScoredHypothesis& best = inference.predicting();
   const ResidualLoad* load = inference.residual ? &*inference.residual : nullptr;
-  const Hypothesis h(uncertain, load != nullptr ? load->effects : best.effects);
+  const Hypothesis h(uncertain, load != nullptr ? load->effects : inference.corrected.effects);
   const Fit& fit = best.kind == HypothesisKind::effect ? best.fit : inference.parameters;
   model::Vehicle corrected = vehicle;
   if (best.kind != HypothesisKind::none || load != nullptr) {
     const Eigen::VectorXd& mean = load != nullptr ? load->at : inference.corrected.at;
     Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(h.size(), h.size());
-    covariance.topLeftCorner(inference.corrected.at.size(), inference.corrected.at.size()) = fit.covariance();
+    const Eigen::MatrixXd known = fit.covariance();
+    covariance.topLeftCorner(known.rows(), known.cols()) = known;
     if (load != nullptr)
       covariance.bottomRightCorner(load->covariance.rows(), load->covariance.cols()) = load->covariance;
     const auto at = [&](const Eigen::VectorXd& coordinates) {

@@ -52,8 +52,10 @@ void write_files(const std::filesystem::path& out, const Diagnosed& d) {
   for (const char* name : {kDiagnosisFile, kVehicleFile, kResidualsFile, kHypothesesFile})
     if (std::error_code error; true) std::filesystem::remove(out / name, error);
   if (d.corrected)
-    io::write_atomically(out / kVehicleFile,
-                         "# Corrected by flappy-gap diagnose.\n" + model::vehicle_text(*d.corrected));
+    io::write_atomically(
+        out / kVehicleFile,
+        "# Corrected by flappy-gap diagnose. Effects that its report does not name make up for errors of the model.\n" +
+            model::vehicle_text(*d.corrected));
   write_diagnosis(out, d.result);
 }
 

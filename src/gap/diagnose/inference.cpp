@@ -30,20 +30,99 @@ class Progress {
   bool stopped_ = false;
 };
 
-/// The corrected vehicle has no background magnitudes, so its parameters are fitted without them.
-CorrectedParameters without_background(const RobotFit& robot, const Fitter& fitter, const Hypothesis& hypothesis,
-                                       const Fit& fit) {
+/// How far a joint fit moves the coordinates of unknowns, by effect and index of the unknown.
+using Moves = std::map<std::pair<std::string, Eigen::Index>, double>;
+
+/// Of the background magnitudes that change a simulation. `first`: NuisanceMean::place of the first background.
+Moves moves_of(const std::vector<Background>& background, const Fitter::JointFit& joint, std::size_t first) {
+  Moves moves;
+  for (const Fitter::NuisanceMean& n : joint.means) {
+    if (n.place < first) continue;
+    for (const Background::Move& m : background[n.place - first].moves)
+      if (!unknowns_of(m.effect)[static_cast<std::size_t>(m.unknown)].in_log)
+        moves[{m.effect, m.unknown}] += m.by * n.mean;
+  }
+  return moves;
+}
+
+/// The parameters of a joint fit, and effects with its background magnitudes. An effect that would leave its accepted
+/// range has no background.
+CorrectedParameters with_background(const RobotFit& robot, const Fitter& fitter, const Hypothesis& hypothesis,
+                                    const Fit& fit) {
+  const Regressors nuisances = robot.nuisance_regressors();
+  std::vector<Background> background = robot.background(fitter.evidence().discrepancy(), false);
+  for (;;) {
+    const Fitter::JointFit joint =
+        fitter.with_nuisances(nuisances, background, fit).joint_fit(hypothesis, fit, fitter.all_flights());
+    const Moves moves = moves_of(background, joint, nuisances.columns.size());
+    CorrectedParameters c{hypothesis.effects(), {}, robot.minors_given(joint)};
+    for (const auto& [unknown, by] : moves)
+      if (!std::ranges::count(c.effects, unknown.first)) c.effects.push_back(unknown.first);
+    const Hypothesis h(robot.uncertain(), c.effects);
+    c.at = h.start();
+    c.at.head(joint.at.size()) = joint.at;
+    std::vector<std::string> impossible;
+    Eigen::Index first = h.shared();
+    for (const std::string& effect : c.effects) {
+      const auto size = static_cast<Eigen::Index>(unknowns_of(effect).size());
+      for (Eigen::Index k = 0; k < size; ++k)
+        if (const auto move = moves.find({effect, k}); move != moves.end()) c.at[first + k] += move->second;
+      if (!h.bounded(c.at).segment(first, size).isApprox(c.at.segment(first, size))) impossible.push_back(effect);
+      first += size;
+    }
+    const auto left_out = std::erase_if(background, [&](const Background& b) {
+      return !b.moves.empty() && std::ranges::count(impossible, b.moves[0].effect);
+    });
+    if (left_out == 0) return c;
+  }
+}
+
+/// Parameters and effects that predict the flights by themselves. Parameters would make up for what background
+/// magnitudes explain, so a vehicle with wings has these too. All are fitted once more around them: the columns of `fit`
+/// hold only nearby.
+CorrectedParameters corrected_parameters(const RobotFit& robot, const Fitter& fitter, const Hypothesis& hypothesis,
+                                         const Fit& fit) {
   const Fitter without = fitter.without_background();
-  const bool moves = fitter.evidence().policy().background_in_corrected;
-  const Fitter::JointFit joint =
-      without.joint_fit(hypothesis, moves ? without.refit_effects(hypothesis, fit) : fit, fitter.all_flights());
-  CorrectedParameters c{joint.at, robot.minors_given(joint)};
+  const auto jointly = [&](const Hypothesis& h, const Fit& around) {
+    const Fitter::JointFit joint = without.joint_fit(h, around, fitter.all_flights());
+    return CorrectedParameters{h.effects(), joint.at, robot.minors_given(joint)};
+  };
+  CorrectedParameters c;
+  if (fitter.evidence().policy().background_in_corrected) {
+    c = with_background(robot, fitter, hypothesis, fit);
+    const Hypothesis h(robot.uncertain(), c.effects);
+    if (const Fit there = without.fit(h, h.bounded(c.at), 0); there.flown()) c = jointly(h, there);
+  } else {
+    c = jointly(hypothesis, fit);
+  }
   // parameters are fitted one by one, so together they may describe a body that cannot exist
   sim::Randomisation uncertain = robot.uncertain();
   uncertain.set_minors(c.minors);
   c.minors = uncertain.minors();
-  const Hypothesis h(uncertain, hypothesis.effects());
-  for (int n = 0; n < kMaxHalvings && model::physical_fault(h.vehicle(c.at).vehicle); ++n) c.at = (c.at + fit.at) / 2;
+  const Hypothesis h(uncertain, c.effects);
+  VectorXd possible = h.start();
+  possible.head(fit.at.size()) = fit.at;
+  for (int n = 0; n < kMaxHalvings && model::physical_fault(h.vehicle(c.at).vehicle); ++n) c.at = (c.at + possible) / 2;
+  return c;
+}
+
+/// The references' parameters and background, and the test flights' effects. Of an effect that both have, the sum.
+CorrectedParameters with_effects(const sim::Randomisation& uncertain, const CorrectedParameters& reference,
+                                 const Hypothesis& tests, const VectorXd& at) {
+  CorrectedParameters c{tests.effects(), {}, reference.minors};
+  for (const std::string& effect : reference.effects)
+    if (!std::ranges::count(c.effects, effect)) c.effects.push_back(effect);
+  const Hypothesis h(uncertain, c.effects), of_reference(uncertain, reference.effects);
+  c.at = h.start();
+  c.at.head(tests.size()) = at;
+  c.at.head(h.shared()) = reference.at.head(h.shared());
+  for (Eigen::Index i = h.shared(); i < h.size(); ++i)
+    for (Eigen::Index r = h.shared(); r < of_reference.size(); ++r) {
+      const Unknown &u = h.unknowns()[static_cast<std::size_t>(i)],
+                    &v = of_reference.unknowns()[static_cast<std::size_t>(r)];
+      if (u.magnitude && u.effect == v.effect && u.name == v.name) c.at[i] += reference.at[r] - of_reference.start()[r];
+    }
+  c.at = h.bounded(std::move(c.at));
   return c;
 }
 
@@ -53,15 +132,10 @@ CorrectedParameters correct(const RobotFit& robot, const Fitter& fitter, const R
   const ScoredHypothesis& answer = d.predicting();
   const bool has_effects = answer.kind == HypothesisKind::effect;
   const Hypothesis h(robot.uncertain(), has_effects ? answer.effects : std::vector<std::string>{});
-  if (reference != nullptr) {
-    CorrectedParameters c = reference->corrected;
-    VectorXd at = has_effects ? answer.fit.mean() : h.start();
-    at.head(h.shared()) = c.at;
-    c.at = h.bounded(std::move(at));
-    return c;
-  }
-  if (has_effects && !answer.fitted()) return {h.bounded(answer.fit.mean()), d.minors};
-  return without_background(robot, fitter, h, has_effects ? answer.fit : d.parameters);
+  if (reference != nullptr)
+    return with_effects(robot.uncertain(), reference->corrected, h, has_effects ? answer.fit.mean() : h.start());
+  if (has_effects && !answer.fitted()) return {h.effects(), h.bounded(answer.fit.mean()), d.minors};
+  return corrected_parameters(robot, fitter, h, has_effects ? answer.fit : d.parameters);
 }
 
 }  // namespace
@@ -101,11 +175,11 @@ VerdictRule rule_of(const InferenceOptions& options, const RobotFit& robot) {
 
 ReferenceFit::ReferenceFit(const Flights& flights, const sim::Randomisation& uncertain, const InferenceOptions& options)
     : fit(RobotFit::of_references(flights, uncertain, options.discrepancy, options.withheld, options.threads)),
-      corrected{fit.parameters().at, fit.uncertain().minors()} {
+      corrected{{}, fit.parameters().at, fit.uncertain().minors()} {
   if (uncertain.nominal().beat_averaged) return;
   // a contrast needs no description of what the model gets wrong, but the parameters of a corrected vehicle do
   const RobotFit alone = fit.with_nuisances();
-  corrected = without_background(alone, alone.fitter(), alone.no_effects(), alone.parameters());
+  corrected = corrected_parameters(alone, alone.fitter(), alone.no_effects(), alone.parameters());
 }
 
 Inference infer(const Flights& flights, const sim::Randomisation& uncertain, InferenceOptions options,

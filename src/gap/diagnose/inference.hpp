@@ -44,13 +44,14 @@ struct ScoredHypothesis {
 
 /// Parameters and effects of the corrected vehicle.
 struct CorrectedParameters {
-  Eigen::VectorXd at;          ///< coordinates of the Hypothesis of predicting()'s effects
-  std::vector<double> minors;  ///< variates for sim::Randomisation::set_minors
+  std::vector<std::string> effects;  ///< those of Inference::predicting(), then those of background magnitudes alone
+  Eigen::VectorXd at;                ///< coordinates of their Hypothesis
+  std::vector<double> minors;        ///< variates for sim::Randomisation::set_minors
 };
 
 /// A smooth load on the torso that describes what is left (gap/diagnose/residual_load.hpp).
 struct ResidualLoad {
-  std::vector<std::string> effects;      ///< those of Inference::predicting(), and the load
+  std::vector<std::string> effects;      ///< those of CorrectedParameters, and the load
   Eigen::VectorXd at;                    ///< coordinates of the corrected vehicle, the load's last
   Eigen::MatrixXd covariance;            ///< posterior covariance of the load's coordinates
   std::map<std::string, double> limits;  ///< largest flown velocity or rate, by name of the load's limit

@@ -40,8 +40,7 @@ Posterior load_given(const Fitter& fitter, const Fit& corrected, const std::vect
 
 std::optional<ResidualLoad> fit_residual_load(const RobotFit& robot, const Fitter& fitter, const Flights& flights,
                                               int threads, const Inference& d) {
-  const ScoredHypothesis& answer = d.predicting();
-  std::vector<std::string> effects = answer.effects;
+  std::vector<std::string> effects = d.corrected.effects;
   effects.emplace_back(kResidual);
   sim::Randomisation uncertain = robot.uncertain();
   uncertain.set_minors(d.corrected.minors);

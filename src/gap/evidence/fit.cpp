@@ -145,9 +145,8 @@ Fitter Fitter::with_nuisances(const Regressors& nuisances, const std::vector<Bac
                               const Fit& fit) const {
   Fitter f = *this;
   f.nuisances_.clear();
-  f.places_.clear();
   Regressors all = own_regressors(fit);
-  const std::size_t first = all.columns.size(), scaled = first + nuisances.columns.size();
+  const std::size_t first = all.columns.size();
   for (std::size_t k = 0; k < nuisances.columns.size(); ++k) all.add(*nuisances.columns[k], nuisances.prior_means[k]);
   for (const Background& b : background) {
     int effect = f.place_of(b.effect);
@@ -161,8 +160,7 @@ Fitter Fitter::with_nuisances(const Regressors& nuisances, const std::vector<Bac
   for (std::size_t i = first; i < all.columns.size(); ++i) {
     const auto diagonal = static_cast<Index>(i);
     if (!(reduced.sums(diagonal, diagonal) > kMinInformation)) continue;
-    f.nuisances_.push_back({*all.columns[i], {}, all.prior_means[i], all.effects[i], all.priors[i]});
-    if (i < scaled) f.places_.push_back(i - first);
+    f.nuisances_.push_back({*all.columns[i], all.prior_means[i], all.effects[i], all.priors[i], i - first});
   }
   return f.with_scales(scales_);
 }
@@ -171,17 +169,17 @@ Fitter Fitter::with_scales(Scales scales) const {
   Fitter f = *this;
   f.scales_ = std::move(scales);
   for (Nuisance& n : f.nuisances_) {
-    n.scaled = n.column;
     const auto effect = static_cast<std::size_t>(n.effect);
     if (n.effect >= 0)
-      n.scaled *= effect < f.scales_.effects.size() ? f.scales_.effects[effect] : f.scales_.prior_scale(n.prior);
+      n.scale = effect < f.scales_.effects.size() ? f.scales_.effects[effect] : f.scales_.prior_scale(n.prior);
+    n.scaled = n.scale * n.column;
   }
   return f;
 }
 
 Fitter Fitter::without_background() const {
   Fitter f = *this;
-  f.nuisances_.resize(places_.size());  // background magnitudes come last
+  std::erase_if(f.nuisances_, [](const Nuisance& n) { return n.effect >= 0; });
   return f;
 }
 
@@ -194,9 +192,10 @@ std::vector<Fitter::NuisanceEstimate> Fitter::nuisances(const Fit& fit) const {
   const Regressors r = regressors(fit);
   const Posterior p = Evidence::posterior(reduce(fit, r), r.all, r.prior_mean());
   std::vector<NuisanceEstimate> list;
-  for (std::size_t k = 0; k < places_.size(); ++k) {
-    const Index i = static_cast<Index>(r.columns.size() - nuisances_.size() + k);
-    list.push_back({{places_[k], p.mean[i]}, std::sqrt(p.covariance(i, i))});
+  const std::size_t own = r.columns.size() - nuisances_.size();
+  for (std::size_t k = 0; k < nuisances_.size() && nuisances_[k].effect < 0; ++k) {
+    const auto i = static_cast<Index>(own + k);
+    list.push_back({{nuisances_[k].place, p.mean[i]}, std::sqrt(p.covariance(i, i))});
   }
   return list;
 }
@@ -331,7 +330,7 @@ Fitter::JointFit Fitter::joint_fit(const Hypothesis& hypothesis, const Fit& fit,
                  {}};
   for (std::size_t n = 0; k < p.mean.size(); ++k, ++n) {
     joint.nuisances += p.mean[k] * *r.columns[static_cast<std::size_t>(k)];
-    if (n < places_.size()) joint.means.push_back({places_[n], p.mean[k]});
+    joint.means.push_back({nuisances_[n].place, nuisances_[n].scale * p.mean[k]});
   }
   return joint;
 }

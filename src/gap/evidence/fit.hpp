@@ -34,8 +34,15 @@ struct Fit {
 
 /// Background magnitude of an effect: a regressor with a standard normal coefficient.
 struct Background {
+  /// An effect's unknown, by index, and by how much the column moves its coordinate.
+  struct Move {
+    std::string effect;
+    Eigen::Index unknown;
+    double by;
+  };
   std::string effect;
   BasisCoefficients column;
+  std::vector<Move> moves = {};  ///< empty: the column is no vehicle's, as that of a shape
 };
 
 /// Fits hypotheses, given evidence, nuisance regressors and scales. Immutable: with_... return a changed copy.
@@ -64,8 +71,8 @@ class Fitter {
   std::vector<char> all_flights() const { return std::vector<char>(flights_->size(), 1); }
 
   struct NuisanceMean {
-    std::size_t place;  ///< index in `nuisances` of with_nuisances
-    double mean;        ///< posterior mean of the regressor's coefficient
+    std::size_t place;  ///< index in `nuisances` of with_nuisances; then in `background`
+    double mean;        ///< posterior mean of the coefficient of the column given to with_nuisances
   };
   /// Posterior of a nuisance regressor, given a fit.
   struct NuisanceEstimate : NuisanceMean {
@@ -88,7 +95,7 @@ class Fitter {
   struct JointFit {
     Eigen::VectorXd at;
     BasisCoefficients nuisances;
-    std::vector<NuisanceMean> means;  ///< of all nuisance regressors that were not left out
+    std::vector<NuisanceMean> means;  ///< of all nuisance regressors and backgrounds that were not left out
   };
   JointFit joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
   /// The part of a fit's residual that everything explains by linear columns, learnt from some flights alone: in a
@@ -147,10 +154,13 @@ class Fitter {
               const Eigen::VectorXd& at) const;
 
   struct Nuisance {
-    BasisCoefficients column, scaled;
+    BasisCoefficients column;
     double prior_mean;
     int effect;  ///< in effects_; -1: none
     ScalePrior prior;
+    std::size_t place;  ///< as NuisanceMean::place
+    double scale = 1;
+    BasisCoefficients scaled = {};
   };
   void add_nuisances(bool scaled, Regressors& to) const;
 
@@ -160,8 +170,6 @@ class Fitter {
   Scales scales_;
   LinearMagnitudes linear_;
   std::vector<Nuisance> nuisances_;
-  /// Indices in `nuisances` of with_nuisances, without those left out; these come first in nuisances_.
-  std::vector<std::size_t> places_;
   std::vector<std::string> effects_;
 };
 

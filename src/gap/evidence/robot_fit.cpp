@@ -261,15 +261,18 @@ std::vector<Background> RobotFit::background(const ModelDiscrepancy& discrepancy
     const std::string& effect = magnitudes_[i].effect;
     const double sd = discrepancy.background_sd(effect);
     if (!of_sides(*model::find_effect(uncertain_.nominal(), effect))) {
-      const auto n = static_cast<double>(magnitudes_[i].near.size());
-      for (const BasisCoefficients& near : magnitudes_[i].near) list.push_back({effect, sd / std::sqrt(n) * near});
+      const double each = sd / std::sqrt(static_cast<double>(magnitudes_[i].near.size()));
+      for (const BasisCoefficients& near : magnitudes_[i].near)
+        list.push_back({effect, each * near, {{effect, magnitudes_[i].unknown, each}}});
       continue;
     }
     if (i + 1 == magnitudes_.size() || magnitudes_[i + 1].effect != effect) continue;
     const std::string both = effect + kOfBoth;
     const BasisCoefficients &left = magnitudes_[i].near[0], &right = magnitudes_[i + 1].near[0];
-    list.push_back({effect, sd * std::numbers::sqrt2 / 2 * (left - right)});
-    list.push_back({both, discrepancy.background_sd(both) * std::numbers::sqrt2 / 2 * (left + right)});
+    const double apart = std::numbers::sqrt2 / 2 * sd,
+                 shared = std::numbers::sqrt2 / 2 * discrepancy.background_sd(both);
+    list.push_back({effect, apart * (left - right), {{effect, 0, apart}, {effect, 1, -apart}}});
+    list.push_back({both, shared * (left + right), {{effect, 0, shared}, {effect, 1, shared}}});
     ++i;
   }
   for (std::size_t i = 0; shapes && i < shapes_.size(); ++i)

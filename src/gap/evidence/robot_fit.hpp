@@ -97,7 +97,8 @@ class RobotFit {
   std::vector<double> minors_moved_by(const Means& means) const {
     std::vector<double> minors = uncertain_.minors();
     for (const Fitter::NuisanceMean& n : means)
-      if (n.place >= sensor_errors_.size()) minors[n.place - sensor_errors_.size()] += n.mean;
+      if (n.place >= sensor_errors_.size() && n.place < sensor_errors_.size() + minors_.size())
+        minors[n.place - sensor_errors_.size()] += n.mean;
     return minors;
   }
   void take_scales() { fitter_ = fitter_.with_scales(find_scales(no_effects_, parameters_, fitter_.scales())); }

@@ -8,14 +8,12 @@ struct DiagnosisPolicy {
   bool flight_offsets;  ///< the regime basis has an offset for each flight but the first
   /// Scales of the model discrepancy and of background magnitudes are fitted for each hypothesis.
   bool discrepancy_scales;
-  bool nuisances_are_noise;  ///< residuals of held-out flights exclude what the nuisance regressors explain
-  bool move_parameters;      ///< parameters are fitted again jointly with the effects that explain most
-  /// The corrected vehicle is refitted by simulation without background magnitudes; false: only linearly, by its
-  /// columns.
-  bool background_in_corrected;
-  bool validate;         ///< ladder, controls and agreements are computed; effects that cannot show are listed
-  double min_step_nats;  ///< least gain of evidence for which a fit takes another step
-  int max_further;       ///< number of effects that are tried at a time, each jointly with the best set
+  bool nuisances_are_noise;      ///< residuals of held-out flights exclude what the nuisance regressors explain
+  bool move_parameters;          ///< parameters are fitted again jointly with the effects that explain most
+  bool background_in_corrected;  ///< the corrected vehicle has effects with the fit's background magnitudes
+  bool validate;                 ///< ladder, controls and agreements are computed; effects that cannot show are listed
+  double min_step_nats;          ///< least gain of evidence for which a fit takes another step
+  int max_further;               ///< number of effects that are tried at a time, each jointly with the best set
 };
 
 /// Vehicles with wings and motors: each step of a fit costs a simulation, so it has to bring more.

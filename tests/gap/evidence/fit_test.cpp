@@ -113,6 +113,11 @@ TEST_F(Fits, IsGivenNuisances) {
   const Fitter::JointFit all = scaled.joint_fit(none, parameters, {1, 1}),
                          bare = scaled.without_background().joint_fit(none, parameters, {1, 1});
   EXPECT_GT(all.nuisances.norm(), bare.nuisances.norm());
+  ASSERT_EQ(bare.means.size(), 1u);
+  ASSERT_EQ(all.means.size(), 2u);
+  EXPECT_EQ(all.means[1].place, 2u) << "after both nuisances";
+  const double both = all.means[0].mean + all.means[1].mean;  // of the same column, whatever its scale
+  EXPECT_NEAR((all.nuisances - both * wind).norm(), 0, 1e-9 * all.nuisances.norm());
 }
 
 // The law of an effect that acts by the place may deviate along the functions of the place that its change follows: each load of the body by the rms

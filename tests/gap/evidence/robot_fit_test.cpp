@@ -76,6 +76,24 @@ TEST_F(RobotFits, KnowsWhatMagnitudesChange) {
   EXPECT_FALSE(ground->large.empty());
 }
 
+// A vehicle takes background magnitudes by their moves, so each column is what its moves change.
+TEST_F(RobotFits, SaysHowBackgroundsMoveUnknowns) {
+  int apart = 0;
+  for (const Background& b : robot_->background(read_model_discrepancy(), false)) {
+    ASSERT_FALSE(b.moves.empty()) << b.effect;
+    BasisCoefficients sum = BasisCoefficients::Zero(b.column.rows(), b.column.cols()), other = sum;
+    for (const Background::Move& m : b.moves)
+      for (const MagnitudeColumn& c : robot_->magnitudes())
+        if (c.effect == m.effect && c.unknown == m.unknown) sum += m.by * c.near.front(), other += m.by * c.near.back();
+    EXPECT_LT(std::min((b.column - sum).norm(), (b.column - other).norm()), 1e-12 * (1 + b.column.norm())) << b.effect;
+    apart += b.moves.size() == 2 && b.moves[0].by == -b.moves[1].by ? 1 : 0;
+  }
+  EXPECT_GT(apart, 0) << "the wings of one effect";
+  for (const Background& b : robot_->background(read_model_discrepancy(), true))
+    if (b.moves.empty()) return;
+  FAIL() << "a shape is no coordinate by itself";
+}
+
 TEST_F(RobotFits, WeighsHypothesesWithScalesOfTheirOwn) {
   const Hypothesis wind(robot_->uncertain(), {"wind"});
   const Fit fit = robot_->fitter().fit_effects(wind, wind.start(), robot_->parameters());
