@@ -33,14 +33,15 @@ class Progress {
 /// How far a joint fit moves the coordinates of unknowns, by effect and index of the unknown.
 using Moves = std::map<std::pair<std::string, Eigen::Index>, double>;
 
-/// Of the background magnitudes that change a simulation. `first`: NuisanceMean::place of the first background.
-Moves moves_of(const std::vector<Background>& background, const Fitter::JointFit& joint, std::size_t first) {
+/// Of the background magnitudes of how wings, hinges and drives work. Those of a place or of the air would follow the
+/// robot to another place. `first`: NuisanceMean::place of the first background.
+Moves moves_of(const ModelDiscrepancy& discrepancy, const std::vector<Background>& background,
+               const Fitter::JointFit& joint, std::size_t first) {
   Moves moves;
   for (const Fitter::NuisanceMean& n : joint.means) {
     if (n.place < first) continue;
     for (const Background::Move& m : background[n.place - first].moves)
-      if (!unknowns_of(m.effect)[static_cast<std::size_t>(m.unknown)].in_log)
-        moves[{m.effect, m.unknown}] += m.by * n.mean;
+      if (std::ranges::count(discrepancy.of_models, m.effect)) moves[{m.effect, m.unknown}] += m.by * n.mean;
   }
   return moves;
 }
@@ -50,11 +51,12 @@ Moves moves_of(const std::vector<Background>& background, const Fitter::JointFit
 CorrectedParameters with_background(const RobotFit& robot, const Fitter& fitter, const Hypothesis& hypothesis,
                                     const Fit& fit) {
   const Regressors nuisances = robot.nuisance_regressors();
-  std::vector<Background> background = robot.background(fitter.evidence().discrepancy(), false);
+  const ModelDiscrepancy& discrepancy = fitter.evidence().discrepancy();
+  std::vector<Background> background = robot.background(discrepancy, false);
   for (;;) {
     const Fitter::JointFit joint =
         fitter.with_nuisances(nuisances, background, fit).joint_fit(hypothesis, fit, fitter.all_flights());
-    const Moves moves = moves_of(background, joint, nuisances.columns.size());
+    const Moves moves = moves_of(discrepancy, background, joint, nuisances.columns.size());
     CorrectedParameters c{hypothesis.effects(), {}, robot.minors_given(joint)};
     for (const auto& [unknown, by] : moves)
       if (!std::ranges::count(c.effects, unknown.first)) c.effects.push_back(unknown.first);
