@@ -1,6 +1,8 @@
 #include "gap/diagnose/inference.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 
 #include "gap/diagnose/effect_fits.hpp"
 #include "gap/diagnose/held_out.hpp"
@@ -15,6 +17,8 @@ namespace {
 using Eigen::VectorXd;
 
 constexpr int kMaxHalvings = 10;
+/// Beyond this a coordinate is out of its range; less is rounding.
+constexpr double kBeyond = 1e-9;
 
 class Progress {
  public:
@@ -46,8 +50,13 @@ Moves moves_of(const ModelDiscrepancy& discrepancy, const std::vector<Background
   return moves;
 }
 
-/// The parameters of a joint fit, and effects with its background magnitudes. An effect that would leave its accepted
-/// range has no background.
+/// Index of the first unknown of an effect.
+Eigen::Index first_of(const Hypothesis& h, const std::string& effect) {
+  return std::ranges::find(h.unknowns(), effect, &Unknown::effect) - h.unknowns().begin();
+}
+
+/// The parameters of a joint fit, and effects with its background magnitudes; one that would leave its accepted range has
+/// none.
 CorrectedParameters with_background(const RobotFit& robot, const Fitter& fitter, const Hypothesis& hypothesis,
                                     const Fit& fit) {
   const Regressors nuisances = robot.nuisance_regressors();
@@ -63,17 +72,12 @@ CorrectedParameters with_background(const RobotFit& robot, const Fitter& fitter,
     const Hypothesis h(robot.uncertain(), c.effects);
     c.at = h.start();
     c.at.head(joint.at.size()) = joint.at;
-    std::vector<std::string> impossible;
-    Eigen::Index first = h.shared();
-    for (const std::string& effect : c.effects) {
-      const auto size = static_cast<Eigen::Index>(unknowns_of(effect).size());
-      for (Eigen::Index k = 0; k < size; ++k)
-        if (const auto move = moves.find({effect, k}); move != moves.end()) c.at[first + k] += move->second;
-      if (!h.bounded(c.at).segment(first, size).isApprox(c.at.segment(first, size))) impossible.push_back(effect);
-      first += size;
-    }
+    for (const auto& [unknown, by] : moves) c.at[first_of(h, unknown.first) + unknown.second] += by;
+    const VectorXd beyond = c.at - h.bounded(c.at);
     const auto left_out = std::erase_if(background, [&](const Background& b) {
-      return !b.moves.empty() && std::ranges::count(impossible, b.moves[0].effect);
+      return std::ranges::any_of(b.moves, [&](const Background::Move& m) {
+        return moves.contains({m.effect, m.unknown}) && std::abs(beyond[first_of(h, m.effect) + m.unknown]) > kBeyond;
+      });
     });
     if (left_out == 0) return c;
   }
@@ -108,7 +112,8 @@ CorrectedParameters corrected_parameters(const RobotFit& robot, const Fitter& fi
   return c;
 }
 
-/// The references' parameters and background, and the test flights' effects. Of an effect that both have, the sum.
+/// The references' parameters and background, and the test flights' effects. The magnitudes of an effect that both have
+/// add up.
 CorrectedParameters with_effects(const sim::Randomisation& uncertain, const CorrectedParameters& reference,
                                  const Hypothesis& tests, const VectorXd& at) {
   CorrectedParameters c{tests.effects(), {}, reference.minors};
@@ -118,12 +123,15 @@ CorrectedParameters with_effects(const sim::Randomisation& uncertain, const Corr
   c.at = h.start();
   c.at.head(tests.size()) = at;
   c.at.head(h.shared()) = reference.at.head(h.shared());
-  for (Eigen::Index i = h.shared(); i < h.size(); ++i)
-    for (Eigen::Index r = h.shared(); r < of_reference.size(); ++r) {
-      const Unknown &u = h.unknowns()[static_cast<std::size_t>(i)],
-                    &v = of_reference.unknowns()[static_cast<std::size_t>(r)];
-      if (u.magnitude && u.effect == v.effect && u.name == v.name) c.at[i] += reference.at[r] - of_reference.start()[r];
+  for (const std::string& effect : reference.effects) {
+    const bool alone = !std::ranges::count(tests.effects(), effect);
+    const Eigen::Index to = first_of(h, effect), from = first_of(of_reference, effect);
+    for (Eigen::Index k = 0; k < static_cast<Eigen::Index>(unknowns_of(effect).size()); ++k) {
+      if (alone) c.at[to + k] = reference.at[from + k];
+      else if (h.unknowns()[static_cast<std::size_t>(to + k)].magnitude)
+        c.at[to + k] += reference.at[from + k] - of_reference.start()[from + k];
     }
+  }
   c.at = h.bounded(std::move(c.at));
   return c;
 }
@@ -179,9 +187,12 @@ ReferenceFit::ReferenceFit(const Flights& flights, const sim::Randomisation& unc
     : fit(RobotFit::of_references(flights, uncertain, options.discrepancy, options.withheld, options.threads)),
       corrected{{}, fit.parameters().at, fit.uncertain().minors()} {
   if (uncertain.nominal().beat_averaged) return;
-  // a contrast needs no description of what the model gets wrong, but the parameters of a corrected vehicle do
-  const RobotFit alone = fit.with_nuisances();
-  corrected = corrected_parameters(alone, alone.fitter(), alone.no_effects(), alone.parameters());
+  // A contrast needs no description of what the model gets wrong, but a corrected vehicle does. In flights that are no
+  // references, effects act.
+  Flights alone;
+  for (const auto& flight : flights) alone.push_back(flight->corrected({}));
+  const RobotFit robot(alone, uncertain, options.discrepancy, options.withheld, options.threads);
+  corrected = corrected_parameters(robot, robot.fitter(), robot.no_effects(), robot.parameters());
 }
 
 Inference infer(const Flights& flights, const sim::Randomisation& uncertain, InferenceOptions options,

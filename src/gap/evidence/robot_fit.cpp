@@ -61,26 +61,6 @@ RobotFit RobotFit::of_references(const Flights& flights, const sim::Randomisatio
   return RobotFit(Stages::parameters, flights, uncertain, discrepancy, std::move(withheld), threads);
 }
 
-RobotFit::RobotFit(const RobotFit& other)
-    : flights_(other.flights_),
-      uncertain_(other.uncertain_),
-      withheld_(other.withheld_),
-      threads_(other.threads_),
-      fitter_(other.fitter_),
-      no_effects_(uncertain_, {}),
-      nominal_(other.nominal_),
-      parameters_(other.parameters_),
-      magnitudes_(other.magnitudes_),
-      shapes_(other.shapes_),
-      sensor_errors_(other.sensor_errors_),
-      minors_(other.minors_) {}
-
-RobotFit RobotFit::with_nuisances() const {
-  RobotFit whole(*this);
-  whole.refit_with_nuisances();
-  return whole;
-}
-
 RobotFit RobotFit::planned(const Flights& flights, const sim::Randomisation& uncertain,
                            const ModelDiscrepancy& discrepancy, int threads) {
   return RobotFit(Stages::planned, flights, uncertain, discrepancy, {}, threads);

@@ -21,8 +21,6 @@ class RobotFit {
   /// needs no further description.
   static RobotFit of_references(const Flights& flights, const sim::Randomisation& uncertain,
                                 const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads);
-  /// Goes on from of_references() to what the first constructor fits.
-  RobotFit with_nuisances() const;
   /// A contrast: `flights` are those of `reference`, set_reference(), and test flights of the same robot. Linearises
   /// around the parameters of `reference`; an effect's magnitude acts in the test flights alone.
   RobotFit(const RobotFit& reference, const Flights& flights);
@@ -30,6 +28,7 @@ class RobotFit {
   /// prior scales of what models get wrong.
   static RobotFit planned(const Flights& flights, const sim::Randomisation& uncertain,
                           const ModelDiscrepancy& discrepancy, int threads);
+  RobotFit(const RobotFit&) = delete;
   RobotFit& operator=(const RobotFit&) = delete;
 
   const Evidence& evidence() const { return fitter_.evidence(); }
@@ -79,7 +78,6 @@ class RobotFit {
   enum class Stages { planned, parameters, all };
   RobotFit(Stages stages, const Flights& flights, const sim::Randomisation& uncertain,
            const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads);
-  RobotFit(const RobotFit& other);
   void fit_parameters();
   void linearise_around(const Fit& parameters);
   void find_nuisance_columns();
