@@ -8,6 +8,7 @@
 #include "fixture.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "refusal.hpp"
+#include "rollout/fly_fixture.hpp"
 
 namespace flappy::design {
 namespace {
@@ -103,6 +104,24 @@ TEST(Space, RoundsToTheStepsOfTheWorkshop) {
       if (v.step > 0) EXPECT_NEAR(steps, std::round(steps), 1e-6) << info_of(v.quantity).name;
     }
     EXPECT_EQ(s.values(s.unit(values)), values);
+  }
+}
+
+// A search goes on from what a diagnosis corrected: its effects stay, its posterior is of parameters that change.
+TEST(DesignConfig, TakesACorrectedVehicle) {
+  model::Vehicle corrected = test::nominal();
+  corrected.effects["wing_damage"] = {{"left_area", 0.04}, {"right_area", 0.0}};
+  corrected.posterior = model::Posterior{{"torso.mass_kg"}, {corrected.torso.mass_kg}, {{1e-12}}};
+  const flight::Folder folder;
+  const std::string file = folder.write("corrected.toml", model::vehicle_text(corrected));
+  const Space s = small_config({"vehicle=" + file}).judge.space;
+  Values longer = s.built;
+  value_of(longer, Quantity::wing_length) -= 0.002;
+  for (const Values& values : {s.built, longer}) {
+    const Robot r = build(s, values);
+    EXPECT_EQ(r.refused, "");
+    EXPECT_EQ(r.vehicle.effects.at("wing_damage").at("left_area"), 0.04);
+    EXPECT_FALSE(r.vehicle.posterior);
   }
 }
 
