@@ -57,6 +57,8 @@ struct ResidualLoad {
   std::map<std::string, double> limits;  ///< largest flown velocity or rate, by name of the load's limit
   /// Mean losses in held-out flights of the corrected vehicle without the load and with it; none: a single flight.
   std::optional<double> loss_without, loss;
+  /// Whether it predicts flights held out better; else the corrected vehicle does without it.
+  bool helps() const { return !loss || !loss_without || *loss < *loss_without; }
 };
 
 struct InferenceOptions {
