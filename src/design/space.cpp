@@ -179,7 +179,7 @@ Space read_space(const io::Table& root) {
   const std::filesystem::path file = root.file("vehicle");
   s.published = model::read_vehicle(file);
   if (!s.published.contact.empty()) root.fail("vehicle", "has points of contact", "a vehicle without contact");
-  s.published.posterior.reset();  // of parameters that designs change
+  s.published.posterior.reset();  // designs change the parameters that it describes
   s.workshop = read_workshop(root);
   s.built = built_values(s.published, s.workshop);
   // the areal density is what makes the law's panel as heavy as the built wing
