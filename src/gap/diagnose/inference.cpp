@@ -136,14 +136,37 @@ CorrectedParameters with_effects(const sim::Randomisation& uncertain, const Corr
   return c;
 }
 
-/// Parameters and effects of the corrected vehicle. In a contrast, the parameters are those of the references.
+/// By how much parameters changed from the references to the test flights, as sessions differ, given the answer.
+VectorXd changed_since(const RobotFit& robot, const Fitter& fitter, const ScoredHypothesis& answer,
+                       const Inference& d) {
+  const bool fitted = answer.kind == HypothesisKind::effect && answer.fitted();
+  const Hypothesis h(robot.uncertain(), fitted ? answer.effects : std::vector<std::string>{});
+  const Fitter::JointFit joint = fitter.joint_fit(h, fitted ? answer.fit : d.parameters, fitter.all_flights());
+  const std::vector<Background> changes = robot.session_changes(fitter.evidence().discrepancy().session);
+  const std::size_t first = robot.nuisance_regressors().columns.size();
+  VectorXd moved = VectorXd::Zero(h.shared());
+  for (const Fitter::NuisanceMean& n : joint.means) {
+    if (n.place < first || n.place >= first + changes.size()) continue;
+    for (const Background::Move& m : changes[n.place - first].moves)
+      if (m.effect.empty()) moved[m.unknown] += m.by * n.mean;
+  }
+  return moved;
+}
+
+/// Parameters and effects of the corrected vehicle. In a contrast, the parameters are those of the references, moved by
+/// what changed since.
 CorrectedParameters correct(const RobotFit& robot, const Fitter& fitter, const ReferenceFit* reference,
                             const Inference& d) {
   const ScoredHypothesis& answer = d.predicting();
   const bool has_effects = answer.kind == HypothesisKind::effect;
   const Hypothesis h(robot.uncertain(), has_effects ? answer.effects : std::vector<std::string>{});
-  if (reference != nullptr)
-    return with_effects(robot.uncertain(), reference->corrected, h, has_effects ? answer.fit.mean() : h.start());
+  if (reference != nullptr) {
+    CorrectedParameters c =
+        with_effects(robot.uncertain(), reference->corrected, h, has_effects ? answer.fit.mean() : h.start());
+    c.at.head(h.shared()) += changed_since(robot, fitter, answer, d);
+    c.at = Hypothesis(robot.uncertain(), c.effects).bounded(std::move(c.at));
+    return c;
+  }
   if (has_effects && !answer.fitted()) return {h.effects(), h.bounded(answer.fit.mean()), d.minors};
   return corrected_parameters(robot, fitter, h, has_effects ? answer.fit : d.parameters);
 }

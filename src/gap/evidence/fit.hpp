@@ -34,7 +34,8 @@ struct Fit {
 
 /// Background magnitude of an effect: a regressor with a standard normal coefficient.
 struct Background {
-  /// An effect's unknown, by index, and by how much the column moves its coordinate.
+  /// An unknown of an effect ("": of those that all hypotheses share), by index, and by how much the column moves its
+  /// coordinate.
   struct Move {
     std::string effect;
     Eigen::Index unknown;

@@ -139,7 +139,7 @@ std::vector<Background> RobotFit::session_changes(const SessionVariation& sessio
     for (std::size_t d = 0; d < parameters_.columns.size(); ++d)
       if (parameters_.columns[d].size() > 0)
         change += parameters_.directions.axes(j, static_cast<Eigen::Index>(d)) * parameters_.columns[d];
-    list.push_back({kSessionParameters, sd * basis.in_tests(change)});
+    list.push_back({kSessionParameters, sd * basis.in_tests(change), {{"", j, sd}}});
   }
   for (std::size_t i = 0; i < sensor_errors_.size(); ++i) {
     const ModelDiscrepancy::Nuisance& n = evidence().discrepancy().nuisances[i];
@@ -148,7 +148,7 @@ std::vector<Background> RobotFit::session_changes(const SessionVariation& sessio
   }
   for (const MagnitudeColumn& m : magnitudes_)
     if (const double sd = session.background_sd(m.effect); sd > 0)
-      list.push_back({kSessionOf + m.effect, sd * m.change});
+      list.push_back({kSessionOf + m.effect, sd * m.change, {{m.effect, m.unknown, sd}}});
   return list;
 }
 
