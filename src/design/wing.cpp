@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "model/chord.hpp"
+
 namespace flappy::design {
 namespace {
 
@@ -55,8 +57,8 @@ model::Planform planform_of(const WingShape& s, double rotational_damping_coeffi
 }
 
 WingShape shape_of(const model::Planform& p) {
-  const double a1 = 3 * (2 * p.r11 - p.r00), a2 = 5 * (6 * p.r22 - 6 * p.r11 + p.r00);
-  return {p.wing_length_m, p.mean_chord_m * p.r00, (p.r00 - a1 + a2) / p.r00, (p.r00 + a1 + a2) / p.r00};
+  const model::QuadraticChord chord(p);
+  return {p.wing_length_m, p.mean_chord_m * p.r00, chord.at(-1) / p.r00, chord.at(1) / p.r00};
 }
 
 Mass panel_of(const WingShape& s, const Panel& panel, int side) {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "model/chord.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::model {
@@ -77,9 +78,9 @@ SideParameters<double> derive_side(const Side& s, double air_density, double ste
 }
 
 /// Means over the span of c^3 and c^3 x, with c the chord per mean chord and x = r/R, which a planform does not state.
-/// The chord is approximated by the quadratic of its moments r00, r11, r22, its projection on Legendre's polynomials
-/// P_k(2x - 1), and integrated by Gauss's rule with five points, exact for these powers. The error of the quadratic in
-/// the stated means of c^2, c^2 x and c^4, between which c^3 lies, is corrected half and half:
+/// The chord is approximated by QuadraticChord and integrated by Gauss's rule with five points, exact for these powers.
+/// The error of the quadratic in the stated means of c^2, c^2 x and c^4, between which c^3 lies, is corrected half and
+/// half:
 ///   <c^3> sqrt(z_cp0/<c^2> z_rd/<c^4>)      <c^3 x> z_cp1/<c^2 x> sqrt(z_rd/<c^4> <c^2>/z_cp0)
 /// Exact for chords that are linear or quadratic; 0.1 % off for the shipped wings, 0.4 % for an ellipse, 2 % (of c^3 x)
 /// for shipped wings that lost 15 % at the tip.
@@ -90,11 +91,11 @@ ChordCubed chord_cubed(const Planform& w) {
   constexpr double kPoint[] = {-0.90617984593866399, -0.53846931010568309, 0, 0.53846931010568309, 0.90617984593866399};
   constexpr double kWeight[] = {0.11846344252809454, 0.23931433524968324, 0.28444444444444444, 0.23931433524968324,
                                 0.11846344252809454};
-  const double a0 = w.r00, a1 = 3 * (2 * w.r11 - w.r00), a2 = 5 * (6 * w.r22 - 6 * w.r11 + w.r00);
+  const QuadraticChord chord(w);
   ChordCubed cubed;
   double c2 = 0, c2x = 0, c4 = 0;
   for (int i = 0; i < 5; ++i) {
-    const double y = kPoint[i], x = (1 + y) / 2, c = a0 + a1 * y + a2 * (1.5 * y * y - 0.5), area2 = kWeight[i] * c * c;
+    const double y = kPoint[i], x = (1 + y) / 2, c = chord.at(y), area2 = kWeight[i] * c * c;
     c2 += area2;
     c2x += area2 * x;
     c4 += area2 * c * c;

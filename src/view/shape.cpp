@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/chord.hpp"
+
 namespace flappy::view {
 namespace {
 
@@ -41,10 +43,7 @@ Json ellipsoid_of(const model::RigidBody& torso) {
 }  // namespace
 
 double chord_at(const model::Planform& p, double share) {
-  // the inverse of the Hilbert matrix of order 3
-  const double a = 9 * p.r00 - 36 * p.r11 + 30 * p.r22, b = -36 * p.r00 + 192 * p.r11 - 180 * p.r22,
-               c = 30 * p.r00 - 180 * p.r11 + 180 * p.r22;
-  return std::max(0.0, a + b * share + c * share * share);
+  return std::max(0.0, model::QuadraticChord(p).at(2 * share - 1));
 }
 
 Json shape_of(const model::Vehicle& v) {
