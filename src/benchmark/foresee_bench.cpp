@@ -41,7 +41,7 @@ void write_table(const fs::path& folder, const Manifest& manifest) {
 
 }  // namespace
 
-bool foresee_bench(const ForeseeCommand& command) {
+bool foresee_bench(const BenchQuestions& command) {
   for (const fs::path& folder : command.folders) {
     const Manifest manifest = read_manifest(folder);
     if (fs::exists(true_fits(folder)))
@@ -53,14 +53,7 @@ bool foresee_bench(const ForeseeCommand& command) {
       if (!fs::exists(file_of(folder, c.number))) open.push_back(&c);
     const bool all = work_through("planning", open.size(), command.threads, nullptr, [&](std::size_t k) {
       const PublicCase& c = *open[k];
-      Question q;
-      q.flights = c.flights(folder);
-      q.reference = c.references(folder);
-      q.vehicle = command.vehicle.empty() ? fs::path(manifest.vehicle) : command.vehicle;
-      q.priors = command.priors;
-      q.discrepancy = command.discrepancy;
-      q.sessions = command.sessions;
-      q.verdict = command.verdict;
+      const Question q = command.question(folder, manifest, c);
       Json json;
       for (const Foreseen& f : foresee(q, q.reference.empty() ? alone : std::map<std::string, double>()))
         json[f.effect] = {{"rival", f.rival}, {"nats", f.nats}, {"probability", f.probability}};

@@ -36,7 +36,7 @@ class Predictions {
       : command_(command),
         folder_(folder),
         manifest_(manifest),
-        vehicle_(command.vehicle.empty() ? fs::path(manifest.vehicle) : command.vehicle),
+        vehicle_(command.vehicle_of(manifest)),
         sums_(folder / kSums) {}
 
   void check_inputs() const {
@@ -82,16 +82,11 @@ class Predictions {
   Json read(std::size_t number) const { return read_json(prediction_file(folder_, number)); }
 
   Question question(const PublicCase& c, const std::vector<std::string>& withheld) const {
-    return {.flights = c.flights(folder_),
-            .reference = c.references(folder_),
-            .vehicle = vehicle_,
-            .priors = command_.priors,
-            .discrepancy = command_.discrepancy,
-            .verdict = command_.verdict,
-            .sessions = command_.sessions,
-            .withheld = withheld,
-            .residual = command_.residual,
-            .experiments = command_.experiments};
+    Question q = command_.question(folder_, manifest_, c);
+    q.withheld = withheld;
+    q.residual = command_.residual;
+    q.experiments = command_.experiments;
+    return q;
   }
 
  private:

@@ -2,26 +2,17 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <vector>
 
-#include "benchmark/predict/predict.hpp"
-#include "io/installation.hpp"
+#include "benchmark/questions.hpp"
 #include "io/ranks.hpp"
 
 namespace flappy::benchmark {
 
-struct ScoreCommand {
-  std::vector<std::filesystem::path> folders;
-  std::filesystem::path vehicle;  ///< empty: that of the manifest
-  std::filesystem::path out;      ///< folder for score.md and score.csv; empty: the first of `folders`
-  std::filesystem::path priors = io::config_path("gap/priors.toml"),
-                        discrepancy = io::config_path("gap/model_discrepancy.toml"),
-                        verdict;  ///< empty: configs/gap/verdict.toml, contrast_verdict.toml of a contrast
-  std::filesystem::path sessions = io::config_path("gap/session_variation.toml");  ///< only for a contrast
-  std::filesystem::path experiments = io::config_path("gap/experiments");          ///< manoeuvres that may be proposed
+struct ScoreCommand : BenchQuestions {
+  std::filesystem::path out;  ///< folder for score.md and score.csv; empty: the first of `folders`
+  std::filesystem::path experiments = io::config_path("gap/experiments");  ///< manoeuvres that may be proposed
   bool proposals = false;  ///< also fly what undecided diagnoses of part "singles" propose
   bool residual = false;   ///< corrected vehicles have what is left as a smooth load, for flappy-blind loop
-  int threads = 0;         ///< number of cases at a time; 0: one for each processor
   io::Ranks* ranks = nullptr;
   Predictor predictor = predict;
 };

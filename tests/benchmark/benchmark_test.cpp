@@ -539,7 +539,7 @@ TEST_F(Benchmark, FliesWhatADiagnosisProposes) {
 TEST_F(Benchmark, PlansBeforeItScores) {
   if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   copy_two();
-  ForeseeCommand plan;
+  BenchQuestions plan;
   plan.folders = {root_ / "bench"};
   plan.threads = 2;
   ASSERT_TRUE(foresee_bench(plan));

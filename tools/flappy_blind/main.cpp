@@ -147,6 +147,19 @@ Json fly_case(const RobotOptions& o, Programme programme) {
 }
 
 }  // namespace
+void add_question_options(io::Command& c, benchmark::BenchQuestions& q) {
+  c.option("folders", q.folders, "of flappy-blind make").required();
+  c.option("--vehicle", q.vehicle, "the robot as declared, where it is elsewhere now");
+  c.option("--priors", q.priors, "what is uncertain of the vehicle").shows_default();
+  c.option("--discrepancy", q.discrepancy,
+           "what models get wrong; of a family: configs/gap/discrepancy/without_FAMILY.toml")
+      .shows_default();
+  c.option("--sessions", q.sessions, "what differs between sessions, for a contrast").shows_default();
+  c.option("--verdict", q.verdict,
+           "constants of the verdict; none: configs/gap/verdict.toml, for a contrast contrast_verdict.toml");
+  c.option("--threads", q.threads, "cases at a time; 0: one for each processor").range(0, 1024);
+}
+
 }  // namespace flappy::blind
 
 int main(int argc, char** argv) {
@@ -219,30 +232,14 @@ int main(int argc, char** argv) {
   make.option("--threads", made.threads, "0: one for each processor").range(0, 1024);
   io::Command score = program.app().command("score", "diagnoses every case, then opens the labels and compares");
   benchmark::ScoreCommand scored;
-  score.option("folders", scored.folders, "of flappy-blind make").required();
+  blind::add_question_options(score, scored);
   score.option("--out", scored.out, "folder for score.md and score.csv; none: the first of those");
-  score.option("--vehicle", scored.vehicle, "the robot as declared, where it is elsewhere now");
-  score.option("--priors", scored.priors, "what is uncertain of the vehicle").shows_default();
-  score
-      .option("--discrepancy", scored.discrepancy,
-              "what models get wrong; of a family: configs/gap/discrepancy/without_FAMILY.toml")
-      .shows_default();
-  score.option("--sessions", scored.sessions, "what differs between sessions, for a contrast").shows_default();
   score.flag("--proposals", scored.proposals,
              "fly what undecided diagnoses of part singles propose, changes to the robot included");
   score.flag("--residual", scored.residual, "give corrected vehicles what is left, as a smooth load, for the loop");
-  score.option("--verdict", scored.verdict,
-               "constants of the verdict; none: configs/gap/verdict.toml, for a contrast contrast_verdict.toml");
-  score.option("--threads", scored.threads, "cases at a time; 0: one for each processor").range(0, 1024);
   io::Command plan = program.app().command("plan", "before scoring: what plans expect of the diagnoses of each case");
-  benchmark::ForeseeCommand foreseen;
-  plan.option("folders", foreseen.folders, "of flappy-blind make").required();
-  plan.option("--vehicle", foreseen.vehicle, "the robot as declared, where it is elsewhere now");
-  plan.option("--priors", foreseen.priors, "as for score").shows_default();
-  plan.option("--discrepancy", foreseen.discrepancy, "as for score").shows_default();
-  plan.option("--sessions", foreseen.sessions, "as for score").shows_default();
-  plan.option("--verdict", foreseen.verdict, "as for score");
-  plan.option("--threads", foreseen.threads, "cases at a time; 0: one for each processor").range(0, 1024);
+  benchmark::BenchQuestions foreseen;
+  blind::add_question_options(plan, foreseen);
   io::Command calibrate = program.app().command("calibrate", "learns from scored cases how much evidence counts");
   benchmark::CalibrateCommand calibrated;
   calibrate.option("folders", calibrated.folders, "of flappy-blind score").required();

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "benchmark/predict/predict.hpp"
+#include "benchmark/records.hpp"
+#include "io/installation.hpp"
+
+namespace flappy::benchmark {
+
+/// Of which benchmarks, and with which files, score_bench and foresee_bench ask.
+struct BenchQuestions {
+  std::vector<std::filesystem::path> folders;  ///< of make_bench
+  std::filesystem::path vehicle;               ///< empty: that of the manifest
+  std::filesystem::path priors = io::config_path("gap/priors.toml"),
+                        discrepancy = io::config_path("gap/model_discrepancy.toml"),
+                        verdict;  ///< empty: configs/gap/verdict.toml, contrast_verdict.toml of a contrast
+  std::filesystem::path sessions = io::config_path("gap/session_variation.toml");  ///< only for a contrast
+  int threads = 0;  ///< number of cases at a time; 0: one for each processor
+
+  std::filesystem::path vehicle_of(const Manifest& manifest) const;
+  /// About a case of the benchmark in `folder`; nothing is withheld.
+  Question question(const std::filesystem::path& folder, const Manifest& manifest, const PublicCase& of) const;
+};
+
+}  // namespace flappy::benchmark
