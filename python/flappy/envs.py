@@ -311,7 +311,7 @@ CONFIGS = {
 
 
 def register() -> None:
-    """Registers `flappy/...`; `import flappy` has done it, as has Gymnasium where the package is installed."""
+    """Registers `flappy/...`; `import flappy` has done it."""
     for name, config in CONFIGS.items():
         full = f"flappy/{name}"
         if full in gymnasium.registry:

@@ -50,7 +50,7 @@ int main(int argc, char** argv) {
   const io::Command submit = app.command("submit", "a new job; prints its number");
   submit.option("kind", asked.kind, "train, evaluate, export or diagnose").required();
   submit
-      .option("config", asked.config, "train/escape.toml, below the server's folder; of others a job's folder: 000001")
+      .option("config", asked.config, "train/escape.toml, below the server's folder; of others a job's number: 7")
       .required();
   submit.option("--set", asked.overrides, "override a key: learn.updates=1000").one_at_a_time();
   submit.option("--id", asked.id, "the same one twice is one job");
