@@ -201,7 +201,7 @@ std::map<std::string, std::string> crazyflie_files(const rollout::FlyConfig& con
   return {
       {"Makefile",
        "# make, then make cload. CRAZYFLIE_BASE: a clone of the firmware with its submodules.\n"
-       "CRAZYFLIE_BASE ?= $(HOME)/crazyflie-firmware\nOOT_CONFIG := $(PWD)/app-config\n"
+       "CRAZYFLIE_BASE ?= $(HOME)/crazyflie-firmware\nOOT := $(CURDIR)\nOOT_CONFIG := $(CURDIR)/app-config\n"
        "# Kconfig drops this with another controller than the PID, which flies the Flapper all the same\n"
        "EXTRA_CFLAGS += -DCONFIG_CONTROLLER_PID_FILTER_ALL=1\n"
        "include $(CRAZYFLIE_BASE)/tools/make/oot.mk\n"},
@@ -228,6 +228,7 @@ std::string px4_mapping(const rollout::FlyConfig& config) {
     text.replace(begin, text.find('\n', begin) - begin, key + " = " + value);
   };
   replace("vehicle", "\"" + config.vehicle.name + ".toml\"");
+  replace("world", "\"ned_x_north\"");  // as flappy_px4.cc turns poses
   const std::string of_battery = "# -1 to 1, as a share of the battery's voltage";
   text.replace(text.find(of_battery), of_battery.size(), "# 1 is FLAPPY_PX4_FULL_V of flappy_px4.cpp, below");
   replace("flapping_Hz", io::shortest_digits(config.vehicle.driver.flapping_Hz));

@@ -234,14 +234,16 @@ struct Stream {
     Column &qw = columns["qw"], &qx = columns["qx"], &qy = columns["qy"], &qz = columns["qz"];
     constexpr double kHalf = std::numbers::sqrt2 / 2;
     constexpr Quaternion kFromNed{0, kHalf, kHalf, 0};  // north, east, down to east, north, up
+    constexpr Quaternion kToXNorth{0, -1, 0, 0};        // to north, west, up
     constexpr Quaternion kFromFlu{0, 1, 0, 0};          // forward, left, up to forward, right, down
     for (std::size_t i = 0; i < qw.size(); ++i) {
       Quaternion q{qw[i], qx[i], qy[i], qz[i]};
-      if (mapping.ned) q = kFromNed * q;
+      if (mapping.ned) q = (mapping.x_north ? kToXNorth : kFromNed) * q;
       if (mapping.frd) q = q * kFromFlu;
       qw[i] = q.w, qx[i] = q.x, qy[i] = q.y, qz[i] = q.z;
       if (!mapping.ned || !placed) continue;
-      std::swap(x[i], y[i]);
+      if (mapping.x_north) y[i] = -y[i];
+      else std::swap(x[i], y[i]);
       z[i] = -z[i];
     }
   }

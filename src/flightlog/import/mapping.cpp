@@ -146,7 +146,11 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
   s.late_s = table.number_or("late_s", s.late_s, positive(1e3));
   s.sequence = table.string_or("sequence", "");
   if (keys.has_frame) s.frd = table.choice_or("frame", "flu", {"flu", "frd"}) == "frd";
-  if (keys.has_world) s.ned = table.choice_or("world", "enu", {"enu", "ned"}) == "ned";
+  if (keys.has_world) {
+    const std::string world = table.choice_or("world", "enu", {"enu", "ned", "ned_x_north"});
+    s.ned = world != "enu";
+    s.x_north = world == "ned_x_north";
+  }
   s.measures_rate = keys.has_rate && !table.has("rate_hz");
   read_columns(keys, s);
   return s;

@@ -40,7 +40,8 @@
 //   above = 0.0                              # ... above this value
 //
 //   [mocap]                                  # keys as above; roll_rad, pitch_rad, yaw_rad may replace qw to qz
-//   world = "enu"                            # default; or "ned": frame of position and attitude; turned to z up
+//   world = "enu"                            # frame of position and attitude. "ned" is turned to east, north, up,
+//                                            # "ned_x_north" to north, west, up
 //   frame = "flu"                            # default; or "frd": frame of the body; turned to x forward, y left, z up
 //   rate_hz = 200                            # optional in every stream; measured if missing
 //   latency_s = 0.0                          # time used less measured instant; 0 if the stamp is that instant
@@ -101,7 +102,7 @@ struct StreamMapping {
   double late_s = 0.02;
   std::string sequence;  ///< empty: none
   std::vector<ColumnMapping> columns;
-  bool frd = false, ned = false, measures_rate = false;
+  bool frd = false, ned = false, x_north = false, measures_rate = false;
   std::string flown_field;  ///< command stream only: field that is above flown_above in flight; empty: the whole log
   double flown_above = 0;
   io::Table table;  ///< the stream's table in the file, for error messages

@@ -263,6 +263,14 @@ TEST(CrazyflieApp, HoversByItsOwnControllerFirst) {
   EXPECT_NEAR(out[0].thrust, 65535 * 0.587, 100);  // hover_V
 }
 
+// PWD is the folder of the shell, which make -C does not change.
+TEST(CrazyflieApp, IsMadeFromAnyFolder) {
+  const std::string makefile =
+      firmware_files("crazyflie", dash(), {{"flappy_policy.h", ""}, {"flappy_controller.h", ""}}).at("Makefile");
+  EXPECT_NE(makefile.find("\nOOT := $(CURDIR)\n"), std::string::npos);
+  EXPECT_EQ(makefile.find("PWD"), std::string::npos);
+}
+
 TEST(CrazyflieApp, RefusesWhatTheFirmwareCannotSet) {
   EXPECT_EQ(message([] { firmware_files("crazyflie", dash({"task.action.bias_V=[-0.4,0.4]"}), {}); }),
             "--for crazyflie: the task's actions move pitch_servo from 0.1 to 0.9 (the firmware sets 0.301 to 0.699); "

@@ -68,6 +68,14 @@ TEST(Px4Module, FliesOnTheBoardAsTheLanesDo) {
   fly_as_the_lanes(of_nominal(config), 0, module.board());
 }
 
+// flappy_px4.cc turns north, east, down to north, west, up, and so has the import of its log to do.
+TEST(Px4Module, ImportsPosesAsItTakesThem) {
+  const auto files = firmware_files("px4", escape(), {{"flappy_policy.h", ""}, {"flappy_controller.h", ""}});
+  const std::string& mapping = files.at("mapping.toml");
+  EXPECT_NE(mapping.find("\nworld = \"ned_x_north\"\n"), std::string::npos);
+  EXPECT_EQ(mapping.find("\"ned\""), std::string::npos);
+}
+
 TEST(Px4Module, RefusesWhatItCannotFly) {
   EXPECT_EQ(flight::message([] {
               firmware_files("px4", rollout::read_fly_config(source_path("configs/fly/flapper_dash.toml")), {});

@@ -379,6 +379,16 @@ TEST(Import, TurnsNorthEastDownIntoEastNorthUp) {
   EXPECT_EQ(log.imu.gyro_x_rad_s[0], 1);
   EXPECT_EQ(log.imu.gyro_y_rad_s[0], -2);
   EXPECT_EQ(log.imu.accel_z_m_s2[0], -6);
+
+  const FlightLog x_north =
+      assemble(robot.channels, mapping_of("ros2.toml", {"mocap.world=ned_x_north", "mocap.frame=frd"})).log;
+  EXPECT_EQ(x_north.mocap.x_m[0], 10);
+  EXPECT_EQ(x_north.mocap.y_m[0], -20);
+  EXPECT_EQ(x_north.mocap.z_m[0], 30);
+  EXPECT_NEAR(x_north.mocap.qw[0], w, 1e-15);
+  EXPECT_NEAR(x_north.mocap.qx[0], x, 1e-15);
+  EXPECT_NEAR(x_north.mocap.qy[0], -y, 1e-15);
+  EXPECT_NEAR(x_north.mocap.qz[0], -z, 1e-15);
 }
 
 TEST(Import, LeavesOutPosesThatAreNone) {
