@@ -35,8 +35,9 @@ VectorXd gains_of(const Fitter& fitter, const Fit& fit, const std::vector<Magnit
   return gains;
 }
 
-/// Probability of an effect, given the gains of all.
-double probability_of(Index effect, const VectorXd& gains, const VerdictRule& rule) {
+/// Probability of a rival, given the gains of all.
+double probability_of(Index effect, const std::vector<std::string>& rivals, const VectorXd& gains,
+                      const VerdictRule& rule) {
   std::vector<ScoredHypothesis> all(3);
   all[0].kind = HypothesisKind::none, all[0].log_prior = std::log(rule.prior.none);
   all[1].kind = HypothesisKind::parameters, all[1].log_prior = std::log(rule.prior.parameters);
@@ -46,13 +47,13 @@ double probability_of(Index effect, const VectorXd& gains, const VerdictRule& ru
   for (Index i = 0; i < gains.size(); ++i) {
     ScoredHypothesis a;
     a.kind = HypothesisKind::effect;
-    a.effects = {std::to_string(i)};
+    a.effects = {rivals[static_cast<std::size_t>(i)]};
     a.log_prior = std::log(rule.prior.effect / n);
     a.log_evidence = a.log_prior + gains[i];
     all.push_back(std::move(a));
   }
   set_probabilities(all, rule);
-  const std::vector<std::string> asked = {std::to_string(effect)};
+  const std::vector<std::string> asked = {rivals[static_cast<std::size_t>(effect)]};
   return std::ranges::find(all, asked, &ScoredHypothesis::effects)->probability;
 }
 
@@ -85,7 +86,7 @@ class Separator {
       s.effects.emplace_back(asked_[t].effect->info.id);
       s.nats.conservativeResize(s.nats.rows() + 1, n + 1);
       s.nats.bottomRows(1) << (own - gains[t]->array()).matrix().transpose(), own;
-      s.probability.push_back(probability_of(asked_[t].rival, *gains[t], rule_));
+      s.probability.push_back(probability_of(asked_[t].rival, rivals_, *gains[t], rule_));
       s.sure_from.push_back(from[t]);
     }
     return s;
@@ -129,7 +130,7 @@ class Separator {
   std::vector<std::optional<double>> sure_from(const std::vector<std::optional<VectorXd>>& at_one) const {
     const std::size_t n = asked_.size();
     const auto sure = [&](std::size_t t, const VectorXd& gains) {
-      return probability_of(asked_[t].rival, gains, rule_) >= kSure;
+      return probability_of(asked_[t].rival, rivals_, gains, rule_) >= kSure;
     };
     std::vector<std::optional<double>> found(n);
     std::vector<std::optional<VectorXd>> gains = at_one;
@@ -158,7 +159,7 @@ class Separator {
     const double from = low, to = high;
     while (high / low > 1.02) {
       const double middle = std::sqrt(low * high), share = (middle * middle - from * from) / (to * to - from * from);
-      (probability_of(asked_[t].rival, below + share * (above - below), rule_) >= kSure ? high : low) = middle;
+      (probability_of(asked_[t].rival, rivals_, below + share * (above - below), rule_) >= kSure ? high : low) = middle;
     }
     return high;
   }

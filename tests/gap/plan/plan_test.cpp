@@ -84,6 +84,16 @@ TEST_F(SeparationOfTour, IsSureFromTheMagnitudeThatItSays) {
   }
 }
 
+// What of the surroundings gains by chance is less in the verdict's rule.
+TEST_F(SeparationOfTour, ChargesAnEffectWhatItGainsByChance) {
+  VerdictRule rule = read_verdict_rule();
+  ASSERT_TRUE(std::ranges::count(rule.gain.outside, "wind"));
+  const double before = separation_of(*flights_, *robot_, {{"wind", 0.2}}, rule, 2, false).probability[0];
+  rule.gain.outside.clear();
+  const double after = separation_of(*flights_, *robot_, {{"wind", 0.2}}, rule, 2, false).probability[0];
+  EXPECT_LT(after, before);
+}
+
 // A wing that lost area flies on the other side: predicted so, nothing is left but what was left before.
 TEST(Changes, ArePredictedInTheFlightsBeforeWhichTheyWereMade) {
   std::vector<Manoeuvre> all = read_manoeuvres(kTestConfigs + "gap/experiments");
