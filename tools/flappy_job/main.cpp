@@ -49,8 +49,7 @@ int main(int argc, char** argv) {
   constexpr std::uint64_t kLastJob = 999'999'999;
   const io::Command submit = app.command("submit", "a new job; prints its number");
   submit.option("kind", asked.kind, "train, evaluate, export or diagnose").required();
-  submit
-      .option("config", asked.config, "train/escape.toml, below the server's folder; of others a job's number: 7")
+  submit.option("config", asked.config, "train/escape.toml, below the server's folder; of others a job's number: 7")
       .required();
   submit.option("--set", asked.overrides, "override a key: learn.updates=1000").one_at_a_time();
   submit.option("--id", asked.id, "the same one twice is one job");
