@@ -72,9 +72,10 @@ void add_effects(Section& section, const Json& effects) {
                     e.at("sure_from").is_null() ? Json("never") : cell(e.at("sure_from"), at + "/sure_from", 2),
                     alike.size() > 4 ? std::to_string(alike.size()) + " others" : spoken_list(alike)});
   }
-  section.add(table("Each effect", {"effect", "at", "probability that it is given", "sure from, of this", "may be"},
+  section.add(table("Each effect",
+                    {"effect", "at", "probability that it is named", "surely from, times this", "could be taken for"},
                     std::move(rows),
-                    "Sure: given with a probability of at least 0.9, if the robot has it so many times as large."));
+                    "Surely: named with a probability of at least 0.9, if the robot has it so many times as large."));
 }
 
 void add_choices(Section& section, const Json& choices, double asked) {
