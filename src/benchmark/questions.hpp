@@ -9,9 +9,9 @@
 
 namespace flappy::benchmark {
 
-/// Of which benchmarks, and with which files, score_bench and foresee_bench ask.
+/// Benchmarks that score_bench diagnoses or foresee_bench plans, and the files that both use for it.
 struct BenchQuestions {
-  std::vector<std::filesystem::path> folders;  ///< of make_bench
+  std::vector<std::filesystem::path> folders;  ///< benchmarks that make_bench wrote
   std::filesystem::path vehicle;               ///< empty: that of the manifest
   std::filesystem::path priors = io::config_path("gap/priors.toml"),
                         discrepancy = io::config_path("gap/model_discrepancy.toml"),

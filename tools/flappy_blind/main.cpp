@@ -146,7 +146,6 @@ Json fly_case(const RobotOptions& o, Programme programme) {
   return {{"seed", o.seed}, {"draw", sampled.draw}, {"crashes", crashes}, {"flights", list}};
 }
 
-}  // namespace
 void add_question_options(io::Command& c, benchmark::BenchQuestions& q) {
   c.option("folders", q.folders, "of flappy-blind make").required();
   c.option("--vehicle", q.vehicle, "the robot as declared, where it is elsewhere now");
@@ -160,6 +159,7 @@ void add_question_options(io::Command& c, benchmark::BenchQuestions& q) {
   c.option("--threads", q.threads, "cases at a time; 0: one for each processor").range(0, 1024);
 }
 
+}  // namespace
 }  // namespace flappy::blind
 
 int main(int argc, char** argv) {

@@ -201,7 +201,7 @@ std::map<std::string, std::string> crazyflie_files(const rollout::FlyConfig& con
   return {
       {"Makefile",
        "# make, then make cload. CRAZYFLIE_BASE: a clone of the firmware with its submodules.\n"
-       "CRAZYFLIE_BASE ?= $(HOME)/crazyflie-firmware\nOOT := $(CURDIR)\nOOT_CONFIG := $(CURDIR)/app-config\n"
+       "CRAZYFLIE_BASE ?= $(HOME)/crazyflie-firmware\nOOT := $(CURDIR)\nOOT_CONFIG := $(OOT)/app-config\n"
        "# Kconfig drops this with another controller than the PID, which flies the Flapper all the same\n"
        "EXTRA_CFLAGS += -DCONFIG_CONTROLLER_PID_FILTER_ALL=1\n"
        "include $(CRAZYFLIE_BASE)/tools/make/oot.mk\n"},

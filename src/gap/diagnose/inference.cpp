@@ -154,7 +154,7 @@ VectorXd changed_since(const RobotFit& robot, const Fitter& fitter, const Scored
 }
 
 /// Parameters and effects of the corrected vehicle. In a contrast, the parameters are those of the references, moved by
-/// what changed since.
+/// changed_since.
 CorrectedParameters correct(const RobotFit& robot, const Fitter& fitter, const ReferenceFit* reference,
                             const Inference& d) {
   const ScoredHypothesis& answer = d.predicting();

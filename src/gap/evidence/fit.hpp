@@ -96,7 +96,7 @@ class Fitter {
   struct JointFit {
     Eigen::VectorXd at;
     BasisCoefficients nuisances;
-    std::vector<NuisanceMean> means;  ///< of nuisance regressors and backgrounds that the flights tell of
+    std::vector<NuisanceMean> means;  ///< left out: regressors that the flights have no information on
   };
   JointFit joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
   /// The part of a fit's residual that everything explains by linear columns, learnt from some flights alone: in a

@@ -148,7 +148,7 @@ std::vector<Background> RobotFit::session_changes(const SessionVariation& sessio
   }
   for (const MagnitudeColumn& m : magnitudes_)
     if (const double sd = session.background_sd(m.effect); sd > 0)
-      list.push_back({kSessionOf + m.effect, sd * m.change, {{m.effect, m.unknown, sd}}});
+      list.push_back({kSessionOf + m.effect, sd * m.change});
   return list;
 }
 

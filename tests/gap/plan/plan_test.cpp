@@ -84,7 +84,7 @@ TEST_F(SeparationOfTour, IsSureFromTheMagnitudeThatItSays) {
   }
 }
 
-// What of the surroundings gains by chance is less in the verdict's rule.
+// The verdict charges an effect of the surroundings fewer nats for chance than an effect of the robot.
 TEST_F(SeparationOfTour, ChargesAnEffectWhatItGainsByChance) {
   VerdictRule rule = read_verdict_rule();
   ASSERT_TRUE(std::ranges::count(rule.gain.outside, "wind"));
