@@ -2,7 +2,9 @@
 install(FILES LICENSE DESTINATION share/doc/flappy RENAME copyright COMPONENT programs)
 install(FILES LICENSE DESTINATION share/doc/libflappy-dev RENAME copyright COMPONENT dev)
 install(FILES README.md CHANGELOG.md packaging/flappy-server.service DESTINATION share/doc/flappy COMPONENT programs)
-install(DIRECTORY docs DESTINATION share/doc/flappy COMPONENT programs)
+install(DIRECTORY docs examples DESTINATION share/doc/flappy COMPONENT programs)
+install(PROGRAMS examples/close_the_loop DESTINATION share/doc/flappy/examples COMPONENT programs)
+install(DIRECTORY tools/onboard DESTINATION share/doc/flappy/tools COMPONENT programs)
 # licences of what is compiled in, as Debian states them
 foreach(name IN ITEMS libeigen3-dev libtomlplusplus-dev libcli11-dev nlohmann-json3-dev librandom123-dev libpagmo-dev libspdlog-dev libjs-three libjs-chart.js)
   if(EXISTS /usr/share/doc/${name}/copyright)
