@@ -228,7 +228,8 @@ struct Stream {
       for (const char* name : {"gyro_y_rad_s", "gyro_z_rad_s", "accel_y_m_s2", "accel_z_m_s2"})
         if (const auto c = columns.find(name); c != columns.end())
           for (double& value : c->second) value = -value;
-    if (!columns.contains("qw") || (!mapping.frd && !mapping.ned)) return;
+    const bool down = mapping.world != World::enu, x_north = mapping.world == World::ned_x_north;
+    if (!columns.contains("qw") || (!mapping.frd && !down)) return;
     const bool placed = columns.contains("x_m");
     Column &x = columns["x_m"], &y = columns["y_m"], &z = columns["z_m"];
     Column &qw = columns["qw"], &qx = columns["qx"], &qy = columns["qy"], &qz = columns["qz"];
@@ -238,11 +239,11 @@ struct Stream {
     constexpr Quaternion kFromFlu{0, 1, 0, 0};          // forward, left, up to forward, right, down
     for (std::size_t i = 0; i < qw.size(); ++i) {
       Quaternion q{qw[i], qx[i], qy[i], qz[i]};
-      if (mapping.ned) q = (mapping.x_north ? kToXNorth : kFromNed) * q;
+      if (down) q = (x_north ? kToXNorth : kFromNed) * q;
       if (mapping.frd) q = q * kFromFlu;
       qw[i] = q.w, qx[i] = q.x, qy[i] = q.y, qz[i] = q.z;
-      if (!mapping.ned || !placed) continue;
-      if (mapping.x_north) y[i] = -y[i];
+      if (!down || !placed) continue;
+      if (x_north) y[i] = -y[i];
       else std::swap(x[i], y[i]);
       z[i] = -z[i];
     }

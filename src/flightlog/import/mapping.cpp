@@ -148,8 +148,7 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
   if (keys.has_frame) s.frd = table.choice_or("frame", "flu", {"flu", "frd"}) == "frd";
   if (keys.has_world) {
     const std::string world = table.choice_or("world", "enu", {"enu", "ned", "ned_x_north"});
-    s.ned = world != "enu";
-    s.x_north = world == "ned_x_north";
+    s.world = world == "enu" ? World::enu : world == "ned" ? World::ned : World::ned_x_north;
   }
   s.measures_rate = keys.has_rate && !table.has("rate_hz");
   read_columns(keys, s);

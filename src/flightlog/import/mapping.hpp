@@ -87,6 +87,7 @@
 namespace flappy::flightlog {
 
 enum class TimeOf { stamp, received, field };
+enum class World { enu, ned, ned_x_north };
 
 struct ColumnMapping {
   std::string column, channel, field;
@@ -102,7 +103,8 @@ struct StreamMapping {
   double late_s = 0.02;
   std::string sequence;  ///< empty: none
   std::vector<ColumnMapping> columns;
-  bool frd = false, ned = false, x_north = false, measures_rate = false;
+  World world = World::enu;
+  bool frd = false, measures_rate = false;
   std::string flown_field;  ///< command stream only: field that is above flown_above in flight; empty: the whole log
   double flown_above = 0;
   io::Table table;  ///< the stream's table in the file, for error messages
