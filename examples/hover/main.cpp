@@ -23,7 +23,8 @@ int main(int argc, char** argv) {
 
     std::size_t first = 0;
     while (first < batch.size() && batch.support(first) == flappy::sim::Start::standing) ++first;
-    std::printf("%s lifts off at %.1f V\n", vehicle.name.c_str(), amplitude_V(first));
+    if (first < batch.size()) std::printf("%s lifts off at %.1f V\n", vehicle.name.c_str(), amplitude_V(first));
+    else std::printf("%s does not lift off up to %.1f V\n", vehicle.name.c_str(), amplitude_V(first - 1));
   } catch (const std::exception& e) {
     std::fprintf(stderr, "%s\n", e.what());
     return 2;

@@ -5,6 +5,7 @@ Each file is what sb3_hover.py or cleanrl_hover.py wrote, one for each seed. Bes
 
 import csv
 import glob
+import itertools
 import sys
 from pathlib import Path
 
@@ -14,7 +15,8 @@ plt.switch_backend("svg")
 plt.rcParams |= {"svg.hashsalt": "flappy", "svg.fonttype": "none"}  # the same bytes for the same curves
 figure, axes = plt.subplots(1, 2, figsize=(9, 3.4), sharey=True)
 rows = []
-for colour, argument in zip(("#2f81f7", "#e0702c", "#3fa45b", "#8250df"), sys.argv[2:], strict=False):
+colours = itertools.cycle(("#2f81f7", "#e0702c", "#3fa45b", "#8250df"))
+for colour, argument in zip(colours, sys.argv[2:], strict=False):
     name, pattern = argument.split("=", 1)
     for seed, path in enumerate(sorted(glob.glob(pattern)), 1):
         with open(path, newline="") as file:

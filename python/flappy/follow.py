@@ -341,7 +341,9 @@ def tell(run: Run, logger: Logger, programs: Path | None = None) -> bool:
 def _runs_of(folder: Path, known: dict[Path, Run]) -> tuple[list[Run], bool]:
     """Runs of a folder so far, and whether more are to come: flappy-train --seeds makes one after another, then curve.csv."""
     seeds = sorted(folder.glob("seed_*"))
-    return [known.setdefault(each, Run(each)) for each in seeds or [folder]], bool(seeds) and not (folder / "curve.csv").exists()
+    runs = [known.setdefault(each, Run(each)) for each in seeds or [folder]]
+    stopped = any((run.json("summary.json") or {}).get("stopped") for run in runs)
+    return runs, bool(seeds) and not stopped and not (folder / "curve.csv").exists()
 
 
 def follow(folders: list[Path], logger: Logger, every_s: float = 10.0, programs: Path | None = None) -> None:

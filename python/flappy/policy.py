@@ -13,12 +13,13 @@ from . import _core
 class Policy:
     """What acts upon observations: a run folder of `flappy-train`, a C header (.h), which is compiled, ONNX (.onnx) or TorchScript (.pt).
 
-    These two are read by the onnxruntime or torch of this Python, which is imported for it. `policy(observation)`: float32
+    ONNX and TorchScript files are read by the onnxruntime or torch of this Python, and raise their errors. `policy(observation)`: float32
     (n, observations) or (observations,), raw and in SI units, to float32 of as many rows: what is added to the controller's output or,
     without one, set: V and fractions of a beat. `env.unwrapped.to_action(...)` makes an action of it.
 
     Raises:
-        InputError: one line, where the file is no policy, does not compile or fails its own test.
+        InputError: one line, where a run folder or header is no policy, does not compile or fails its own test.
+        ValueError: an observation that has another number of dimensions.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -47,6 +48,8 @@ class Policy:
 
     def __call__(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """Acts."""
+        if np.ndim(observation) not in (1, 2):
+            raise ValueError(f"observation: has {np.ndim(observation)} dimensions; accepted: (n, observations) or (observations,)")
         rows = np.atleast_2d(np.asarray(observation, np.float32))
         action: NDArray[np.float32]
         if self._session is not None:

@@ -58,6 +58,17 @@ class Turn {
   std::atomic_flag& busy_;
 };
 
+/// While any of these lives, Ctrl-C stops our work early (io::interrupted()); afterwards Python handles it again.
+class Interruptible {
+ public:
+  Interruptible();
+  ~Interruptible();
+  Interruptible(const Interruptible&) = delete;
+};
+
+/// Raises KeyboardInterrupt.
+[[noreturn]] void raise_interrupt();
+
 /// Finds a file: `file` itself, or else a configuration of the package, such as "fly/hover.toml".
 std::filesystem::path found(const std::filesystem::path& file);
 

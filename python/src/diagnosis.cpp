@@ -1,6 +1,4 @@
 // Binds diagnosis and identification from measurements: flappy-gap diagnose, flappy-identify forces.
-#include <csignal>
-
 #include "bind.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "gap/diagnose/diagnose_command.hpp"
@@ -10,33 +8,8 @@
 namespace flappy::python {
 namespace {
 
-/// During its lifetime Ctrl-C stops our work early; afterwards Python handles it again.
-class Interruptible {
- public:
-  Interruptible() {
-    sigaction(SIGINT, nullptr, &interrupt_);
-    sigaction(SIGTERM, nullptr, &terminate_);
-    io::stop_on_interrupt();
-  }
-  ~Interruptible() {
-    sigaction(SIGINT, &interrupt_, nullptr);
-    sigaction(SIGTERM, &terminate_, nullptr);
-    io::forget_interrupt();
-  }
-  Interruptible(const Interruptible&) = delete;
-
- private:
-  struct sigaction interrupt_ {
-  }, terminate_{};
-};
-
 nb::object of_json(const nlohmann::ordered_json& json) {
   return nb::module_::import_("json").attr("loads")(json.dump());
-}
-
-[[noreturn]] void interrupted() {
-  PyErr_SetNone(PyExc_KeyboardInterrupt);
-  throw nb::python_error();
 }
 
 nb::object diagnose(const std::filesystem::path& vehicle, const std::vector<std::string>& flights,
@@ -59,13 +32,14 @@ nb::object diagnose(const std::filesystem::path& vehicle, const std::vector<std:
     json = gap::run_diagnose(command);
     stopped = io::interrupted();
   }
-  if (stopped) interrupted();
+  if (stopped) raise_interrupt();
   return of_json(json);
 }
 
 nb::dict identify(const std::filesystem::path& vehicle_file, const std::filesystem::path& measured_file,
                   const std::filesystem::path& config_file, const std::vector<std::string>& parameters, int starts,
                   std::uint64_t seed, int threads) {
+  if (starts < 1) throw nb::value_error(("starts: is " + std::to_string(starts) + "; accepted: 1 and more").c_str());
   identify::ForceFit fit;
   model::Vehicle vehicle;
   bool stopped = false;
@@ -82,7 +56,7 @@ nb::dict identify(const std::filesystem::path& vehicle_file, const std::filesyst
     fit = identify::fit_forces(vehicle, identify::read_measured_map(measured_file, vehicle.driver), config, options);
     stopped = io::interrupted();
   }
-  if (stopped) interrupted();
+  if (stopped) raise_interrupt();
   fit.vehicle.name = vehicle.name + "_fitted";
   fit.vehicle.posterior.reset();
   nb::list all;

@@ -135,6 +135,7 @@ void bind_fleet(nb::module_& m) {
       .def(
           "hash",
           [](const PyFleet& fleet) {
+            const Turn turn(fleet.busy(), "the fleet");
             return fleet.with([](auto& f) {
               std::uint64_t hash = 0;
               for (std::size_t i = 0; i < f.fleet().size(); ++i)
@@ -264,8 +265,8 @@ std::string flights_page(const nb::list& flights, const std::optional<std::files
       shown.push_back({name, name, log_of(nb::cast<nb::dict>(flight), name)});
     } else {
       const auto folder = nb::cast<std::filesystem::path>(flight);
-      const std::filesystem::path full = std::filesystem::absolute(folder / "").lexically_normal();
-      shown.push_back({full.parent_path().filename().string(), folder, flightlog::read_flight_log(folder)});
+      shown.push_back({io::folder_name(std::filesystem::absolute(folder).lexically_normal()), folder,
+                       flightlog::read_flight_log(folder)});
     }
   }
   const nb::gil_scoped_release free;
@@ -294,14 +295,20 @@ double fleet_seconds(const std::filesystem::path& config, const std::vector<std:
 
 nb::dict fly(const std::filesystem::path& config, const std::vector<std::string>& overrides, std::size_t count,
              const std::optional<std::filesystem::path>& log) {
+  if (count < 1) throw nb::value_error("count: is 0; accepted: 1 and more");
   rollout::FlyOptions options;
   options.count = count;
+  options.keep_going = [](double) { return !io::interrupted(); };
   if (log) options.log_folder = *log;
   rollout::FlyResult result;
+  bool stopped = false;
   {
+    const Interruptible until_done;
     const nb::gil_scoped_release free;
     result = rollout::fly(rollout::read_fly_config(found(config), overrides), options);
+    stopped = io::interrupted();
   }
+  if (stopped) raise_interrupt();
   nb::dict d;
   d["hash"] = result.hash, d["successes"] = result.successes, d["flown_s"] = result.flown_s, d["logs"] = result.logs;
   return d;
@@ -323,7 +330,8 @@ void bind_flights(nb::module_& m) {
         "What flappy-report writes of flights, folders or what read_flight returns: the text of an HTML file.");
   m.def("fleet_seconds", &fleet_seconds, "config"_a, "overrides"_a, "count"_a, "periods"_a, "steps"_a);
   m.def("fly", &fly, "config"_a, "overrides"_a = std::vector<std::string>{}, "count"_a = 1, "log"_a = nb::none(),
-        "What flappy-fly does: hash, successes, flown_s, logs.");
+        "What flappy-fly does. A dict: hash (as flappy-fly prints it), successes (flights), flown_s (duration of each "
+        "flight), logs (folders written into `log`). InputError for a faulty file; KeyboardInterrupt after Ctrl-C.");
 }
 
 }  // namespace flappy::python

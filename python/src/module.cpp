@@ -1,8 +1,12 @@
 // The module flappy._core. io::InputError becomes flappy.InputError, a ValueError.
+#include <csignal>
+#include <mutex>
+
 #include "bind.hpp"
 #include "io/config.hpp"
 #include "io/installation.hpp"
 #include "io/program.hpp"
+#include "io/progress.hpp"
 
 namespace flappy::python {
 
@@ -52,6 +56,36 @@ Floats::Floats(nb::handle value, const char* name, std::initializer_list<std::si
 Turn::Turn(std::atomic_flag& busy, const char* what) : busy_(busy) {
   if (busy_.test_and_set(std::memory_order_acquire))
     throw std::runtime_error(std::string(what) + ": another thread is in a call to it; accepted: one call at a time");
+}
+
+namespace {
+
+std::mutex interruptible_guard;
+int interruptible = 0;  ///< how many Interruptible live, in all threads
+struct sigaction of_interrupt {
+}, of_terminate{};
+
+}  // namespace
+
+Interruptible::Interruptible() {
+  const std::scoped_lock lock(interruptible_guard);
+  if (interruptible++ > 0) return;
+  sigaction(SIGINT, nullptr, &of_interrupt);
+  sigaction(SIGTERM, nullptr, &of_terminate);
+  io::stop_on_interrupt();
+}
+
+Interruptible::~Interruptible() {
+  const std::scoped_lock lock(interruptible_guard);
+  if (--interruptible > 0) return;
+  sigaction(SIGINT, &of_interrupt, nullptr);
+  sigaction(SIGTERM, &of_terminate, nullptr);
+  io::forget_interrupt();
+}
+
+void raise_interrupt() {
+  PyErr_SetNone(PyExc_KeyboardInterrupt);
+  throw nb::python_error();
 }
 
 std::filesystem::path found(const std::filesystem::path& file) {

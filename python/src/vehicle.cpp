@@ -1,5 +1,7 @@
 // Binds vehicles, and batches of them in open loop: flappy::sim::Batch, with a row of an array for each flapper.
 #include <algorithm>
+#include <cmath>
+#include <span>
 #include <variant>
 
 #include "bind.hpp"
@@ -28,7 +30,7 @@ class PyBatch {
  public:
   PyBatch(std::size_t count, const Vehicle& vehicle, double step_s, int threads, const sim::World& world,
           const std::string& instruction_set, bool meters_energy, bool single)
-      : count_(count) {
+      : count_(count), meters_energy_(meters_energy) {
     const sim::BatchOptions options{step_s, threads, world, instruction_set, meters_energy};
     if (single) batch_ = std::make_unique<sim::Batch<float>>(count, vehicle, options);
     else batch_ = std::make_unique<sim::Batch<double>>(count, vehicle, options);
@@ -38,11 +40,13 @@ class PyBatch {
     return std::visit([&](auto& batch) { return call(*batch); }, batch_);
   }
   std::size_t size() const { return count_; }
+  bool meters_energy() const { return meters_energy_; }
   std::size_t at(std::int64_t i) const { return checked_index(i, count_); }
   std::atomic_flag& busy() const { return busy_; }
 
  private:
   std::size_t count_;
+  bool meters_energy_;
   std::variant<std::unique_ptr<sim::Batch<double>>, std::unique_ptr<sim::Batch<float>>> batch_;
   mutable std::atomic_flag busy_ = ATOMIC_FLAG_INIT;
 };
@@ -89,6 +93,8 @@ sim::FlapperState state_of(const nb::dict& given) {
       throw nb::value_error(
           (name + ": is " + described(value) + "; accepted: float64 of shape (" + std::to_string(part->width) + ",)")
               .c_str());
+    if (!std::ranges::all_of(std::span(array.data(), part->width), [](double x) { return std::isfinite(x); }))
+      throw nb::value_error((name + ": is not finite; accepted: finite numbers").c_str());
     std::copy_n(array.data(), part->width, reinterpret_cast<double*>(&s) + part->first);
   }
   return s;
@@ -116,6 +122,8 @@ void bind_batch(nb::module_& m) {
       .def(
           "__init__",
           [](sim::Wall* w, double x, double y, double nx, double ny) {
+            if (!(std::abs(std::hypot(nx, ny) - 1) < 1e-6))
+              throw nb::value_error("normal: its length is not 1; accepted: normal_x and normal_y of a unit vector");
             new (w) sim::Wall{x, y, nx, ny};
           },
           "x_m"_a, "y_m"_a, "normal_x"_a, "normal_y"_a);
@@ -182,6 +190,7 @@ void bind_batch(nb::module_& m) {
       .def(
           "set_vehicle",
           [](const PyBatch& b, std::int64_t i, const Vehicle& v) {
+            const Turn turn(b.busy(), "the batch");
             b.with([&](auto& batch) { batch.set_vehicle(b.at(i), v); });
           },
           "i"_a, "vehicle"_a, "Gives one a vehicle of its own; its state stays.")
@@ -214,6 +223,7 @@ void bind_batch(nb::module_& m) {
       .def(
           "status",
           [](const PyBatch& b) {
+            const Turn turn(b.busy(), "the batch");
             auto array = make_array<std::uint32_t>({b.size()});
             for (std::size_t i = 0; i < b.size(); ++i)
               array.data()[i] = b.with([&](auto& batch) { return batch.status(i); });
@@ -223,6 +233,9 @@ void bind_batch(nb::module_& m) {
       .def(
           "energy_J",
           [](const PyBatch& b) {
+            const Turn turn(b.busy(), "the batch");
+            if (!b.meters_energy())
+              throw nb::value_error("energy_J: is not metered; accepted: a batch with meters_energy");
             auto array = make_array<double>({b.size()});
             for (std::size_t i = 0; i < b.size(); ++i)
               array.data()[i] = b.with([&](auto& batch) { return batch.energy_J(i); });
@@ -232,6 +245,7 @@ void bind_batch(nb::module_& m) {
       .def(
           "held_impulse",
           [](const PyBatch& b) {
+            const Turn turn(b.busy(), "the batch");
             auto array = make_array<double>({b.size(), 6});
             for (std::size_t i = 0; i < b.size(); ++i) {
               const sim::HeldImpulse h = b.with([&](auto& batch) { return batch.held_impulse(i); });
@@ -246,6 +260,7 @@ void bind_batch(nb::module_& m) {
       .def(
           "support",
           [](const PyBatch& b) {
+            const Turn turn(b.busy(), "the batch");
             static constexpr const char* kNames[] = {"flying", "standing", "welded"};
             std::vector<std::string> names;
             for (std::size_t i = 0; i < b.size(); ++i)
@@ -254,7 +269,11 @@ void bind_batch(nb::module_& m) {
           },
           "What holds each: \"flying\", \"standing\" or \"welded\".")
       .def(
-          "hash", [](const PyBatch& b) { return b.with([](auto& batch) { return batch.hash(); }); },
+          "hash",
+          [](const PyBatch& b) {
+            const Turn turn(b.busy(), "the batch");
+            return b.with([](auto& batch) { return batch.hash(); });
+          },
           "Of every number that moves.");
   m.def("instruction_sets", &sim::instruction_sets, "Those that this processor can run, the best last.");
 }

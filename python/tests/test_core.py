@@ -83,8 +83,11 @@ def test_a_batch_takes_states_and_vehicles():
         (lambda b: b.reset(0, {"place": [1]}), KeyError, 'no part "place"; accepted: position_m, attitude'),
         (lambda b: b.reset(0, {"position_m": [1]}), ValueError, "position_m: is int64 of shape (1,); accepted: float64 of shape (3,)"),
         (lambda b: b.reset(0, start="sitting"), ValueError, 'start: is "sitting"; accepted: flying, standing, welded'),
+        (lambda b: b.reset(0, {"attitude": [1, 0, np.nan, 0]}), ValueError, "attitude: is not finite"),
         (lambda b: b.step(-1), ValueError, ""),
-        (lambda b: b.energy_J(), Exception, ""),
+        (lambda b: flappy.Wall(0, 0, 2, 0), ValueError, "normal: its length is not 1"),
+        (lambda b: flappy.fly("fly/hover.toml", count=0), ValueError, "count: is 0; accepted: 1 and more"),
+        (lambda b: b.energy_J(), ValueError, "meters_energy"),
     ],
 )
 def test_a_batch_refuses(call, error, said):

@@ -29,7 +29,7 @@ std::map<std::string, Detectability> read_detectability(const std::filesystem::p
 /// One robot and its flights, as only the maker knows them.
 struct PlannedCase {
   std::size_t number = 0;  ///< from 1, in random order
-  std::string part;        ///< one of kParts
+  std::string part;        ///< one of kParts or kContrastParts
   std::vector<blind::BlindEffect> effects;
   std::uint64_t seed = 0;
   bool hover = false, power = false;

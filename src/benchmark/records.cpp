@@ -188,16 +188,18 @@ Json to_json(const Prediction& p) {
 
 Prediction read_prediction(const std::filesystem::path& file) {
   const Json json = read_json(file);
-  if (!json.contains("diagnosis"))
-    throw io::InputError(file.string() + ": has no diagnosis; accepted: what this flappy-blind score wrote");
-  Prediction p;
-  p.diagnosis = gap::diagnosis_from(json.at("diagnosis"), file);
-  for (const auto& [name, b] : json.at("baselines").items())
-    p.baselines[name] = {b.at("named").get<Names>(), b.at("ranking").get<Names>()};
-  p.features = json.at("features").get<std::vector<double>>();
-  p.corrected = json.at("corrected");
-  p.crashed = json.at("crashed");
-  return p;
+  try {
+    Prediction p;
+    p.diagnosis = gap::diagnosis_from(json.at("diagnosis"), file);
+    for (const auto& [name, b] : json.at("baselines").items())
+      p.baselines[name] = {b.at("named").get<Names>(), b.at("ranking").get<Names>()};
+    p.features = json.at("features").get<std::vector<double>>();
+    p.corrected = json.at("corrected");
+    p.crashed = json.at("crashed");
+    return p;
+  } catch (const Json::exception& e) {
+    throw io::InputError(file.string() + ": " + e.what() + "; accepted: what this flappy-blind score wrote");
+  }
 }
 
 }  // namespace flappy::benchmark

@@ -12,7 +12,7 @@
 namespace flappy::benchmark {
 
 struct CaseTruth {
-  std::string part;                            ///< one of kParts
+  std::string part;                            ///< one of kParts or kContrastParts
   std::vector<std::string> effects;            ///< effects of the robot
   std::map<std::string, double> true_values;   ///< by "effect.parameter", where the catalogue has an equivalent
   std::vector<std::string> channels, regimes;  ///< where the effects act (blind::FamilyEffect)

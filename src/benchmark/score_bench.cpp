@@ -214,7 +214,9 @@ bool fly_proposals(const ScoreCommand& command, Bench& bench) {
         q.experiments.clear();
         const std::string& name = bench.cases[open[k]].prediction.manoeuvre;
         const auto manoeuvre = std::ranges::find(manoeuvres, name, &gap::Manoeuvre::name);
-        if (manoeuvre == manoeuvres.end()) refuse(file_of(open[k]), "no manoeuvre \"" + name + "\"");
+        if (manoeuvre == manoeuvres.end())
+          throw io::InputError(command.experiments.string() + ": has no manoeuvre \"" + name +
+                               "\", which was proposed; accepted: what score began with");
         blind::Assignment a = label.robot(q.vehicle);
         const blind::ProposedFlight flight =
             proposed_flight(*manoeuvre, flightlog::read_flight_log(q.flights.front()).header);

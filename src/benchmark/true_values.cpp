@@ -178,7 +178,7 @@ class Likeness {
         unknowns_(gap::unknowns_of(entry_)),
         wanted_(std::move(wanted)) {}
 
-  /// And the share of the change that they leave (a ratio of rms, at most 1).
+  /// The magnitudes, and the share of the change that they leave (a ratio of rms, at most 1).
   std::pair<std::map<std::string, double>, double> find() {
     VectorXd at = start();
     double least = cost(left_at({at})[0], at);

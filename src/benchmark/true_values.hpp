@@ -20,8 +20,8 @@ bool acts_on_sensors(blind::Effect effect);
 
 /// For each catalogue effect of `effects`: magnitudes, by "effect.parameter", that change the simulator's noise-free
 /// rows most as the robot's does; alone, on flights of the same seed without effects. Null if half of the change or
-/// more is left, or the bare robot crashes. Shapes have their prior, magnitudes none. `uncertain`: about any vehicle.
-/// Twenty seconds of a processor.
+/// more is left, or the bare robot crashes. Shapes have their prior, magnitudes none. `uncertain` may be of
+/// another vehicle: its changes are applied to this one. Takes 20 s of a processor.
 std::map<std::string, std::optional<double>> true_values(const blind::Case& c,
                                                          const std::vector<blind::BlindEffect>& effects,
                                                          const sim::Randomisation& uncertain, int threads);

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "flightlog/readings.hpp"
+#include "flightlog/rotation.hpp"
 #include "io/statistics.hpp"
 
 namespace flappy::flightlog {
@@ -94,11 +95,6 @@ std::vector<PoseReading> own_poses(const FlightLog& log) {
   return own;
 }
 
-Vector3d rotation_vector(const Eigen::Matrix3d& r) {
-  const Eigen::AngleAxisd a(r);
-  return a.angle() * a.axis();
-}
-
 }  // namespace
 
 std::vector<double> low_pass(const std::vector<double>& x, double per_sample) {
@@ -152,9 +148,10 @@ BeatAveragedMotion beat_averaged_motion(const FlightLog& log, double bandwidth_H
   };
   unseen(m.begin_s, m.begin_s + kEnds * period_s);
   unseen(poses.back().t_s - kEnds * period_s, INFINITY);  // not up to the last pose: rounding may place a step after it
-  for (std::size_t i = 1; i < poses.size(); ++i)
-    if (poses[i].t_s - poses[i - 1].t_s > kFilled * period_s)
-      unseen(poses[i - 1].t_s - kAround * period_s, poses[i].t_s + kAround * period_s);
+  const auto skip = [&](double before_s, double after_s) {  // a gap between two samples
+    if (after_s - before_s > kFilled * period_s) unseen(before_s - kAround * period_s, after_s + kAround * period_s);
+  };
+  for (std::size_t i = 1; i < poses.size(); ++i) skip(poses[i - 1].t_s, poses[i].t_s);
 
   std::vector<Eigen::Vector4d> smooth(n);
   for (Eigen::Index c = 0; c < 4; ++c) {
@@ -169,17 +166,23 @@ BeatAveragedMotion beat_averaged_motion(const FlightLog& log, double bandwidth_H
   m.position_m = filtered(position, per_sample);
   std::vector<Vector3d> rate(n);
   if (!log.imu.gyro_x_rad_s.empty()) {
+    const Column& t_s = log.imu.t_s;
+    const double late_s = log.header.imu.latency_s;
+    skip(m.begin_s, t_s.front() - late_s);
+    skip(t_s.back() - late_s, poses.back().t_s);
+    for (std::size_t i = 1; i < t_s.size(); ++i) skip(t_s[i - 1] - late_s, t_s[i] - late_s);
     std::vector<Vector3d> gyro(n);
     for (std::size_t i = 0, at = 0; i < n; ++i) {
-      const double t = m.t_s(i) + log.header.imu.latency_s;
-      while (at + 1 < log.imu.t_s.size() && log.imu.t_s[at + 1] <= t) ++at;
+      const double t = m.t_s(i) + late_s;
+      while (at + 1 < t_s.size() && t_s[at + 1] <= t) ++at;
       gyro[i] = imu_reading(log.imu, at).rate_rad_s;
     }
     rate = filtered(gyro, per_sample);
   } else {
     for (std::size_t i = 0; i < n; ++i) {
       const std::size_t a = i == 0 ? 0 : i - 1, b = std::min(i + 1, n - 1);
-      rate[i] = rotation_vector(m.attitude[a].transpose() * m.attitude[b]) / (m.step_s * static_cast<double>(b - a));
+      rate[i] = logarithm(Eigen::Quaterniond(m.attitude[a].transpose() * m.attitude[b])) /
+                (m.step_s * static_cast<double>(b - a));
     }
   }
   m.rate_rad_s = rate;

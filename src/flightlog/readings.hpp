@@ -29,8 +29,8 @@ std::vector<std::optional<Eigen::Quaterniond>> second_attitudes(const FlightLog&
 /// attitude.csv far more than the poses around it.
 std::vector<char> swapped_poses(const FlightLog& log);
 
-/// Replaces times of arrival by sampling instants of a regular clock fitted to mocap, IMU and power (first instant,
-/// period, gaps counted). A stream that fits no regular clock keeps its times.
+/// Replaces the jittering times of arrival of mocap, IMU and power by the nearest times of a regular clock (first instant,
+/// period, gaps counted); the mean latency stays in them. A stream that fits no regular clock keeps its times.
 FlightLog on_its_clocks(FlightLog log);
 
 /// A sample of the IMU, in B; the rate is 0 where there is no gyro.

@@ -173,8 +173,8 @@ void Smoother::read_imu(const FlightLog& log) {
     force_before = force;
   }
   bounds_s_.push_back(s.t_s.back() - late_s + interval_s / 2);
-  gyro_ = BeatAveragedSpline(bounds_s_, std::move(gyro));
-  accel_ = BeatAveragedSpline(bounds_s_, std::move(accel));
+  gyro_ = SplineOfMeans(bounds_s_, std::move(gyro));
+  accel_ = SplineOfMeans(bounds_s_, std::move(accel));
 }
 
 auto Smoother::read_poses(const FlightLog& log) const -> std::vector<Pose> {
@@ -359,7 +359,7 @@ std::optional<std::size_t> Smoother::imu_sample(double t_s) const {
   return sample_[k];
 }
 
-Vector3d Smoother::mean(const BeatAveragedSpline& signal, double from_s, double to_s) const {
+Vector3d Smoother::mean(const SplineOfMeans& signal, double from_s, double to_s) const {
   Vector3d sum = Vector3d::Zero();
   for (std::size_t k = last_not_after(bounds_s_, from_s); k + 1 < bounds_s_.size() && bounds_s_[k] < to_s; ++k) {
     const double length = bounds_s_[k + 1] - bounds_s_[k];

@@ -7,7 +7,7 @@
 //
 // Model of the IMU, from flight.toml: a sample is the mean over its interval, centred latency + 1/(2 pi bandwidth)
 // before t_s, with a first-order low-pass, which the smoother undoes, where the bandwidth is below that of such a mean.
-// Inside an interval the signal is the quadratic of BeatAveragedSpline: a sine of w rad/s is off by about (w
+// Inside an interval the signal is the quadratic of SplineOfMeans: a sine of w rad/s is off by about (w
 // interval)^4/180 of its amplitude; the gyro's noise stays (the body rate is not smoothed); a jump, as at a stop,
 // spreads over two intervals. In simulated hovering (500 Hz, noise 0.052 rad/s, rates of 10 rad/s, jumps of 2) the body
 // rate is off by 0.065 rad/s in the median, by 0.3 in one case of ten; its interval mean is as good as the gyro.
@@ -19,8 +19,8 @@
 #include <optional>
 #include <vector>
 
-#include "flightlog/beat_averaged_spline.hpp"
 #include "flightlog/flight_log.hpp"
+#include "flightlog/spline_of_means.hpp"
 #include "sim/replay.hpp"
 
 namespace flappy::flightlog {
@@ -98,7 +98,7 @@ class Smoother {
   Filtered filter(const std::vector<Pose>& poses, const Noise& noise);
   void smooth(const Filtered& filtered, const Noise& noise);
 
-  Eigen::Vector3d mean(const BeatAveragedSpline& signal, double from_s, double to_s) const;
+  Eigen::Vector3d mean(const SplineOfMeans& signal, double from_s, double to_s) const;
   std::size_t node_before(double t_s) const;
   Reading reading(std::size_t interval, double from_s, double to_s) const;
   static Eigen::Quaterniond to_middle(const State& x, const Reading& r);
@@ -113,7 +113,7 @@ class Smoother {
   std::vector<double> bounds_s_;     // bounds of the IMU's intervals
   std::vector<char> gap_;            // for each interval, whether it has no sample
   std::vector<std::size_t> sample_;  // for each interval, its sample of imu.csv; in a gap, the one after it
-  BeatAveragedSpline gyro_, accel_;
+  SplineOfMeans gyro_, accel_;
   std::vector<Node> nodes_;  // at every bound and every pose
   std::vector<double> pose_s_;
   std::vector<std::size_t> pose_node_;

@@ -163,6 +163,10 @@ void AtomicFile::commit() {
 
 void AtomicFile::refuse(int error) const { refuse_file(path_, "cannot be written", error); }
 
+std::string folder_name(const std::filesystem::path& folder) {
+  return (folder.has_filename() ? folder : folder.parent_path()).filename().string();
+}
+
 void make_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);

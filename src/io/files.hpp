@@ -55,6 +55,9 @@ class AtomicFile {
   std::FILE* file_ = nullptr;
 };
 
+/// The last name of a path: "escape" of "runs/escape" and of "runs/escape/".
+std::string folder_name(const std::filesystem::path& folder);
+
 /// Makes a folder and its parents where they are missing. Throws InputError where the folder cannot be written to.
 void make_folder(const std::filesystem::path& folder);
 

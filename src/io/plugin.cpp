@@ -19,7 +19,7 @@ const void* plugin_symbol(const std::string& name, const char* symbol, const std
   void* loaded = dlopen(file_of(name).c_str(), RTLD_NOW | RTLD_LOCAL);
   if (loaded == nullptr)
     throw InputError(file_of(name).string() + ": cannot be loaded: " + dlerror() +
-                     "; accepted: LibTorch as it was built with");
+                     "; accepted: the libraries that this build was made with");
   const void* found = dlsym(loaded, symbol);
   if (found == nullptr)
     throw InputError(file_of(name).string() + ": has no " + symbol + "; accepted: a plugin of this build");

@@ -45,7 +45,8 @@ class Collector {
   struct Pending {
     std::uint32_t count = 0;  // pending actions, at most `return_steps`
     std::uint32_t episode = 0;
-    std::uint64_t episodes = 0, waits = 0;  // waits: 1: handed back, and rewards count until until_s of the task
+    // waits: 1 after the hand-back while rewards still count (up to reward.until_s), else 0; 64 bits against padding
+    std::uint64_t episodes = 0, waits = 0;
     EpisodeSums sums;
     double episode_return = 0;
   };

@@ -15,8 +15,7 @@
 
 namespace flappy::learn {
 
-/// Names of columns, fixed for a run. The first is the step (update), which orders records. Columns that only some
-/// reports have, as those of an evaluation, are empty in the others.
+/// Names of columns, fixed for a run. The first is the step (update), which orders records.
 struct MetricsColumns {
   std::vector<std::string> metrics, timing;
 };

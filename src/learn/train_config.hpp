@@ -21,8 +21,8 @@
 //   [evaluate]              every (updates), vehicles
 //   [checkpoint]            every (updates), keep
 //
-// Every number of updates above is rounded up to a multiple of updates_per_step. Overrides of other keys, as
-// "task.reward.goal=1", apply to `fly`.
+// learn.updates, evaluate.every and checkpoint.every are rounded up to multiples of updates_per_step. Overrides of other
+// keys, as "task.reward.goal=1", apply to `fly`.
 #pragma once
 
 #include "learn/engine.hpp"

@@ -197,13 +197,13 @@ class Trainer {
   void evaluate() {
     const auto from = Clock::now();
     const double wall = wall_s();
+    const auto [simulation, learning] = shares();
     const rollout::Summary flown = judge();
     publish();
 
     collector_.share();
     const EpisodeSums sums = collector_.take_sums();
     const double samples = static_cast<double>(samples_);
-    const auto [simulation, learning] = shares();
     const auto share = [&](double count) { return count / sums.episodes; };
     const double figures[] = {static_cast<double>(updates()),
                               static_cast<double>(collector_.env_steps()),

@@ -7,6 +7,7 @@
 
 #include "flightlog/ros/flight_mcap.hpp"
 #include "io/parallel.hpp"
+#include "model/jointed.hpp"
 #include "rollout/rollout.hpp"
 #include "sim/storage.hpp"
 
@@ -73,6 +74,9 @@ FlyResult fly_all(const FlyConfig& config, const FlyOptions& options) {
     if (options.count > 1)
       throw io::InputError("--mcap: is of one flight, not of " + std::to_string(options.count) +
                            "; accepted: --count 1");
+    if (!model::mixed_inputs(config.vehicle).empty())
+      throw io::InputError(
+          "--mcap: holds voltages, and this vehicle has other inputs; accepted: a vehicle with motors");
     io::check_output(options.mcap);
   }
   std::size_t at_a_time = options.count;

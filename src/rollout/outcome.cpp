@@ -150,7 +150,7 @@ Summary summarise(std::span<const Outcome> flights) {
     if (o.captured_s > 0) {
       capture.push_back(o.captured_s);
       overshoot.push_back(o.overshoot_m);
-    } else {
+    } else if (o.failure == TaskFailure::never_captured) {
       ++s.missing[static_cast<std::size_t>(o.missing)];
     }
     strict_s.push_back(o.strict_s > 0 ? o.strict_s : std::numeric_limits<double>::infinity());

@@ -317,17 +317,18 @@ struct Recorder<T>::Storage {
     const std::int64_t end = sim::storage_of(fleet.batch()).steps;
     const std::int64_t begin = end - std::lround(fleet.period_s() * step_hz);
     bool sampled = false;
-    const auto sample_tick = [&] {
+    // Power belongs to the voltages that hold as the period begins: of an update at its first step, else of one before.
+    const auto add_power_once = [&] {
       if (!std::exchange(sampled, true) && log.power) add_power(time_s(begin));
     };
     if (!log.header.inputs.empty()) add_inputs(begin);
     else
       for (const DriverUpdate& u : driver_updates(fleet, flapper)) {
-        if (u.step > begin) sample_tick();
+        if (u.step > begin) add_power_once();
         add_command(u);
-        sample_tick();
+        add_power_once();
       }
-    sample_tick();
+    add_power_once();
     if (log.wings) add_wings(time_s(begin));
 
     look();
@@ -418,9 +419,10 @@ template <class T>
 double Recorder<T>::bytes_per_s(const FlyConfig& c) {
   const flight::FleetOptions& o = c.fleet;
   const std::size_t inputs = model::mixed_inputs(c.vehicle).size();
+  const std::size_t joints = c.vehicle.jointed ? kJointNames.size() : 0;
   const double commands = inputs > 0 ? static_cast<double>(1 + inputs) * o.control_hz : 8 / c.vehicle.driver.hold_s;
   const double numbers = commands + 7 * o.sensors.imu.rate_hz + 8 * o.sensors.mocap.rate_hz +
-                         static_cast<double>(kTruthNames.size() + 9) * o.control_hz;
+                         static_cast<double>(kTruthNames.size() + 9 + joints) * o.control_hz;
   return 2 * sizeof(double) * numbers;  // vectors grow by doubling
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/derive.hpp"
+
 namespace flappy::rollout {
 namespace {
 
@@ -33,8 +35,7 @@ std::vector<flight::Snapshot<T>> settle(const flight::FleetOptions& options, std
     const model::Vehicle v = vehicle(o.first_flapper + static_cast<std::uint32_t>(i));
     fleet.set_vehicle(i, v);
     fleet.start(i, 0);
-    const double beats_Hz = v.jointed ? v.jointed->frequency_Hz : v.driver.flapping_Hz;
-    const auto phases = std::max(1L, static_cast<long>(std::ceil(1 / beats_Hz / fleet.period_s())));
+    const auto phases = std::max(1L, static_cast<long>(std::ceil(1 / model::beats_Hz(v) / fleet.period_s())));
     taken_at[i] = settled + static_cast<long>((o.first_flapper + i) % static_cast<std::size_t>(phases));
   }
   const long last = std::ranges::max(taken_at);

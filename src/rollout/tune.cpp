@@ -115,6 +115,7 @@ TuneConfig read_tune_config(const std::filesystem::path& path, const std::vector
   c.vary = root.strings("vary");
   c.duration_s = root.number("duration_s", io::positive(1000));
   c.settle_s = root.number("settle_s", io::non_negative(1000));
+  if (c.settle_s >= c.duration_s) root.fail("settle_s", "is not before the end", "less than duration_s");
   c.seed = static_cast<std::uint64_t>(root.integer("seed", 0, INT64_MAX));
   c.population = static_cast<unsigned>(root.integer("population", 5, 10000));
   c.generations = static_cast<unsigned>(root.integer("generations", 1, 100000));

@@ -66,6 +66,10 @@ void add_parts(Section& section, const std::vector<Case>& cases) {
   section.add(f);
 }
 
+/// Parts without a single effect of the catalogue as their truth.
+constexpr const char* kOthers[] = {"withheld",         "outside",         "pairs",        "hover",
+                                   "changed_withheld", "changed_outside", "changed_pairs"};
+
 /// Adds the confusion matrix of the cases with one effect or none: true cause by verdict.
 void add_confusion(Section& section, const std::vector<Case>& cases) {
   std::vector<std::string> rows, columns;
@@ -74,10 +78,11 @@ void add_confusion(Section& section, const std::vector<Case>& cases) {
     if (std::ranges::find(list, name) == list.end()) list.push_back(name);
   };
   for (const Case& c : cases) {
-    if (c.part == "withheld" || c.part == "outside" || c.part == "pairs" || c.part == "hover") continue;
+    if (std::ranges::find(kOthers, c.part) != std::end(kOthers)) continue;
     const std::string truth = c.truth.empty() ? "(" + c.part + ")" : in_words(c.truth);
     const bool several = c.named.find('+') != std::string::npos;
-    const std::string said = c.verdict != "effect" ? "(" + c.verdict + ")" : several ? "(several)" : in_words(c.named);
+    const bool names = c.verdict == "effect" || c.verdict == "remainder";
+    const std::string said = !names ? "(" + c.verdict + ")" : several ? "(several)" : in_words(c.named);
     add(rows, truth), add(columns, said);
     ++counts[{truth, said}];
   }

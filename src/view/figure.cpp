@@ -46,8 +46,9 @@ std::string in_double_quotes(const std::string& text) {
   return q + "\"";
 }
 
-/// Breaks a name into lines of about kLine letters, as an expression of gnuplot.
-constexpr std::size_t kLine = 40;
+constexpr std::size_t kLine = 40;  ///< letters
+
+/// A name in lines of about kLine letters.
 std::vector<std::string> lines_of(const std::string& name) {
   std::vector<std::string> lines = {""};
   for (std::size_t at = 0; at < name.size();) {
@@ -106,6 +107,7 @@ std::string plot_of(const Series& s) {
   return "";
 }
 
+/// A name in lines, as an expression of gnuplot.
 std::string in_lines(const std::string& name) {
   std::string text;
   for (const std::string& line : lines_of(name)) text += (text.empty() ? "" : ".\"\\n\".") + quoted(line);

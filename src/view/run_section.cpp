@@ -25,7 +25,7 @@ struct Run {
 };
 
 Run read_run(const fs::path& folder) {
-  Run run{folder.filename().string(),
+  Run run{io::folder_name(folder),
           folder,
           learn::read_metrics(folder / "metrics.jsonl"),
           learn::read_metrics(folder / "timing.jsonl"),

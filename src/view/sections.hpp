@@ -34,7 +34,7 @@ Section speed_section(const std::filesystem::path& file);
 Section run_section(const std::filesystem::path& folder);  ///< a run of flappy-train, or several (--seeds)
 
 /// A scored blind benchmark: its folder, or score.csv alone, such as docs/results/blind_reported.csv; reads predictions
-/// and sealed labels next to it. The block "cases": {"cases": [{"number", "part", "truth", "verdict", "named",
+/// next to it. The block "cases": {"cases": [{"number", "part", "truth", "verdict", "named",
 /// "probability", "right", "details": [[name, text]], "rivals": [[name, probability]]}]}.
 Section benchmark_section(const std::filesystem::path& path);
 

@@ -23,8 +23,7 @@ class ValidationPart {
  public:
   ValidationPart(Section& section, const gap::Diagnosis& diagnosis)
       : section_(section), validation_(*diagnosis.validation), flights_(diagnosis.flights.size()) {
-    for (const std::string& flight : diagnosis.flights)
-      names_.push_back(std::filesystem::path(flight).filename().string());
+    for (const std::string& flight : diagnosis.flights) names_.push_back(io::folder_name(flight));
     for (std::size_t i = 0; i < validation_.ladder.size(); ++i) {
       const std::string& added = validation_.ladder[i].added;
       if (i > 1) effects_.push_back(added);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -122,6 +123,24 @@ TEST(BeatAveragedMotion, LeavesOutWhatWasNotSeen) {
   for (std::size_t i = 0; i < m.size(); ++i)
     if (m.t_s(i) > 8.3 && m.t_s(i) < 10.7) EXPECT_EQ(m.seen[i], 0) << m.t_s(i);
   expect_true(m, 0.05);  // what a straight line made of the gap reaches a little way through the filter
+}
+
+TEST(BeatAveragedMotion, LeavesOutWhatTheGyroMissed) {
+  FlightLog log = flight(20);
+  ImuStream& u = log.imu;
+  for (int i = 400; i < 1700; ++i) {  // 4 s to 17 s, nothing from 9 s to 10 s
+    if (i >= 900 && i < 1000) continue;
+    const Truth x = truth(i / 100.0);
+    u.t_s.push_back(i / 100.0);
+    u.gyro_x_rad_s.push_back(x.rate.x()), u.gyro_y_rad_s.push_back(x.rate.y()), u.gyro_z_rad_s.push_back(x.rate.z());
+    for (Column* c : {&u.accel_x_m_s2, &u.accel_y_m_s2, &u.accel_z_m_s2}) c->push_back(0);
+  }
+  const BeatAveragedMotion m = beat_averaged_motion(log, kBandwidth_Hz, "flight");
+  const std::ptrdiff_t unseen = std::ranges::count(m.seen, 0);
+  for (std::size_t i = 0; i < m.size(); ++i)
+    if (const double t = m.t_s(i); t < 4 || (t > 8.99 && t < 10) || t > 17) EXPECT_EQ(m.seen[i], 0) << t;
+  // 4 + 1 + 3 s, and four times 2.5 periods of the bandwidth beside them
+  EXPECT_NEAR(static_cast<double>(unseen) * m.step_s, 8 + 4 * 2.5 / kBandwidth_Hz, 0.1);
 }
 
 TEST(BeatAveragedMotion, RefusesWhatIsTooShortOrTooSlow) {

@@ -187,6 +187,9 @@ TEST(Summary, CountsEachFlightOnce) {
   EXPECT_EQ(s.failures[static_cast<std::size_t>(rollout::TaskFailure::lost_tilt)], 1u);
   EXPECT_EQ(s.failures[0], 6u);
   EXPECT_EQ(s.missing[static_cast<std::size_t>(rollout::Demand::heading)], 3u);
+  rollout::Outcome crashed;  // before it could capture
+  crashed.failure = rollout::TaskFailure::lost_tilt, crashed.missing = rollout::Demand::heading;
+  EXPECT_EQ(summarise(std::span(&crashed, 1)).missing[static_cast<std::size_t>(rollout::Demand::heading)], 0u);
   std::swap(flights[0], flights[1]);
   EXPECT_NE(summarise(flights).hash, s.hash);
   const rollout::Summary nothing = rollout::summarise(std::span<const rollout::Outcome>());

@@ -251,6 +251,8 @@ def check_flight(browser: Browser) -> None:
     for box in browser.driver.find_elements("css selector", ".choice input"):
         if not box.is_selected():
             box.send_keys(" ")
+    browser.run("const p = players[0]; p.timeline.show(p.duration_s / 3); p.seek(p.duration_s)")
+    assert browser.run("const p = players[0]; return Math.abs(p.timeline.end_s - p.duration_s) < 1e-9"), "a window does not reach the end"
     browser.run("players[0].look('chase'); players[0].timeline.show(players[0].duration_s); players[0].seek(0.2)")
 
 

@@ -53,7 +53,7 @@ typedef enum {
 #define FLAPPY_GUEST_BAD_CONTROLLER 2U /* the controller's self-test failed */
 #define FLAPPY_GUEST_HANDED_BACK 4U    /* the task is done, or its time is over */
 #define FLAPPY_GUEST_TAKEN_BACK 8U     /* the wish ended, or the autopilot no longer flies */
-#define FLAPPY_GUEST_LATE 16U          /* this and all that follow are faults */
+#define FLAPPY_GUEST_LATE 16U          /* this and the next two are faults */
 #define FLAPPY_GUEST_AWAY 32U          /* too far from its path */
 #define FLAPPY_GUEST_NOT_FINITE 64U    /* estimate, observation or inputs are no numbers */
 #define FLAPPY_GUEST_FAULTS 112U

@@ -5,6 +5,7 @@
 #include "io/installation.hpp"
 #include "io/progress.hpp"
 #include "io/run_program.hpp"
+#include "learn/trainer.hpp"
 
 namespace flappy {
 namespace {
@@ -26,10 +27,9 @@ design::Policy trained(const fs::path& folder, const fs::path& config) {
   const auto file = [&](const char* key) {
     return std::string(key) + "=" + fs::absolute(folder / (std::string(key) + ".toml")).string();
   };
-  if (!fs::exists(run_folder / "summary.json")) {
-    if (fs::exists(run_folder / "run.json")) run("flappy-train", {"--resume", run_folder});
-    else run("flappy-train", {config, "--out", run_folder, "--set", file("vehicle"), "--set", file("controller")});
-  }
+  if (!fs::exists(run_folder / "run.json"))
+    run("flappy-train", {config, "--out", run_folder, "--set", file("vehicle"), "--set", file("controller")});
+  else if (learn::unfinished_run_in(run_folder)) run("flappy-train", {"--resume", run_folder});
   if (!io::interrupted() && !fs::exists(found)) run("flappy-eval", {run_folder, "--no-baselines", "--json", found});
   if (!fs::exists(found)) return {};
   const auto json = nlohmann::ordered_json::parse(io::read_text(found));

@@ -28,7 +28,8 @@ Json run(const CalibrationSettings& s, io::Program& program) {
   const model::Vehicle vehicle = s.source.read_vehicle();
   model::Vehicle truth = model::read_vehicle(s.truth);
   const FitConfig config = s.fit.read_config(vehicle);
-  const FitOptions options = s.fit.options(s.source.options(vehicle));
+  FitOptions options = s.fit.options(s.source.options(vehicle));
+  options.progress = [](const std::string&, double, double) { return !io::interrupted(); };
   const std::vector<double*> true_values = fitted_values(config, truth);
   const std::vector<sim::Input> inputs = s.inputs.empty() ? default_inputs() : read_inputs(s.inputs, vehicle.driver);
   const std::vector<sim::Input> held =
@@ -51,6 +52,7 @@ Json run(const CalibrationSettings& s, io::Program& program) {
     MeasuredMap measured = simulate_forces(truth, inputs, {}, seed, options.map);
     measured.name = s.inputs.empty() ? "map of " + s.truth : s.inputs;
     const ForceFit fit = fit_forces(vehicle, measured, config, options);
+    if (io::interrupted()) break;  // this fit was cut short
     of_seed[1] = fit.after.total;
     if (!held.empty()) {
       const MeasuredMap other = simulate_forces(truth, held, {}, seed + 1000000, options.map);

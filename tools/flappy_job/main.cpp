@@ -75,7 +75,6 @@ int main(int argc, char** argv) {
     const io::DdsConfig where = io::read_dds_config(config.root());
     config.root().finish();
     server::CommandClient client(where, timeout_s);
-    io::stop_on_interrupt();
 
     if (list.given()) {
       nlohmann::ordered_json all = nlohmann::ordered_json::array();
@@ -83,6 +82,7 @@ int main(int argc, char** argv) {
       return program.write_json({{"jobs", all}});
     }
     if (watch.given()) {
+      io::stop_on_interrupt();
       bool over = false;
       for (const server::JobStatus& each : client.list())
         if (watched == 0 || each.id == watched) job::print(each), over |= each.id == watched && job::is_over(each);

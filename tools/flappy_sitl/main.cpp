@@ -57,13 +57,18 @@ int main(int argc, char** argv) {
   app.option("--timeout", options.timeout_s, "seconds without an autopilot, or in lock step without its input")
       .range(0.01, 3600.0)
       .shows_default();
-  app.option("--manoeuvre", options.manoeuvre_s, "seconds after which the pilot wishes for the task's manoeuvre");
+  app.option("--manoeuvre", options.manoeuvre_s, "seconds after which the pilot wishes for the task's manoeuvre")
+      .range(0.01, 1e6);
   app.option("--log", log, "folder for the log of the flight");
   app.option("--set", overrides, "override a key: flight.duration_s=2, dds.reach=host").one_at_a_time();
   return program.run(argc, argv, [&] {
     rollout::FlyConfig config = rollout::read_fly_config(config_name, overrides);
     config.actor.reset();
     config.fleet.task.forbid_actions();
+    if (options.manoeuvre_s >= config.duration_s)
+      throw io::InputError("--manoeuvre: is " + io::shortest_digits(options.manoeuvre_s) +
+                           " s; accepted: less than flight.duration_s, " + io::shortest_digits(config.duration_s) +
+                           " s");
     options.lock_step = !real_time;
     options.log_folder = log;
     io::ProgressLine progress("flown");

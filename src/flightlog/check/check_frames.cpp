@@ -139,7 +139,7 @@ Shoves shoves_of(const Context& c) {
 }
 
 /// Mean square of the specific force from positions less that from the accelerometer, less a constant.
-double remainder(const Context& c, const Shoves& shoves, const Frames& frames, double unit) {
+double misfit(const Context& c, const Shoves& shoves, const Frames& frames, double unit) {
   std::vector<Vector3d> felt(shoves.attitude.size());
   for (std::size_t k = 0; k < felt.size(); ++k)
     felt[k] = frames.attitude(shoves.attitude[k]) * (frames.accel * c.motion.accel_m_s2()[k] * unit);
@@ -173,11 +173,11 @@ const Frames* check_axes(Context& c, const Hypotheses& h) {
   const double gravity = c.log.header.gravity_m_s2;
   const bool in_g = gravity > 5 && mean.norm() > 0.7 && mean.norm() < 1.3;
   std::vector<double> left;
-  for (const Frames& f : h.all) left.push_back(remainder(c, shoves, f, in_g ? gravity : 1));
-  const Values values = {{"remainder_m_s2", std::sqrt(left[0])},
+  for (const Frames& f : h.all) left.push_back(misfit(c, shoves, f, in_g ? gravity : 1));
+  const Values values = {{"misfit_m_s2", std::sqrt(left[0])},
                          {"pitch_inverted_m_s2", std::sqrt(left[1])},
                          {"roll_inverted_m_s2", std::sqrt(left[2])}};
-  // Noise and lever arms leave the same remainder in all hypotheses; over so many windows, chance never halves it.
+  // Noise and lever arms leave the same misfit in all hypotheses; over so many windows, chance never halves it.
   constexpr double kFar = 0.5, kNear = 1.2, kTells = 1.5;
   const double least = *std::ranges::min_element(left);
   const std::string seen =

@@ -193,14 +193,14 @@ std::pair<std::string, LogPlace> find_mistake(Context& c) {
   double total = 0, noise = 0;
   for (const FrameHypothesis& h : all) {
     const Pairs pairs = pair_up(c.motion, c.windows, h.frame.order, c.lag);
-    left.push_back(remainder(pairs, h.frame.axes, h.scale));
-    total = remainder(pairs, Matrix3d::Identity(), 0);
+    left.push_back(misfit(pairs, h.frame.axes, h.scale));
+    total = misfit(pairs, Matrix3d::Identity(), 0);
     noise = 3 * static_cast<double>(pairs.mocap.size()) * c.rate_noise * c.rate_noise;
   }
   // Some mistakes look alike near level flight: of those that noise does not tell apart, report the likelier.
   const double least = *std::ranges::min_element(left);
   const auto near = [&](double r) { return r <= 2 * least + 2 * noise; };
-  const double declared = remainder(pair_up(c.motion, c.windows, Order::wxyz, c.lag), Matrix3d::Identity(), 1);
+  const double declared = misfit(pair_up(c.motion, c.windows, Order::wxyz, c.lag), Matrix3d::Identity(), 1);
   if (least > 0.5 * total || near(declared)) return {};
   const auto found = std::ranges::find_if(left, near);
   const FrameHypothesis& h = all[static_cast<std::size_t>(found - left.begin())];

@@ -181,4 +181,12 @@ std::vector<DataFault> data_faults(const std::vector<FlightLog>& logs, const std
   return all;
 }
 
+FlightLog read_faultless_log(const std::filesystem::path& folder) {
+  FlightLog log = read_flight_log(folder);
+  if (const auto faults = data_faults(log, folder); !faults.empty())
+    throw io::InputError(faults.front().file + ":" + std::to_string(faults.front().line) + ": " + faults.front().what +
+                         "; accepted: flights that flappy-gap check finds no fault in");
+  return log;
+}
+
 }  // namespace flappy::flightlog

@@ -27,4 +27,7 @@ inline std::vector<DataFault> data_faults(const FlightLog& log, const std::files
 /// The faults of several flights of one robot, whose declared inputs are also compared with one another.
 std::vector<DataFault> data_faults(const std::vector<FlightLog>& logs, const std::vector<std::string>& folders);
 
+/// Reads a log. Throws io::InputError with the first fault, if any.
+FlightLog read_faultless_log(const std::filesystem::path& folder);
+
 }  // namespace flappy::flightlog

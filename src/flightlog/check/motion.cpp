@@ -269,7 +269,7 @@ std::optional<LagEstimate> refine_lag(const SensorMotion& motion, const std::vec
   return LagEstimate{moved_s, sd};
 }
 
-double remainder(const Pairs& pairs, const Matrix3d& axes, double scale) {
+double misfit(const Pairs& pairs, const Matrix3d& axes, double scale) {
   const Moments m = moments(pairs);
   return m.mocap - 2 * scale * overlap(axes, m.cross) + scale * scale * m.gyro;
 }

@@ -111,7 +111,7 @@ std::optional<LagEstimate> refine_lag(const SensorMotion& motion, const std::vec
                                       const SensorFrame& frame, Lag start, double noise);
 
 /// Sum of squares of mocap's rates less `scale x axes x gyro` and less a constant.
-double remainder(const Pairs& pairs, const Matrix3d& axes, double scale);
+double misfit(const Pairs& pairs, const Matrix3d& axes, double scale);
 
 /// mocap = gain x gyro + offset, by least squares. An axis with too little rotation is untested, gain 1.
 struct Gains {

@@ -119,7 +119,7 @@ struct Mapping {
   bool from_first = true;  ///< whether the log's 0 s is the first sample; else 0 of the receiver's clock
   std::map<std::string, double> offsets_s;  ///< given offsets of clocks
   io::DdsConfig dds;                        ///< how a recorder reaches the robot
-  std::vector<StreamMapping> streams;       ///< command, mocap, and imu, power, wings and attitude where mapped
+  std::vector<StreamMapping> streams;       ///< command, mocap, and imu, power, wings, attitude and policy where mapped
 
   Wanted wanted() const;
 };

@@ -242,7 +242,8 @@ std::vector<ClosedLoop> predict_closed_loop(const Flights& flights, const model:
     Quantities& to = found[f][1 + v];
     to.fill(kNan);
     if (beats.size() < kMinBeats) return;
-    const Sortie sortie = options.own_path ? Sortie{pilot, pilot.settle_s, pilot.duration_s} : along(beats, r, pilot);
+    Sortie sortie = options.own_path ? Sortie{pilot, pilot.settle_s, pilot.duration_s} : along(beats, r, pilot);
+    sortie.config.changes = r.log.header.changes;
     to = predict(sortie, r, *vehicles[v], options.copies);
   });
   std::vector<ClosedLoop> rows;

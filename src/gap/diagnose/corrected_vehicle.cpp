@@ -9,7 +9,7 @@ model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Inference&
                                  sim::Randomisation uncertain) {
   uncertain.set_minors(inference.corrected.minors);
   const ScoredHypothesis& best = inference.predicting();
-  const ResidualLoad* load = inference.residual && inference.residual->helps() ? &*inference.residual : nullptr;
+  const ResidualLoad* load = inference.residual && inference.residual->helps ? &*inference.residual : nullptr;
   const Hypothesis h(uncertain, load != nullptr ? load->effects : inference.corrected.effects);
   const Fit& fit = best.kind == HypothesisKind::effect ? best.fit : inference.parameters;
   model::Vehicle corrected = vehicle;

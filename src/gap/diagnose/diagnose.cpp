@@ -128,6 +128,10 @@ DiagnosisRequest read_request(const DiagnosisSettings& settings) {
   options.rule =
       read_verdict_rule(contrast && s.verdict.empty() ? fs::path(io::config_path("gap/contrast_verdict.toml"))
                                                       : file(s.verdict, "verdict.toml"));
+  if (options.discrepancy.beat_averaged != beat_averaged)
+    throw io::InputError("--discrepancy " + s.discrepancy + ": is of vehicles " +
+                         (beat_averaged ? "with wings" : "that are beat-averaged") +
+                         "; accepted: one that was learnt from vehicles like " + vehicle.name);
   if (contrast) options.discrepancy.session = read_session_variation(file(s.sessions, "session_variation.toml"));
   return {s,
           std::move(sets),
@@ -159,7 +163,8 @@ Diagnosed diagnose_flights(const DiagnosisRequest& request, const std::vector<st
   if (references > 0) check_same_streams(headers, folders);
   Diagnosed d;
   if (std::vector<flightlog::DataFault> faults = data_faults(logs, folders); !faults.empty()) {
-    d.result = result_of(folders, std::move(faults));
+    d.result = result_of(tests, std::move(faults));
+    d.result.reference = request.settings.reference;
     return d;
   }
   while (reference.flights.size() < references) {
@@ -194,6 +199,7 @@ Diagnosed diagnose(const DiagnosisRequest& request,
   Reference reference;
   Diagnosed d = diagnose_flights(request, request.settings.flights, reference, progress);
   for (const NamedFlights& other : request.others) {
+    if (!d.result.complete) break;
     d.result.sets.push_back({other.name, diagnose_flights(request, other.flights, reference, progress).result});
     d.result.complete = d.result.complete && d.result.sets.back().diagnosis.complete;
   }

@@ -66,7 +66,8 @@ struct Diagnosed {
 Diagnosed diagnose(const DiagnosisRequest& request,
                    const std::function<bool(double share, const std::string& what)>& progress = {});
 
-/// Adds the closed-loop check (closed_loop_prediction.hpp). No effect on incomplete results and beat-averaged vehicles.
+/// Adds the closed-loop check (closed_loop_prediction.hpp). No effect on incomplete results, beat-averaged vehicles and
+/// contrasts.
 void fly_closed_loop(const DiagnosisRequest& request, Diagnosed& diagnosed);
 /// Adds the most informative next flight (next_experiment.hpp) if the second hypothesis is probable enough. No effect
 /// on incomplete results and beat-averaged vehicles.

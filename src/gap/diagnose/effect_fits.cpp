@@ -17,10 +17,6 @@ using Eigen::VectorXd;
 /// Number of hypotheses tried with a remainder, and of single effects with which the parameters are fitted again.
 constexpr std::size_t kMaxRemainders = 3, kMaxMoved = 3;
 constexpr int kFitIterations = 6;
-/// Log evidence of a hypothesis whose vehicle cannot be simulated.
-constexpr double kRefuted = -1e9;
-/// An effect cannot show if its magnitudes change no coefficient by more, in the channel's unit per unit coordinate.
-constexpr double kNoChange = 1e-9;
 
 ScoredHypothesis baseline(HypothesisKind kind, double log_evidence, double prior) {
   ScoredHypothesis a;
@@ -262,10 +258,12 @@ std::vector<ScoredHypothesis> EffectFits::single_effects(const ScreenedCatalogue
     order.resize(std::min(order.size(), kMaxMoved));
     io::parallel_for(order.size(), threads_,
                      [&](std::size_t i) { move_parameters({finalists[order[i]]}, robot_.fitter(), fits[order[i]]); });
-    for (std::size_t i = 0; i < fits.size(); ++i)
+    for (std::size_t i = 0; i < fits.size(); ++i) {
       // a fit that explains less than the linear model did not find the effect
-      if (vanished(fits[i]) || fits[i].log_evidence < linear(finalists[i]).log_evidence) open.push_back(finalists[i]);
-      else singles.push_back(std::move(fits[i]));
+      ScoredHypothesis screened = linear(finalists[i]);
+      const bool found = !vanished(fits[i]) && !(fits[i].log_evidence < screened.log_evidence);
+      singles.push_back(std::move(found ? fits[i] : screened));
+    }
   } else {
     open.insert(open.end(), finalists.begin(), finalists.end());
   }

@@ -304,7 +304,10 @@ Validation validate(const Fitter& fitter, const sim::Randomisation& uncertain, c
     if (!std::ranges::count(types, name)) types.push_back(name);
     type.push_back(static_cast<int>(std::ranges::find(types, name) - types.begin()));
   }
-  const std::vector<Residuals> by_type = held_out(fitter, flights, fits, type, threads);
+  std::vector<Residuals> by_type;
+  if (types.size() > 1) by_type = held_out(fitter, flights, fits, type, threads);
+  else
+    for (const Residuals* each : left) by_type.push_back(*each);  // of one type, none could be held out
   const auto rung = [&](const std::string& added, const Residuals& each, const Residuals& by_types) {
     v.ladder.push_back({added, {}});
     for (const int channel : channels_of(flights))

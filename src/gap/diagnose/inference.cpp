@@ -37,8 +37,8 @@ class Progress {
 /// How far a joint fit moves the coordinates of unknowns, by effect and index of the unknown.
 using Moves = std::map<std::pair<std::string, Eigen::Index>, double>;
 
-/// Moves by background magnitudes. Effects of a place or of the air are left out: their background belongs to the flights,
-/// not to the robot. `first`: NuisanceMean::place of the first background.
+/// Moves by background magnitudes, of effects in of_models only: the background of others belongs to the flights, not to
+/// the robot. `first`: NuisanceMean::place of the first background.
 Moves moves_of(const ModelDiscrepancy& discrepancy, const std::vector<Background>& background,
                const Fitter::JointFit& joint, std::size_t first) {
   Moves moves;

@@ -57,9 +57,11 @@ struct ResidualLoad {
   std::map<std::string, double> limits;  ///< largest flown velocity or rate, by name of the load's limit
   /// Mean losses in held-out flights of the corrected vehicle without the load and with it; none: a single flight.
   std::optional<double> loss_without, loss;
-  /// Whether it predicts flights held out better; else the corrected vehicle does without it.
-  bool helps() const { return !loss || !loss_without || *loss < *loss_without; }
+  bool helps = true;  ///< whether it predicts flights held out better; else the corrected vehicle does without it
 };
+
+/// Log evidence of a hypothesis that is refuted, or whose vehicle cannot be simulated.
+inline constexpr double kRefuted = -1e9;
 
 struct InferenceOptions {
   int threads = 0;

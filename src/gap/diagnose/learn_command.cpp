@@ -27,11 +27,7 @@ std::vector<fs::path> flights_of(const fs::path& robot) {
 /// Appends the flights in a folder.
 void read_flights(const std::string& from, const model::Vehicle& vehicle, bool reference, Flights& to) {
   for (const fs::path& folder : flights_of(from)) {
-    flightlog::FlightLog log = flightlog::read_flight_log(folder);
-    if (const auto faults = data_faults(log, folder); !faults.empty())
-      throw io::InputError(faults.front().file + ":" + std::to_string(faults.front().line) + ": " +
-                           faults.front().what + "; accepted: flights that flappy-gap check finds no fault in");
-    const auto flight = prediction_of(vehicle, folder, std::move(log));
+    const auto flight = prediction_of(vehicle, folder, flightlog::read_faultless_log(folder));
     if (reference) flight->set_reference();
     to.push_back(flight);
   }
@@ -49,8 +45,14 @@ void run_learn_discrepancy(const LearnCommand& command) {
   if (!vehicle.beat_averaged) vehicle = model::read_vehicle_for_steps(command.vehicle, kHoldStep_s);
   const sim::Randomisation uncertain = sim::read_randomisation(vehicle, io::Config::load(command.priors).root());
   ModelDiscrepancy start = read_model_discrepancy(command.discrepancy);
-  if (command.robots.empty() == command.pairs.empty())
+  if (start.beat_averaged != vehicle.beat_averaged.has_value())
+    throw io::InputError("--discrepancy " + command.discrepancy + ": is of vehicles " +
+                         (start.beat_averaged ? "that are beat-averaged" : "with wings") +
+                         "; accepted: one that was learnt from vehicles like " + vehicle.name);
+  if (command.robots.empty() && command.pairs.empty())
     throw io::InputError("nothing to learn from; accepted: either --robots or --pairs");
+  if (!command.robots.empty() && !command.pairs.empty())
+    throw io::InputError("--robots and --pairs: are both given; accepted: one of them");
   std::vector<Flights> robots;
   for (const std::string& robot : command.robots) {
     robots.emplace_back();

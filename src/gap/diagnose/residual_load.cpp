@@ -76,6 +76,7 @@ std::optional<ResidualLoad> fit_residual_load(const RobotFit& robot, const Fitte
   const RowContext context = row_context_of(asked, d.noise_sd);
   l.loss_without = losses_of(context, before).mean();
   l.loss = losses_of(context, after).mean();
+  l.helps = l.loss && l.loss_without && *l.loss < *l.loss_without;
   return l;
 }
 

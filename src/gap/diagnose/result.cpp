@@ -9,8 +9,6 @@
 namespace flappy::gap {
 namespace {
 
-/// Half width of a normal 90 % interval, in standard deviations.
-constexpr double kHalf90 = 1.645;
 /// Smallest error of a sensor that is reported, in prior standard deviations.
 constexpr double kMinSensorError = 0.25;
 

@@ -257,8 +257,7 @@ std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::strin
   if (const ClosedLoop* c = most_corrected(diagnosis.closed_loop))
     lines.push_back(
         io::format("in closed loop, %s: %s recorded %.3g, by the vehicle's file %.3g, by the corrected one %.3g",
-                   std::filesystem::path(c->flight).filename().c_str(), c->quantity.c_str(), c->recorded, c->nominal,
-                   c->corrected));
+                   io::folder_name(c->flight).c_str(), c->quantity.c_str(), c->recorded, c->nominal, c->corrected));
   if (diagnosis.next) lines.push_back(proposal_line(*diagnosis.next));
   lines.push_back(diagnosis.complete ? next_line(diagnosis, out) : "next: the same command again, to its end");
   return lines;

@@ -16,7 +16,6 @@ using Eigen::VectorXd;
 
 /// Refuted only if the regime explains more than this share of the parameters' residual; less may be chance.
 constexpr double kMinExplainable = 0.15;
-constexpr double kRefuted = -1e9;
 
 const ScoredHypothesis& parameters_alone(const std::vector<ScoredHypothesis>& all) {
   return *std::ranges::find(all, HypothesisKind::parameters, &ScoredHypothesis::kind);
@@ -42,7 +41,8 @@ void refute_idle_effects(const Flights& flights, Inference& d) {
   std::vector<std::optional<double>> losses;
   for (const ScoredHypothesis& a : all) losses.push_back(losses_of(context, a.held_out).mean());
   const auto idle = [&](std::size_t with, const std::optional<double>& without) {
-    return losses[with] && without && !(*losses[with] < *without);
+    if (all[with].held_out.empty() || !without) return false;
+    return !losses[with] || !(*losses[with] < *without);  // none: it diverges
   };
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (!all[i].fitted()) continue;

@@ -35,9 +35,9 @@ void conclude(const VerdictRule& rule, Inference& d, bool contrast = false);
 /// effects may be due to chance, so they are not named; yet a vehicle with them predicts better.
 void predict_with_the_likeliest(Inference& d);
 
-/// Refutes hypotheses that explain too little of held-out flights, and those with an effect without which these are
-/// predicted as well, gives hypotheses without an effect its background
-/// magnitude, sets the probabilities and concludes. `fitter`: with the scales of the parameters alone.
+/// Refutes hypotheses that explain too little of held-out flights, and effects without which these are predicted as well.
+/// Lets hypotheses without an effect have it as background. Then sets the probabilities and concludes.
+/// `fitter`: with the scales of the parameters alone.
 void decide(const RobotFit& robot, const Fitter& fitter, const Flights& flights, const VerdictRule& rule, Inference& d);
 
 /// Sorted groups of the effects, joined by +: "body_drag+world_force". An effect without a group is its own group.

@@ -114,9 +114,9 @@ Evidence Evidence::with_noise(const Residuals& residual) const {
   return e;
 }
 
-Evidence Evidence::with_remainder(const Residuals& residual) const {
+Evidence Evidence::with_rest_as_noise(const Residuals& residual) const {
   Evidence e = *this;
-  e.learn(residual, Learn::remainder);
+  e.learn(residual, Learn::rest_as_noise);
   e.sum_basis();
   e.scales_held_ = true;
   return e;
@@ -184,7 +184,7 @@ void Evidence::learn(const Residuals& residual, Learn what) {
     if (n == 0) return;
     VectorXd delta = VectorXd::Zero(q);
     if (flight(0).disturbed(channel)) delta = session_means(residual, g);
-    else if (what != Learn::remainder) delta = inverse_[static_cast<std::size_t>(channel)] * right;
+    else if (what != Learn::rest_as_noise) delta = inverse_[static_cast<std::size_t>(channel)] * right;
     const auto left = [&](std::size_t f, std::size_t j) {
       return residual[f][row_of(j, g)] - basis().values(f).row(static_cast<Index>(j)).dot(delta);
     };

@@ -136,7 +136,7 @@ class Evidence {
   /// Learns only the weights of outliers: for residuals that are larger than the noise.
   Evidence with_weights(const Residuals& residual) const;
   /// Learns the noise from the whole residual, with its smooth part. From then on, scales stay 1 except of free blocks.
-  Evidence with_remainder(const Residuals& residual) const;
+  Evidence with_rest_as_noise(const Residuals& residual) const;
   Evidence with_discrepancy(ModelDiscrepancy discrepancy) const;
 
   const RegimeBasis& basis() const { return *basis_; }
@@ -189,7 +189,7 @@ class Evidence {
     double sd = 1, past = 0, signal = 0;
     double declared_sd = 0;
   };
-  enum class Learn { declared, weights, noise, remainder };
+  enum class Learn { declared, weights, noise, rest_as_noise };
   const PredictedFlight& flight(std::size_t f) const { return *(*flights_)[f]; }
   bool has_rows(int group) const { return flight(0).has_rows(group / kCoefficients, group % kCoefficients); }
   bool may_be_free(std::size_t block) const;

@@ -79,7 +79,7 @@ class Fitter {
   struct NuisanceEstimate : NuisanceMean {
     double sd;
   };
-  /// Posteriors of all nuisance regressors that were not left out.
+  /// Posteriors of the errors of sensors and the minor draws that were not left out; none of background magnitudes.
   std::vector<NuisanceEstimate> nuisances(const Fit& fit) const;
 
   /// The columns of a fit, without empty ones.

@@ -11,8 +11,6 @@ namespace {
 constexpr double kImuLagSd_s = 5e-4;
 /// Largest deviation of a parameter, in standard deviations.
 constexpr double kMaxDeviation = 4;
-/// Half width of a normal 90 % interval, also the 90 % quantile of a half-normal, in standard deviations.
-constexpr double kHalf90 = 1.645;
 
 }  // namespace
 

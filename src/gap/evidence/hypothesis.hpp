@@ -17,6 +17,9 @@ struct CatalogueEffect;
 
 namespace flappy::gap {
 
+/// Half a 90 % interval of a normal distribution, also the 90 % quantile of a half-normal, in standard deviations.
+inline constexpr double kHalf90 = 1.645;
+
 /// One coordinate: value = centre + scale x coordinate.
 struct Unknown {
   std::string effect;  ///< empty for a parameter of the vehicle

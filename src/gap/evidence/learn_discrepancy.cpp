@@ -264,6 +264,7 @@ ModelDiscrepancy learn_discrepancy(const std::vector<Flights>& flights, const si
   ModelDiscrepancy now = start;
   std::vector<Factors> factors;
   for (int n = 1; n <= kIterations; ++n) {
+    if (io::interrupted()) throw io::InputError("stopped: nothing was learnt; accepted: all robots");
     ShareMoments shares{};
     std::map<std::string, Moment> backgrounds;
     expect(robots, now, shares, backgrounds, factors);
@@ -281,8 +282,11 @@ SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim
   io::ProgressLine line("learning");
   const auto count = static_cast<double>(pairs.size());
   double done = 0;
-  const auto go_on = [&] {
+  const auto heed = [] {
     if (io::interrupted()) throw io::InputError("stopped: nothing was learnt; accepted: all pairs");
+  };
+  const auto go_on = [&] {
+    heed();
     line.show(done / count, io::format("fitting pair %.0f", done + 1));
     done += 1;
   };
@@ -298,6 +302,7 @@ SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim
   }
   ModelDiscrepancy now = start;
   for (int n = 1; n <= kIterations && !harmless.empty(); ++n) {
+    heed();
     ShareMoments shares{};
     std::map<std::string, Moment> backgrounds;
     expect_sessions(harmless, now, shares, backgrounds);
@@ -317,6 +322,7 @@ SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim
     if (const auto error = law_error(robot, p.effect, now)) errors.emplace_back(p.effect, *error);
     for (const auto& f : p.flights) f->forget();
   }
+  heed();
   if (errors.size() >= kMinLaws) take(errors, now.session);
   return now.session;
 }

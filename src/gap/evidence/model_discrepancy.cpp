@@ -78,7 +78,7 @@ std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learn
   };
   std::string text = kHead + learnt + ".\nschema = 1\n\n" + shares_text(d.shares);
   std::string of_models;
-  if (!d.of_models.empty()) {
+  if (!d.beat_averaged) {
     for (const std::string& id : d.of_models) of_models += (of_models.empty() ? "\"" : ", \"") + id + "\"";
     of_models = "\nmodel_freedom = " + number(d.spread.model_freedom) + "\nof_models = [" + of_models + "]";
   }
@@ -86,11 +86,14 @@ std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learn
           "\nblock_freedom = " + number(d.spread.block_freedom) +
           (d.beat_averaged ? "" : "\nplace_freedom = " + number(d.spread.place_freedom)) +
           "\neffect_freedom = " + number(d.spread.effect_freedom) + of_models +
-          (d.beat_averaged ? "\nbeat_averaged = true\n\n" : "\n\n") + kSensors +
-          "[sensors]\nimu_rotation_rad = " + sensor("imu_mounting") + "  # as it is mounted, about each axis\n" +
-          "imu_place_m = " + sensor("imu_place") + "  # along each axis\npower_latency_s = " + sensor("power_delay") +
-          "  # of a sample that is an instant, a mean, or held\nclock_rate = " + sensor("imu_clock") +
-          "  # of each stream's clock against that of the commands\n\n" + kBackground + "[background_sd]\n";
+          (d.beat_averaged ? "\nbeat_averaged = true\n\n" : "\n\n");
+  if (!d.nuisances.empty())
+    text += std::string(kSensors) + "[sensors]\nimu_rotation_rad = " + sensor("imu_mounting") +
+            "  # as it is mounted, about each axis\n" + "imu_place_m = " + sensor("imu_place") +
+            "  # along each axis\npower_latency_s = " + sensor("power_delay") +
+            "  # of a sample that is an instant, a mean, or held\nclock_rate = " + sensor("imu_clock") +
+            "  # of each stream's clock against that of the commands\n\n";
+  text += std::string(kBackground) + "[background_sd]\n";
   for (const auto& [effect, sd] : d.background) text += effect + " = " + number(sd) + "\n";
   return text;
 }

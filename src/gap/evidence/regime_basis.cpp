@@ -36,6 +36,10 @@ void RegimeBasis::append_functions(const Flights& flights) {
   };
   append("1", "always", BasisFunction::constant);
   if (flights.empty()) return;
+  for (std::size_t f = 1; f < flights.size(); ++f)
+    if (!std::ranges::equal(functions[f], functions.front(), {}, &RegimeFunction::name, &RegimeFunction::name))
+      throw io::InputError(flights[f]->name() + ": has other streams than " + flights.front()->name() +
+                           "; accepted: flights with the same streams");
   for (std::size_t i = 0; i < functions.front().size(); ++i) {
     for (std::size_t f = 0; f < flights.size(); ++f) column[f] = functions[f][i].values;
     append(functions.front()[i].name, functions.front()[i].quantity, functions.front()[i].kind);

@@ -18,7 +18,7 @@ constexpr int kFirstIterations = 4, kMaxRefits = 5, kRefitIterations = 6;
 /// Scale of background magnitudes over their prior scale, in the first fit with them.
 constexpr double kWideScale = 5;
 /// Rounds of linear fits of the catalogue, each followed by learning the noise from what is left.
-constexpr int kRemainderRounds = 3;
+constexpr int kRestRounds = 3;
 /// Another round needs this gain and is undone at this loss; smaller changes may be errors of linear models.
 constexpr double kMinGain_nats = 2;
 
@@ -173,7 +173,7 @@ void RobotFit::find_nuisance_columns() {
 void RobotFit::refit_with_nuisances() {
   find_nuisance_columns();
   if (evidence().policy().discrepancy_scales) widen_effects();
-  else learn_remainder();
+  else learn_rest_as_noise();
   parameters_ = fitter_.refit(no_effects_, parameters_, kRefitIterations);
   take_scales();
   for (int round = 0; round < kMaxRefits && refit_with_minors(); ++round) continue;
@@ -213,8 +213,8 @@ bool RobotFit::refit_with_minors() {
   const std::vector<double> there = minors_moved_by(fitter_.nuisances(parameters_));
   const auto take = [&](const std::vector<double>& variates, Fit fit) {
     uncertain_.set_minors(variates);
+    parameters_ = std::move(fit);  // before set_nuisances(), which reads them
     set_nuisances();
-    parameters_ = std::move(fit);
   };
   take(there, parameters_);
   // new columns: with those of another point a fit may stop a hundred nats below a better point nearby
@@ -265,8 +265,8 @@ void RobotFit::set_nuisances() {
 }
 
 /// Takes what all magnitudes of the catalogue together leave as noise, under every hypothesis.
-void RobotFit::learn_remainder() {
-  for (int round = 0; round < kRemainderRounds; ++round) {
+void RobotFit::learn_rest_as_noise() {
+  for (int round = 0; round < kRestRounds; ++round) {
     Regressors r = Fitter::own_regressors(parameters_);
     for (const MagnitudeColumn& m : magnitudes_) r.add(m.change, 0);
     const Posterior p =
@@ -277,7 +277,7 @@ void RobotFit::learn_remainder() {
     for (std::size_t k = 0; k < r.columns.size(); ++k) all += p.mean[static_cast<Eigen::Index>(k)] * *r.columns[k];
     Residuals left = parameters_.residual;
     for (std::size_t f = 0; f < left.size(); ++f) left[f] = evidence().without(f, std::move(left[f]), all);
-    take_evidence(evidence().with_remainder(left));
+    take_evidence(evidence().with_rest_as_noise(left));
     fitter_ = fitter_.with_scales({});
   }
   parameters_.statistics = evidence().statistics(parameters_.residual);

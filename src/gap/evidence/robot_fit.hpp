@@ -83,7 +83,7 @@ class RobotFit {
   void find_nuisance_columns();
   std::vector<Background> all_backgrounds(const ModelDiscrepancy& discrepancy) const;
   void refit_with_nuisances();
-  void learn_remainder();
+  void learn_rest_as_noise();
   void find_magnitudes();
   void find_linear_magnitudes();
   void find_nuisances();

@@ -78,15 +78,16 @@ class Screening {
     ScreenedEffect s{effect, 0, VectorXd::Zero(columns_[magnitudes.front().column].unknowns)};
     for (const Linear& m : magnitudes) s.coordinates[columns_[m.column].unknown] = columns_[m.column].from;
     // jointly with the effect's background magnitude, or instead of it, which saves the cost of its scale
-    const int place = fitter_.place_of(effect);
     const std::vector<double>& scales = fitter_.scales().effects;
-    std::vector<int> others;
-    for (const int i : base_)
-      if (place < 0 || effects_[static_cast<std::size_t>(i)] != place) others.push_back(i);
+    std::vector<int> others = base_;
     double saved = 0;
-    if (others.size() < base_.size() && static_cast<std::size_t>(place) < scales.size())
-      saved = Evidence::scale_cost_nats(scales[static_cast<std::size_t>(place)],
-                                        fitter_.evidence().discrepancy().scale_prior(effect), fitter_.scales());
+    for (const std::string& name : {effect, effect + kOfBoth}) {
+      const int place = fitter_.place_of(name);
+      const auto of_it = [&](int i) { return effects_[static_cast<std::size_t>(i)] == place; };
+      if (place < 0 || std::erase_if(others, of_it) == 0 || static_cast<std::size_t>(place) >= scales.size()) continue;
+      saved += Evidence::scale_cost_nats(scales[static_cast<std::size_t>(place)],
+                                         fitter_.evidence().discrepancy().scale_prior(name), fitter_.scales());
+    }
     const auto with = [&](std::vector<int> chosen) {
       for (const Linear& m : magnitudes) chosen.push_back(m.at);
       return Evidence::posterior(reduced, chosen, mean_(chosen));

@@ -21,6 +21,8 @@ struct MagnitudeStep : Magnitude {
 };
 inline constexpr std::size_t kMaxSteps = 5;
 inline constexpr double kMagnitudeReach = 0.4;
+/// Effects whose change is at most this are not seen.
+inline constexpr double kNoChange = 1e-9;
 
 /// Steps for each effect but `withheld`, with shape parameters in mid-prior. `background`: reach of near steps; null: no
 /// near and no shaped steps.

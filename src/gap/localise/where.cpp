@@ -139,7 +139,9 @@ class ChannelRows {
 
   void test_bands(std::vector<ResidualLocation>& places) const {
     std::vector<double> ends(std::begin(kBandEnds_Hz), std::end(kBandEnds_Hz));
-    ends.push_back(*std::ranges::max_element(around_.beats_Hz) / 2);
+    const double highest_Hz = *std::ranges::max_element(around_.beats_Hz) / 2;
+    std::erase_if(ends, [&](double end) { return end >= highest_Hz; });
+    ends.push_back(highest_Hz);
     const double past = memory();
     Bands left;
     std::vector<double> noise(ends.size(), 0);  // [band] mean square of autoregressive noise of variance 1

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "flappy/vehicle_file.hpp"
+#include "flightlog/check/data_faults.hpp"
 #include "gap/diagnose/diagnose.hpp"
 #include "gap/diagnose/next_experiment.hpp"
 #include "gap/diagnose/verdict.hpp"
@@ -63,8 +64,14 @@ class Planner {
     for (const auto& [effect, times] : settings.magnitudes) {
       check_effect("--magnitude", effect, vehicle_);
       asked_[effect] = times;
-      if (!(times > 0)) throw io::InputError("--magnitude " + effect + ": is not positive; accepted: a factor above 0");
+      const double most = largest_factor(*model::find_effect(vehicle_, effect));
+      if (!(times > 0 && times <= most))
+        throw io::InputError("--magnitude " + effect + ": is " + io::shortest_digits(times) +
+                             "; accepted: a factor above 0, at most " + io::shortest_digits(most));
     }
+    std::vector<std::string> like = settings.like;
+    like.insert(like.end(), settings.like_reference.begin(), settings.like_reference.end());
+    flightlog::check_each_once(like);
   }
 
   Plan run() {
@@ -75,7 +82,8 @@ class Planner {
                            " cannot fly it; accepted: a manoeuvre that the vehicle flies, as hover");
     Plan plan = described(*s);
     for (const Session& other : settings_.matrix_only ? std::vector<Session>() : choices(asked)) {
-      if (io::interrupted()) break;
+      plan.complete = !io::interrupted();
+      if (!plan.complete) break;
       plan.choices.push_back(weighed(other, plan));
     }
     std::ranges::stable_sort(plan.choices, std::greater{}, &PlannedChoice::probability);
@@ -137,7 +145,7 @@ class Planner {
       const auto add = [&](const std::vector<std::string>& folders, bool reference) {
         for (const std::string& folder : folders) {
           const auto flight =
-              std::make_shared<ResetPrediction>(Recording(folder, flightlog::read_flight_log(folder), vehicle_));
+              std::make_shared<ResetPrediction>(Recording(folder, flightlog::read_faultless_log(folder), vehicle_));
           if (reference) flight->set_reference();
           flights.push_back(flight);
         }

@@ -37,6 +37,7 @@ void print(const Plan& plan) {
     std::printf("  %-26s %4.2f  %s%s\n", e.effect.c_str(), e.probability, sure.c_str(),
                 e.alike.empty() ? "" : (", may be " + io::joined(e.alike)).c_str());
   }
+  if (!plan.complete) std::printf("stopped: choices are missing\n");
   for (const std::vector<std::string>& g : plan.groups)
     std::printf("cannot be told apart: %s\n", io::joined(g).c_str());
   for (std::size_t i = 0; i < plan.choices.size() && i < kShownChoices; ++i) {

@@ -13,6 +13,9 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+constexpr int kDoublings = 4;
+static_assert(1 << kDoublings == static_cast<int>(kMaxFactor));
+
 /// The vehicle with the effect at `times` its typical magnitude.
 VehicleHypothesis vehicle_with(const RobotFit& robot, const model::CatalogueEffect& effect, double times) {
   const Hypothesis h(robot.uncertain(), {effect.info.id});
@@ -31,7 +34,8 @@ VectorXd gains_of(const Fitter& fitter, const Fit& fit, const std::vector<Magnit
                   const BasisCoefficients& law_sd, const std::vector<std::string>& rivals) {
   VectorXd gains = VectorXd::Zero(static_cast<Index>(rivals.size()));
   for (const ScreenedEffect& s : screen(fitter, fit, columns, law_sd))
-    gains[std::ranges::find(rivals, s.effect) - rivals.begin()] = s.gain;
+    if (const auto rival = std::ranges::find(rivals, s.effect); rival != rivals.end())
+      gains[rival - rivals.begin()] = s.gain;
   return gains;
 }
 
@@ -65,7 +69,8 @@ class Separator {
     for (auto& flight : unchanged_.statistics.sums)
       for (VectorXd& sums : flight) sums.setZero();
     for (const MagnitudeColumn& m : robot.magnitudes())
-      if (rivals_.empty() || rivals_.back() != m.effect) rivals_.push_back(m.effect);
+      if ((rivals_.empty() || rivals_.back() != m.effect) && m.change.cwiseAbs().maxCoeff() > kNoChange)
+        rivals_.push_back(m.effect);
     for (std::size_t r = 0; r < rivals_.size(); ++r)
       if (const auto at = asked.find(rivals_[r]); at != asked.end())
         asked_.push_back(
@@ -137,8 +142,11 @@ class Separator {
     std::vector<double> factors(n, 0), steps(n, 0);
     for (std::size_t t = 0; t < n; ++t)
       if (gains[t]) factors[t] = 1, steps[t] = sure(t, *gains[t]) ? 0.5 : 2;
-    for (int k = 0; k < kMaxSteps && std::ranges::any_of(factors, [](double f) { return f > 0; }); ++k) {
-      for (std::size_t t = 0; t < n; ++t) factors[t] *= steps[t];
+    for (int k = 0; k < kDoublings && std::ranges::any_of(factors, [](double f) { return f > 0; }); ++k) {
+      for (std::size_t t = 0; t < n; ++t) {
+        factors[t] *= steps[t];
+        if (asked_[t].times * factors[t] > largest_factor(*asked_[t].effect)) factors[t] = 0;
+      }
       const std::vector<std::optional<VectorXd>> next = gains_at(factors);
       for (std::size_t t = 0; t < n; ++t) {
         if (factors[t] == 0) continue;
@@ -164,9 +172,6 @@ class Separator {
     return high;
   }
 
-  /// log2 of kMaxFactor.
-  static constexpr int kMaxSteps = 4;
-
   const Flights& flights_;
   const RobotFit& robot_;
   const VerdictRule& rule_;
@@ -177,6 +182,15 @@ class Separator {
 };
 
 }  // namespace
+
+double largest_factor(const model::CatalogueEffect& effect) {
+  double most = 1e300;
+  for (int k = 0; k < effect.info.magnitudes; ++k) {
+    const model::EffectParameter& p = effect.parameters[static_cast<std::size_t>(k)];
+    most = std::min(most, (p.typical > 0 ? p.high : p.low) / p.typical);
+  }
+  return most;
+}
 
 Separation separation_of(const Flights& flights, const RobotFit& robot, const std::map<std::string, double>& asked,
                          const VerdictRule& rule, int threads, bool sure) {

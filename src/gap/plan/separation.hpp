@@ -23,10 +23,14 @@ struct Separation {
   Eigen::MatrixXd nats;              ///< [effect][rival] expected evidence for the effect over the rival
   /// [effect] Probability that a diagnosis gives the effect, if the robot has it.
   std::vector<double> probability;
-  /// [effect] Factor on the magnitude from which on that probability is kSure; none: not up to kMaxFactor.
+  /// [effect] Factor on the magnitude from which on that probability is kSure; none: not up to kMaxFactor and
+  /// largest_factor().
   std::vector<std::optional<double>> sure_from;
 };
 inline constexpr double kSure = 0.9, kMaxFactor = 16;
+
+/// The largest factor on the typical magnitudes of an effect that a vehicle file accepts.
+double largest_factor(const model::CatalogueEffect& effect);
 
 /// `robot`: of RobotFit::planned. `asked`: [effect] magnitude over the typical one. Leaves out effects that change no
 /// row, or whose simulation diverges. `sure`: also find sure_from.

@@ -79,7 +79,7 @@ std::vector<double> follow(std::vector<double> x, double late, double lag) {
 
 BeatAveragedPrediction::BeatAveragedPrediction(const std::filesystem::path& folder, flightlog::FlightLog log,
                                                const model::Vehicle& nominal, const std::vector<int>& channels)
-    : name_(folder.filename().empty() ? folder.parent_path().filename().string() : folder.filename().string()),
+    : name_(io::folder_name(folder)),
       log_(flightlog::on_its_clocks(std::move(log))),
       nominal_(nominal),
       motion_(flightlog::beat_averaged_motion(log_, nominal.beat_averaged->bandwidth_Hz, folder)) {
@@ -180,6 +180,9 @@ std::vector<Vector3d> BeatAveragedPrediction::turned_by_single_loads() const {
       const auto column = static_cast<std::size_t>(input - b.inputs.begin());
       variables[k] = b.actuators[k].gain * driven(column, 0, 0).input[j] + b.actuators[k].offset;
     }
+    variables[b.actuators.size() + model::kBatteryShare] = battery_rows_[j];
+    for (std::size_t k = 0; k < predicted_.size(); ++k)
+      variables[b.actuators.size() + model::kMotionVariables + k] = driven(b.inputs.size() + k, 0, 0).input[j];
     for (const model::BeatAveragedWrench::Product& p : wrench.products()) {
       if (p.component < 3) continue;
       double moment = p.factor;
@@ -268,12 +271,12 @@ Rows BeatAveragedPrediction::predict(const VehicleHypothesis& hypothesis) const 
   for (const model::BeatAveraged::Actuator& a : b.actuators) {
     const auto input = std::ranges::find(b.inputs, a.input, &model::BeatAveraged::Input::name) - b.inputs.begin();
     driven_by.push_back(
-        &driven(static_cast<std::size_t>(input), drive.delay_s - hypothesis.lag_s, a.lag_s + drive.lag_s));
+        &driven(static_cast<std::size_t>(input), drive.delay_s + hypothesis.lag_s, a.lag_s + drive.lag_s));
   }
   // predicted loads are computed from the inputs, so the lag shifts them as it shifts the inputs
   std::vector<const Driven*> loads;
   for (std::size_t k = 0; k < predicted_.size(); ++k)
-    loads.push_back(&driven(b.inputs.size() + k, -hypothesis.lag_s, 0));
+    loads.push_back(&driven(b.inputs.size() + k, hypothesis.lag_s, 0));
   const Vec com{v.torso.com_m.x, v.torso.com_m.y, v.torso.com_m.z};
   const double nominal_N = nominal_.torso.mass_kg * log_.header.gravity_m_s2;
   const Eigen::Matrix3d nominal_turning = nominal_N * inertia_of(nominal_).inverse();

@@ -95,9 +95,11 @@ class PredictedFlight {
     if (memo_) memo_->clear();
   }
   virtual const std::string& name() const = 0;
-  virtual std::size_t beats() const = 0;
-  virtual double beats_Hz() const = 0;
+  virtual std::size_t beats() const = 0;  ///< of a beat-averaged vehicle: rows in time
+  virtual double beats_Hz() const = 0;    ///< the same a second
+  /// Whether a channel has data in a beat.
   virtual bool covers(std::size_t beat, int channel) const = 0;
+  /// Whether a coefficient of a channel is compared at all.
   virtual bool has_rows(int channel, int coefficient) const = 0;
   /// Whether what no model explains in a channel counts as noise, but its mean over a session: moments that an autopilot
   /// counteracts.

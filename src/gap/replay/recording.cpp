@@ -40,7 +40,7 @@ TorsoAt torso_at(const flightlog::TorsoMotion& m) {
 
 Recording::Recording(const std::filesystem::path& folder, flightlog::FlightLog flight_log,
                      const model::Vehicle& nominal)
-    : name(folder.filename().empty() ? folder.parent_path().filename().string() : folder.filename().string()),
+    : name(io::folder_name(folder)),
       least_z_m(flight_log.header.ambient.ground_z_m + nominal.extent.below_m + kMinClearance_m),
       density_ratio(flight_log.header.ambient.air_density_kg_m3 / nominal.air_density_kg_m3),
       log(flightlog::on_its_clocks(std::move(flight_log))),

@@ -118,7 +118,7 @@ struct NextExperiment {
 struct HeldOutError {
   std::string channel;
   double rms = 0, low = 0, high = 0;  ///< 90 % interval by resampling blocks of beats
-  double by_type = 0;                 ///< rms where all flights of a type are held out together
+  double by_type = 0;  ///< rms where all flights of a type are held out together; `rms` if all have one type
 };
 
 /// Controls of a diagnosis of a beat-averaged vehicle, in held-out flights.

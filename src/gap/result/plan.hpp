@@ -38,6 +38,7 @@ struct Plan {
   std::vector<std::string> unseen;               ///< effects of the catalogue that change no row
   std::vector<std::vector<std::string>> groups;  ///< effects that nothing tells apart
   std::vector<PlannedChoice> choices;            ///< the most telling first
+  bool complete = true;                          ///< whether no choice is missing because the plan was stopped
 };
 
 }  // namespace flappy::gap

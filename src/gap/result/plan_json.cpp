@@ -40,7 +40,8 @@ Json to_json(const Plan& plan) {
           {"effects", effects},
           {"unseen", plan.unseen},
           {"groups", plan.groups},
-          {"choices", choices}};
+          {"choices", choices},
+          {"complete", plan.complete}};
 }
 
 std::string matrix_csv(const Plan& plan) {

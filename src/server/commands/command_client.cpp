@@ -74,7 +74,7 @@ void CommandClient::take_jobs() {
   jobs_.take([&](const JobStatusMessage& m, const dds_sample_info_t&) { heard_.push_back(status_of(m)); });
 }
 
-CommandResult CommandClient::await(const std::string& id, const std::function<void()>& meanwhile) {
+CommandResult CommandClient::await(const std::string& id) {
   std::optional<CommandResult> result;
   for (const double until_s = io::steady_seconds() + timeout_s_; !result;) {
     waiting_.wait(kLook);
@@ -82,7 +82,6 @@ CommandResult CommandClient::await(const std::string& id, const std::function<vo
       if (m.id == id) result = {m.id, m.accepted, m.job, m.message};
     });
     take_jobs();
-    if (meanwhile) meanwhile();
     if (!result && io::steady_seconds() > until_s)
       throw io::InputError("the server does not answer within " + io::shortest_digits(timeout_s_) + " s");
   }
@@ -106,7 +105,7 @@ CommandResult CommandClient::ask(Command command) {
                          std::to_string(kMaxOverrides));
   m.overrides = {count, count, overrides.data(), false};
   if (!command_.write(m)) throw io::InputError("the server takes nothing");
-  return await(command.id, {});
+  return await(command.id);
 }
 
 std::vector<JobStatus> CommandClient::list() {
@@ -168,7 +167,12 @@ std::size_t CommandClient::fetch(std::uint64_t job, const fs::path& folder,
     }
   };
   std::vector<JobFile> files;
-  ask_for("", [&](const FileChunk& m) { files.push_back({m.name, m.size}); });
+  std::optional<std::uint32_t> left;
+  ask_for("", [&](const FileChunk& m) {
+    if (left && m.left + 1 != *left) throw io::InputError("the list of files: a part is missing");
+    left = m.left;
+    files.push_back({m.name, m.size});
+  });
   for (const JobFile& file : files) {
     see(file);
     const fs::path path = folder / safe(file.name);

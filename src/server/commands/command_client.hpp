@@ -25,7 +25,7 @@ class CommandClient {
                     const std::function<void(const JobFile&)>& see);
 
  private:
-  CommandResult await(const std::string& id, const std::function<void()>& meanwhile);
+  CommandResult await(const std::string& id);
   void take_jobs();
 
   double timeout_s_;

@@ -96,8 +96,6 @@ Words diagnose(const Launch& launch) {
                  (launch.folder / kProgress).string()};
   if (launch.folders.data.empty())
     throw io::InputError("kind: this server has no flights; accepted: diagnose where jobs.data is set");
-  if (launch.asked.overrides.empty())
-    throw io::InputError("overrides: name no flight; accepted: flight=NAME, once for each flight");
   Words flights = {"--flights"}, reference = {"--reference"};
   for (const std::string& override : launch.asked.overrides) {
     const std::string key = key_of(override);
@@ -105,6 +103,8 @@ Words diagnose(const Launch& launch) {
       refuse_override(override, "flight=NAME and reference=NAME, once for each flight");
     (key == "flight" ? flights : reference).push_back(below(launch.folders.data, value_of(override), key).string());
   }
+  if (flights.size() == 1)
+    throw io::InputError("overrides: name no flight; accepted: flight=NAME, once for each flight");
   words.insert(words.end(), flights.begin(), flights.end());
   if (reference.size() > 1) words.insert(words.end(), reference.begin(), reference.end());
   return words;

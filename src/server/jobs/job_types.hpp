@@ -5,7 +5,7 @@
 //   train      a configuration below `configs`              --set
 //   evaluate   a job, or a run below `output`               episodes=N, seed=N; else --set
 //   export     a job, or a run below `output`               int8=true, prove=true
-//   diagnose   a vehicle below `configs`                    flight=NAME below `data`, once for each flight
+//   diagnose   a vehicle below `configs`                    flight=NAME below `data`, once for each flight; likewise reference=NAME
 #pragma once
 
 #include <filesystem>

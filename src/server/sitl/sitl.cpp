@@ -111,7 +111,7 @@ class Flight {
     }
   }
 
-  /// Queues the sensor samples before the flight: the estimated pose, and an IMU that shows no rotation and gravity.
+  /// Queues the sensor samples before the flight: the estimated pose, and an IMU at rest: rates 0, specific force g upward.
   void rest() {
     const flight::Motion x = fleet_.estimate(0);
     PoseSample pose{now_s(), {}, {}};

@@ -153,8 +153,11 @@ export class Timeline {
   }
 
   refresh() {
-    for (const plot of this.plots) if (!plot.element.hidden) plot.window(this.begin_s, this.end_s);
-    this.mark(this.now_s);
+    for (const plot of this.plots) {
+      if (plot.element.hidden) continue;
+      plot.window(this.begin_s, this.end_s);
+      plot.mark(this.now_s);
+    }
   }
 
   /** @param {number} t_s */

@@ -27,6 +27,13 @@ TEST(CheckInputs, FindNothingInFlightsThatAreAlike) {
   }
 }
 
+TEST(CheckInputs, AskNothingOfMotorsWhoseVoltageIsUnknown) {
+  FlightLog log = inputs_log({.duration_s = 3});
+  log.header.power->currents = true, log.header.power->current_noise_A = 0.03;
+  log.power->left_current_A = log.power->right_current_A = Column(log.power->t_s.size(), 0.3);
+  for (const Finding& f : check_flight(log).findings) EXPECT_NE(f.check, "left motor");
+}
+
 TEST(CheckInputs, RefuseASpoiltColumn) {
   std::vector<FlightLog> logs = flights(4);
   for (double& v : logs[2].command.declared[0]) v *= 1.9;

@@ -64,7 +64,7 @@ TEST(Evidence, LearnsTheNoise) {
   const BasisCoefficients smooth = BasisCoefficients::Constant(kGroups, declared.basis().size(), -1);
   for (std::size_t f = 0; f < made.size(); ++f) residual[f] = declared.without(f, residual[f], smooth);
   EXPECT_NEAR(declared.with_noise(residual).noise_sd(group), sd, 0.2 * sd);
-  EXPECT_GT(declared.with_remainder(residual).noise_sd(group), 10 * sd);
+  EXPECT_GT(declared.with_rest_as_noise(residual).noise_sd(group), 10 * sd);
   // nor is any smaller than declared
   const Residuals nothing(2, Rows(made[0]->measured().size(), 0));
   EXPECT_NEAR(declared.with_noise(nothing).noise_sd(group), declared.noise_sd(group), 0.02 * SyntheticFlight::kNoise);

@@ -180,6 +180,9 @@ TEST(Learner, an_actor_goes_in_and_comes_out) {
   policy::Actor other = from.actor();
   other.hidden = policy::Activation::relu;
   EXPECT_THROW(to.set_actor(other), std::invalid_argument);
+  other = from.actor();
+  other.linear = true;
+  EXPECT_THROW(to.set_actor(other), std::invalid_argument);
   other = Learner<float>(ddpg(kPlain)).actor();
   EXPECT_THROW(to.set_actor(other), std::invalid_argument);
 }

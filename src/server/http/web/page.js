@@ -133,6 +133,7 @@ async function refresh() {
     if (chosen === null && jobs.length > 0) chosen = (jobs.find((job) => job.state === "running") ?? jobs[0]).id;
     showJobs();
     await showChosen();
+    if (events.readyState === EventSource.OPEN) at("link").textContent = "live";
   } catch {
     at("link").textContent = "no answer";
   }

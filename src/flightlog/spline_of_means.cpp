@@ -1,4 +1,4 @@
-#include "flightlog/beat_averaged_spline.hpp"
+#include "flightlog/spline_of_means.hpp"
 
 #include <utility>
 
@@ -6,7 +6,7 @@ namespace flappy::flightlog {
 
 using Eigen::Vector3d;
 
-BeatAveragedSpline::BeatAveragedSpline(const std::vector<double>& bounds_s, std::vector<Vector3d> means)
+SplineOfMeans::SplineOfMeans(const std::vector<double>& bounds_s, std::vector<Vector3d> means)
     : means_(std::move(means)), knots_(means_.size() + 1) {
   // The values at the bounds make the derivative continuous: the tridiagonal system of the natural cubic spline.
   const std::size_t n = means_.size();
@@ -26,18 +26,18 @@ BeatAveragedSpline::BeatAveragedSpline(const std::vector<double>& bounds_s, std:
   for (std::size_t k = n; k-- > 0;) knots_[k] -= upper[k] * knots_[k + 1];
 }
 
-Vector3d BeatAveragedSpline::value(std::size_t k, double u) const {
+Vector3d SplineOfMeans::value(std::size_t k, double u) const {
   return knots_[k] * ((1 - u) * (1 - 3 * u)) + means_[k] * (6 * u * (1 - u)) + knots_[k + 1] * (u * (3 * u - 2));
 }
 
-Vector3d BeatAveragedSpline::integral(std::size_t k, double u, double v) const {
+Vector3d SplineOfMeans::integral(std::size_t k, double u, double v) const {
   const auto from_0 = [&](double s) -> Vector3d {
     return knots_[k] * (s * (1 - s) * (1 - s)) + means_[k] * (s * s * (3 - 2 * s)) + knots_[k + 1] * (s * s * (s - 1));
   };
   return from_0(v) - from_0(u);
 }
 
-Vector3d BeatAveragedSpline::second_integral(std::size_t k, double u, double v) const {
+Vector3d SplineOfMeans::second_integral(std::size_t k, double u, double v) const {
   const auto from_0 = [&](double s) -> Vector3d {
     return knots_[k] * (s * s * (0.5 + s * (s / 4 - 2.0 / 3))) + means_[k] * (s * s * s * (1 - s / 2)) +
            knots_[k + 1] * (s * s * s * (s / 4 - 1.0 / 3));

@@ -7,11 +7,11 @@
 namespace flappy::flightlog {
 
 /// Derivative of the natural cubic spline through the integral of the means: continuous, quadratic in each interval.
-class BeatAveragedSpline {
+class SplineOfMeans {
  public:
-  BeatAveragedSpline() = default;
+  SplineOfMeans() = default;
   /// `bounds_s` has one element more than `means`.
-  BeatAveragedSpline(const std::vector<double>& bounds_s, std::vector<Eigen::Vector3d> means);
+  SplineOfMeans(const std::vector<double>& bounds_s, std::vector<Eigen::Vector3d> means);
   /// The signal in interval `k`; `u` is the position in it, from 0 to 1.
   Eigen::Vector3d value(std::size_t k, double u) const;
   /// Integral over [u, v] of interval `k`, divided by the length of the interval.
