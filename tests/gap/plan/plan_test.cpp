@@ -11,6 +11,7 @@
 #include "gap/plan/plan_command.hpp"
 #include "gap/plan/separation.hpp"
 #include "io/temporary_folder.hpp"
+#include "io/text.hpp"
 #include "model/effects/registry.hpp"
 #include "refusal.hpp"
 #include "rollout/simulated_flight.hpp"
@@ -128,10 +129,9 @@ TEST(Plan, RefusesWhatCannotBeFlown) {
                 "and motors");
   EXPECT_TRUE(with_change([](PlanSettings& o) { o.manoeuvre = "tuor"; }).ends_with("; did you mean \"tour\"?"));
   EXPECT_TRUE(with_change([](PlanSettings& o) { o.magnitudes = {{"wnd", 1}}; }).ends_with("did you mean \"wind\"?"));
-  EXPECT_EQ(with_change([](PlanSettings& o) {
-              o.magnitudes = {{"wind", 0}};
-            }),
-            "--magnitude wind: is not positive; accepted: a factor above 0");
+  for (const double times : {0.0, 17.0})
+    EXPECT_EQ(with_change([&](PlanSettings& o) { o.magnitudes["wind"] = times; }),
+              io::format("--magnitude wind: is %g; accepted: a factor above 0, at most 16.666666666666668", times));
   EXPECT_TRUE(with_change([](PlanSettings& o) { o.sensors = "nowhere.toml"; }).find("nowhere.toml") !=
               std::string::npos);
   PlanCommand c{.settings = s, .magnitudes = {"wind"}, .out = ""};
