@@ -353,7 +353,9 @@ def check_design(browser: Browser, study: dict[str, list[object]]) -> None:
     return [published, designed].map((n) => n / (data.length / 4));"""
     published, designed = browser.run(coloured)
     assert published > 0.002, f"the published robot has {published} of the picture"
-    assert designed > 0.9 * (len(names) - 1) * published, f"designs have {designed} of the picture, the published robot {published}"
+    areas = [design["values"]["wing_length_m"] * design["values"]["mean_chord_m"] for design in study["designs"]]
+    expected = published * sum(areas[1:]) / areas[0]
+    assert designed > 0.9 * expected, f"designs have {designed} of the picture, {expected} as their wings compare with the published robot's"
     buttons = browser.driver.find_elements("css selector", ".designs .controls button")
     assert [b.text for b in buttons] == ["all", *names[1:]]
     buttons[1].send_keys("\n")
