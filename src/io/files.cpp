@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "io/installation.hpp"
 #include "io/text.hpp"
 
 namespace flappy::io {
@@ -122,7 +123,7 @@ std::string shortest_digits(double value) {
 }
 
 std::string read_text(const std::filesystem::path& path) {
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rbe"), std::fclose);
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(shipped(path).c_str(), "rbe"), std::fclose);
   if (!file) refuse_file(path, "cannot be read", errno);
   std::string text;
   std::array<char, 1 << 16> buffer;

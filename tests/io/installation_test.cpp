@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <fstream>
 
+#include "io/files.hpp"
 #include "io/temporary_folder.hpp"
 
 namespace flappy::io {
@@ -29,12 +30,14 @@ TEST(Installation, FindsWhatIsShippedUnlessThereIsAFile) {
   std::filesystem::current_path(folder.path());
   const std::string own = FLAPPY_SOURCE_DIR "/configs/fly/hover.toml";
   EXPECT_EQ(shipped("configs/fly/hover.toml"), own);
+  EXPECT_EQ(read_text("configs/fly/hover.toml"), read_text(own));
   EXPECT_EQ(shipped("configs/fly/none.toml"), "configs/fly/none.toml");
   EXPECT_EQ(shipped("fly/hover.toml"), "fly/hover.toml");
   EXPECT_EQ(shipped(""), "");
   std::filesystem::create_directories("configs/fly");
   std::ofstream("configs/fly/hover.toml") << "mine = 1\n";
   EXPECT_EQ(shipped("configs/fly/hover.toml"), "configs/fly/hover.toml");
+  EXPECT_EQ(read_text("configs/fly/hover.toml"), "mine = 1\n");
   std::filesystem::current_path(before);
   unsetenv("FLAPPY_CONFIGS");
 }
