@@ -307,7 +307,7 @@ Validation validate(const Fitter& fitter, const sim::Randomisation& uncertain, c
   std::vector<Residuals> by_type;
   if (types.size() > 1) by_type = held_out(fitter, flights, fits, type, threads);
   else
-    for (const Residuals* each : left) by_type.push_back(*each);  // of one type, none could be held out
+    for (const Residuals* each : left) by_type.push_back(*each);  // holding out the only type leaves no flight
   const auto rung = [&](const std::string& added, const Residuals& each, const Residuals& by_types) {
     v.ladder.push_back({added, {}});
     for (const int channel : channels_of(flights))
