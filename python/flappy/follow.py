@@ -342,7 +342,7 @@ def _runs_of(folder: Path, known: dict[Path, Run]) -> tuple[list[Run], bool]:
     """Runs of a folder so far, and whether more are to come: flappy-train --seeds makes one after another, then curve.csv."""
     seeds = sorted(folder.glob("seed_*"))
     runs = [known.setdefault(each, Run(each)) for each in seeds or [folder]]
-    stopped = any((run.json("summary.json") or {}).get("stopped") for run in runs)
+    stopped = any(run.json("summary.json").get("stopped") for run in runs)
     return runs, bool(seeds) and not stopped and not (folder / "curve.csv").exists()
 
 

@@ -95,8 +95,8 @@ class PredictedFlight {
     if (memo_) memo_->clear();
   }
   virtual const std::string& name() const = 0;
-  virtual std::size_t beats() const = 0;  ///< of a beat-averaged vehicle: rows in time
-  virtual double beats_Hz() const = 0;    ///< the same a second
+  virtual std::size_t beats() const = 0;  ///< number of beats; of a beat-averaged vehicle, number of rows in time
+  virtual double beats_Hz() const = 0;    ///< beats, or these rows, a second
   /// Whether a channel has data in a beat.
   virtual bool covers(std::size_t beat, int channel) const = 0;
   /// Whether a coefficient of a channel is compared at all.

@@ -27,7 +27,7 @@ inline constexpr double kMinClearance_m = 0.01;
 struct BeatMotion {
   double t_s = 0, amplitude_V = 0, difference_V = 0, bias_V = 0, split_cycle = 0;
   Eigen::Vector3d velocity_B_m_s, rate_rad_s, position_m;
-  double heading_rad = 0;  ///< of the beat's last interval
+  double heading_rad = 0;  ///< in the beat's last interval, not a mean
 };
 
 struct Recording {
