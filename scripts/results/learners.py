@@ -3,7 +3,7 @@
 
     scripts/results/learners.py BIN ROOT OUT [--seconds 600] [--cells PATTERN] [--seeds 0,1] [--table]
 
-BIN holds the programs, ROOT is the project, OUT keeps each cell as JSON: what is there is not run again. A cell is a tool, a task, a variant ("own": its
+All processors that the process may use are used: `taskset -c 0` before it gives one. BIN holds the programs, ROOT is the project, OUT keeps each cell as JSON: what is there is not run again. A cell is a tool, a task, a variant ("own": its
 defaults; "recipe": what it can take of configs/train) and a seed. Only training is timed; processor time of ours includes evaluations. Unseen robots: 500 flights of another seed,
 of the same tasks, by each tool's own policy without exploration. The quadrotor is flown by each tool's own simulator (rltools_quadrotor.cpp). Python needs the modules of requirements() and flappy.
 """
@@ -21,9 +21,9 @@ import sys
 import time
 
 SHARES = (0.5, 0.8, 0.9, 0.95)
-FLIGHTS, UNSEEN, EVERY_S = 500, 1_000_000, 10.0
+FLIGHTS, UNSEEN, EVERY_S = 500, 1_000_000, 10.0  # evaluations at least 10 s of training apart
 TASKS = {"escape": ("flappy/Escape-v0", "escape"), "hover": ("flappy/Hover-v0", "hover_direct"), "quadrotor": (None, "quadrotor")}  # environment; configs/train
-RECIPE = {"learning_rate": 1e-3, "batch_size": 256, "gamma": 0.98, "tau": 0.02}
+RECIPE = {"learning_rate": 1e-3, "batch_size": 128, "gamma": 0.98, "tau": 0.02}
 RECIPE_TD3 = {"target_policy_noise": 0.1, "target_noise_clip": 0.3, "n_steps": 5}
 NETWORKS = {"pi": [32, 32], "qf": [128, 128]}
 FLAPPERS, UPDATES_A_STEP = 256, 6
@@ -38,7 +38,7 @@ class Clock:
     """Time of training: of the wall and of all processors, evaluations left out."""
 
     def __init__(self):
-        self.rows, self.wall, self.cpu = [], 0.0, 0.0
+        self.rows, self.wall, self.cpu, self.next = [], 0.0, 0.0, 0.0
         self.resume()
 
     def resume(self):
@@ -48,13 +48,15 @@ class Clock:
         """Stops, evaluates, goes on; whether to go on training."""
         self.wall += time.monotonic() - self.since
         self.cpu += time.process_time() - self.since_cpu
+        begun = time.monotonic()
         self.rows.append({"steps": int(steps), "wall_s": self.wall, "cpu_s": self.cpu, "success": success()})
+        self.next = self.wall + max(EVERY_S, time.monotonic() - begun)
         self.resume()
         last = [row["success"] for row in self.rows[-3:]]
         return self.wall < SECONDS and not (len(last) == 3 and min(last) >= SHARES[-1])
 
     def due(self):
-        return self.wall + time.monotonic() - self.since >= EVERY_S * len(self.rows) or self.wall + time.monotonic() - self.since >= SECONDS
+        return self.wall + time.monotonic() - self.since >= min(self.next, SECONDS)
 
 
 def unseen(env_id, policy):
@@ -108,7 +110,7 @@ def by_rltools(algorithm, env_id, variant, seed):
 
     options = {"STEP_LIMIT": 10_000_000, "REPLAY_BUFFER_CAP": 1_000_000, "interface_name": f"{algorithm}_{variant}".lower(), "evaluation_interval": 10_000_000, "num_evaluation_episodes": 1}
     if variant == "recipe":
-        options |= {"GAMMA": 0.98, "ACTOR_BATCH_SIZE": 256, "CRITIC_BATCH_SIZE": 256, "ACTOR_HIDDEN_DIM": 32, "CRITIC_HIDDEN_DIM": 128, "ACTOR_POLYAK": 0.98, "CRITIC_POLYAK": 0.98}
+        options |= {"GAMMA": 0.98, "ACTOR_BATCH_SIZE": 128, "CRITIC_BATCH_SIZE": 128, "ACTOR_HIDDEN_DIM": 32, "CRITIC_HIDDEN_DIM": 128, "ACTOR_POLYAK": 0.98, "CRITIC_POLYAK": 0.98}
         options |= {"TARGET_NEXT_ACTION_NOISE_STD": 0.1, "TARGET_NEXT_ACTION_NOISE_CLIP": 0.3} if algorithm == "TD3" else {}
     state = getattr(rltools, algorithm)(lambda: gymnasium.wrappers.TimeLimit(gymnasium.make(f"flappy:{env_id}"), 400), **options).State(seed)
     clock, steps = Clock(), 0
@@ -227,7 +229,8 @@ for seed in SEEDS if not args.table else []:
             print(f"{tool}, {task}, {variant}, seed {seed} ...", end=" ", flush=True)
             if tool == "rltools-loop":
                 build_rltools_loop()
-            done = subprocess.run([sys.executable, __file__, args.bin, args.root, args.out, "--seconds", str(SECONDS), "--one", tool, task, variant, seed], capture_output=True, text=True)
+            done = subprocess.run([sys.executable, __file__, args.bin, args.root, args.out, "--seconds", str(SECONDS), "--one", tool, task, variant, seed], capture_output=True, text=True,
+                                  env=os.environ | {"OMP_NUM_THREADS": str(len(os.sched_getaffinity(0)))})
             if done.returncode:
                 print(done.stderr.strip().split("\n")[-1])
                 continue

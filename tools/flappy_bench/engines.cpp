@@ -19,7 +19,8 @@ std::vector<EngineRow> measure_engines(int seeds, const std::string& beside) {
   const auto train = [&](const EngineRow& row, int seed, const std::vector<std::string>& more, double& peak_bytes) {
     const std::string name = row.name + std::to_string(seed) + (more.empty() ? "" : "_start");
     const std::filesystem::path folder = work / name;
-    std::vector<std::string> command = {row.program, io::config_path("train/escape.toml"),
+    const auto build = std::filesystem::path(row.program).parent_path().parent_path();  // which has its own configs
+    std::vector<std::string> command = {row.program, build / "share/flappy/configs/train/escape.toml",
                                         "--out",     folder,
                                         "--json",    folder.string() + ".json",
                                         "--set",     "learn.engine=" + row.engine,
