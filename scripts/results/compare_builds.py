@@ -20,7 +20,7 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 STUDENT = {4: 3.182, 5: 2.776, 6: 2.571, 7: 2.447, 8: 2.365, 9: 2.306, 10: 2.262, 12: 2.201, 15: 2.145, 20: 2.093}  # 97.5 % for n rounds
 MORE_IS_BETTER = ("_per_s", "scaling", "share", "success")
-LESS_IS_BETTER = ("_s", "_bytes", "ns_per_step", "bytes_per_flapper", "bytes_per_flapper_closed_loop")
+LESS_IS_BETTER = ("_s", "_bytes", "ns_per_step", "ns_per_step_1000", "ns_per_step_100000", "bytes_per_flapper", "bytes_per_flapper_closed_loop")
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("commit")

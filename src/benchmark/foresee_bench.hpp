@@ -14,8 +14,8 @@ namespace flappy::benchmark {
 /// Table in the folder of a benchmark: a row for each case and effect.
 inline constexpr const char* kForeseenFile = "foreseen.csv";
 
-/// Plans the flights of every case and writes the table. Each effect has the magnitude that it would have in the case
-/// (plan_cases). Resumes an interrupted run; false if interrupted again. InputError if labels were opened.
+/// Plans the flights of every case and writes the table. Each effect is at magnitude 1 with reference flights, at
+/// that of part "singles" without them. Resumes an interrupted run; false if interrupted again. InputError if labels were opened.
 bool foresee_bench(const BenchQuestions& command);
 
 /// The plan's expectation for a case if its robot has this effect. None: no plan was written, or the effect changes no

@@ -12,7 +12,7 @@ namespace {
 
 /// Below kSeedsOfAFamily: robots flown by hand or for tables of detectable magnitudes. Already used: 700001 to 799999
 /// and, from each family's first seed, the 120,000 from each of 5,000,000, 5,500,000, ..., 8,000,000 on.
-constexpr std::uint64_t kSeedsOfAFamily = 10'000'000, kReported = 8'500'000, kSeedsOfAPart = 10'000;
+constexpr std::uint64_t kSeedsOfAFamily = 10'000'000, kReported = 9'000'000, kSeedsOfAPart = 10'000;
 /// Least number of cases of most parts; rounded up so that all effects of a part have as many.
 constexpr std::size_t kAtLeast = 100;
 /// Least numbers of cases in parts of a contrast.
@@ -141,7 +141,7 @@ class Planner {
   blind::BlindEffect at_twice(const std::string& id) const {
     const auto d = of_.find(id);
     if (d == of_.end()) return {id, kOutsideMagnitude};
-    return {id, d->second.undetectable ? 1 : kOverDetectable * d->second.detectable};
+    return {id, kOverDetectable * d->second.detectable};
   }
 
   void single(std::size_t k, PlannedCase& c) const {

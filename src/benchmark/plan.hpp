@@ -55,7 +55,7 @@ struct PlanOptions {
   std::size_t flights = blind::Family::kFlights;  ///< most flights of a session of a contrast
 };
 
-/// Seeds of family b begin at 20,000,000 (development) and 28,500,000 (reported); a and c: 10,000,000 and 30,000,000
+/// Seeds of family b begin at 20,000,000 (development) and 29,000,000 (reported); a and c: 10,000,000 and 30,000,000
 /// likewise.
 std::vector<PlannedCase> plan_cases(const blind::Family& family,
                                     const std::map<std::string, Detectability>& detectability,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "benchmark/predict/predict.hpp"
@@ -20,6 +21,9 @@ struct BenchQuestions {
   int threads = 0;  ///< number of cases at a time; 0: one for each processor
 
   std::filesystem::path vehicle_of(const Manifest& manifest) const;
+  /// The option of this command whose file or value is not the one kept in `file` (then as text: "--verdict"); empty if all are. If
+  /// `file` does not exist, keeps them there. `further`: lines "--option value".
+  std::string other_option(const std::filesystem::path& file, const std::string& further) const;
   /// About a case of the benchmark in `folder`; nothing is withheld.
   Question question(const std::filesystem::path& folder, const Manifest& manifest, const PublicCase& of) const;
 };

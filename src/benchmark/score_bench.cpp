@@ -55,12 +55,22 @@ class Predictions {
 
   /// Makes and seals the missing predictions; false if interrupted.
   bool make() const {
+    const fs::path options = folder_ / "predictions" / "options.txt";
+    const auto other_option = [&] {
+      return command_.other_option(options, "--residual " + std::to_string(command_.residual) + "\n");
+    };
     if (fs::exists(sums_)) {
       check_predictions(folder_, manifest_);
+      if (const std::string other = fs::exists(options) ? other_option() : ""; !other.empty())
+        std::printf("%s: its predictions are sealed, and were made with another %s\n", folder_.c_str(), other.c_str());
       return true;
     }
     if (fs::exists(true_fits(folder_))) refuse(sums_, "is missing, though labels were opened");
     io::make_folder(folder_ / "predictions");
+    if (io::writes(command_.ranks))
+      if (const std::string other = other_option(); !other.empty())
+        throw io::InputError(folder_.string() + ": its predictions were begun with another " + other +
+                             "; accepted: the same options, or a new benchmark");
     std::vector<const PublicCase*> open;
     for (const PublicCase& c : manifest_.cases)
       if (!fs::exists(prediction_file(folder_, c.number))) open.push_back(&c);
@@ -373,7 +383,7 @@ Json score_bench(const ScoreCommand& command) {
     all.insert(all.end(), b->cases.begin(), b->cases.end());
     sets.insert(b->manifest.set);
     for (const Json& id : b->truths.at("undetectable"))
-      undetectable.insert((by_family.size() > 1 ? b->manifest.family + ": " : "") + id.get<std::string>());
+      undetectable.insert((families.size() > 1 ? b->manifest.family + ": " : "") + id.get<std::string>());
     never += b->truths.at("never_fly").size();
     for (const ScoredCase& c : b->cases) drawn_again += c.truth.draw;
     for (const PublicCase& c : b->manifest.cases) commits.insert(b->predictions.read(c.number).at("commit"));

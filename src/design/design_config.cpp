@@ -1,6 +1,10 @@
 #include "design/design_config.hpp"
 
+#include <cmath>
 #include <limits>
+
+#include "io/files.hpp"
+#include "io/sha256.hpp"
 
 namespace flappy::design {
 namespace {
@@ -21,6 +25,8 @@ rollout::FlyConfig read_flights(const io::Table& root, const std::string& key) {
   if (!(fly.fleet.task.constants.success.by_s > 0) || fly.welded || fly.excitation.acts() || fly.actor)
     root.fail(key, "its task defines no success, or it is held, excited or flown by an actor",
               "flights of a controller whose task has [success]");
+  if (fly.randomisation && !fly.resolved.contains("randomisation.toml"))
+    root.fail(key, "draws vehicles from a posterior, which is of one robot", "a file of randomisation, or none");
   return fly;
 }
 
@@ -36,6 +42,12 @@ DesignConfig read_design_config(const std::filesystem::path& path, const std::ve
   c.judge.space = read_space(root);
   c.judge.hover = read_flights(root, "hover");
   c.judge.escape = read_flights(root, "escape");
+  for (const auto& [name, text] : c.judge.hover.resolved) {
+    const auto other = c.judge.escape.resolved.find(name);
+    const bool own = name == "fly.toml" || name == "task.toml" || name == "vehicle.toml" || name == "controller.toml";
+    if (!own && other != c.judge.escape.resolved.end() && other->second != text)
+      root.fail("escape", "its " + name + " is not that of hover", "flights that share it");
+  }
 
   for (const io::Table& t : root.tables("objective")) {
     t.accept({"figure"});
@@ -49,6 +61,8 @@ DesignConfig read_design_config(const std::filesystem::path& path, const std::ve
     if (t.has("at_least")) limit.at_least = t.number("at_least");
     if (t.has("at_most")) limit.at_most = t.number("at_most");
     if (limit.at_least == -kNone && limit.at_most == kNone) t.fail("", "limits nothing", "at_least or at_most");
+    if (limit.at_least > limit.at_most)
+      t.fail("at_least", "is above at_most", "a number below " + io::shortest_digits(limit.at_most));
     c.judge.limits.push_back(limit);
   }
   const io::Table flights = root.table("flights");
@@ -70,8 +84,22 @@ DesignConfig read_design_config(const std::filesystem::path& path, const std::ve
   c.verify.designs = static_cast<std::size_t>(verify.integer("designs", 0, 1000));
   c.verify.vehicles = static_cast<std::size_t>(verify.integer("vehicles", 1, 1'000'000));
   c.verify.step_s = verify.number("step_s", {1e-6, 1e-3});
+  const auto whole = [](double times) { return times > 0.5 && std::abs(times - std::round(times)) < 1e-6 * times; };
+  const double hold_s = c.judge.space.published.driver.hold_s;
+  for (const double step_s : {c.judge.hover.fleet.batch.step_s, c.judge.escape.fleet.batch.step_s, c.verify.step_s})
+    if (hold_s > 0 && !whole(hold_s / step_s))
+      root.fail("vehicle", "driver.hold_s is no multiple of the step of " + io::shortest_digits(step_s) + " s",
+                "whole steps");
+  for (const rollout::FlyConfig* fly : {&c.judge.hover, &c.judge.escape})
+    if (!whole(1 / (fly->fleet.control_hz * c.verify.step_s)))
+      verify.fail("step_s", "is no whole share of the control period",
+                  "1/n of " + io::shortest_digits(1 / fly->fleet.control_hz) + " s");
   root.finish();
-  c.resolved = file.resolved();
+  std::string others =
+      io::read_text(root.file("vehicle")) + io::read_text(root.file("motors")) + io::read_text(verify.file("tune"));
+  for (const rollout::FlyConfig* fly : {&c.judge.hover, &c.judge.escape})
+    for (const auto& [name, text] : fly->resolved) others += text;
+  c.resolved = file.resolved() + "# the files that it names: " + io::sha256(others) + "\n";
   return c;
 }
 

@@ -193,6 +193,12 @@ Space read_space(const io::Table& root) {
   const Robot same = build(s, s.built);
   if (!same.refused.empty())
     root.fail("built", "the built robot cannot be built: " + same.refused, "a workshop that can build it");
+  model::Vehicle published = s.published, built = same.vehicle;
+  const std::vector<model::Parameter> was = model::parameters(published), is = model::parameters(built);
+  for (std::size_t i = 0; i < std::min(was.size(), is.size()); ++i)
+    if (std::abs(*was[i].value - *is[i].value) > 1e-6 * std::abs(*was[i].value) + 1e-12)
+      root.fail("vehicle", "its " + was[i].path + " is not that of the other side, or not symmetric about 0",
+                "a vehicle that is the same left and right");
   return s;
 }
 

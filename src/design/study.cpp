@@ -116,6 +116,7 @@ Json json_of(const Figures& figures) {
 
 std::vector<Record> choose(const Search& search, std::size_t count) {
   std::vector<Record> front = search.front();
+  if (front.empty()) return {};
   const std::size_t n = search.config().objectives.size();
   std::vector<std::vector<double>> f;
   for (const Record& r : front) f.push_back(search.objectives(r));
@@ -123,7 +124,7 @@ std::vector<Record> choose(const Search& search, std::size_t count) {
   std::vector<double> scale(n, 1e-12);
   for (std::size_t k = 0; k < n; ++k) {
     const auto [low, high] = std::ranges::minmax(f, {}, [&](const auto& x) { return x[k]; });
-    if (!f.empty()) scale[k] += high[k] - low[k];
+    scale[k] += high[k] - low[k];
   }
   std::vector<std::size_t> chosen;
   const auto eligible = [&](std::size_t i) {

@@ -36,7 +36,8 @@ Sensors read_sensors(const io::Table& table) {
   s.mocap.rate_hz = table.number("mocap.rate_hz", kRate);
   s.mocap.latency_s = table.number("mocap.latency_s", io::non_negative(0.5));
   s.mocap.position_noise_m = table.number("mocap.position_noise_m", io::positive(1));
-  s.mocap.attitude_noise_rad = table.number("mocap.attitude_noise_rad", io::positive(1));
+  s.mocap.attitude_noise_rad =
+      table.number("mocap.attitude_noise_rad", io::positive(0.05));  // drawn as a small rotation
   s.mocap.loss_probability = table.number_or("mocap.loss_probability", 0, {0, 0.5});
   s.mocap.loss_length = table.number_or("mocap.loss_length", 1, {1, 1e6});
   s.estimator.angle_drift_rad_sqrt_s = table.number("estimator.angle_drift_rad_sqrt_s", kNoise);

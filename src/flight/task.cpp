@@ -235,7 +235,10 @@ void read_hand_back(const io::Table& table, HandBack<double>& h) {
   h = {0, 0, -kFar, kFar, kFar, kFar, -2, -2, kFar, kFar, 0, 0};
   const auto t = table.optional_table("hand_back");
   if (!t) return;
-  const auto bound = [&](const char* name, double otherwise) { return t->number_or(name, otherwise, {-kFar, kFar}); };
+  const auto bound = [&](const std::string& name, double otherwise) {
+    const bool is_place = name == "x_m" || name == "speed_x_m_s";
+    return t->number_or(name, otherwise, {is_place ? -kFar : 0, kFar});
+  };
   const std::string on = t->choice_or("on", "truth", {"truth", "estimate"});
   h = {1,
        on == "estimate" ? 1.0 : 0.0,
@@ -262,7 +265,7 @@ void read_success(const io::Table& table, Success<double>& s) {
        angle("capture.tilt_rad"),
        angle("capture.heading_rad"),
        t->number("keep.from_s", io::non_negative()),
-       t->number("keep.until_s", io::non_negative()),
+       t->number("keep.until_s", {t->number("keep.from_s", io::non_negative()), kFar}),
        t->number("keep.distance_m", io::positive()),
        angle("keep.tilt_rad"),
        angle("keep.heading_rad"),
@@ -405,8 +408,9 @@ Task read_task(const io::Table& table, double tick_s) {
     table.fail("action.repeat_s", "is no whole number of control periods", "n x " + io::shortest_digits(tick_s) + " s");
   k.reward = read_reward(table);
 
-  const auto limit = [&](const char* name, double otherwise) {
-    return table.number_or(std::string("end.") + name, otherwise, {-kFar, kFar});
+  const auto limit = [&](const std::string& name, double otherwise) {
+    const bool is_size = name == "y_m" || name == "z_m" || name == "distance_m";
+    return table.number_or("end." + name, otherwise, {is_size ? 0 : -kFar, kFar});
   };
   task.says_contact = table.has("end.contact");
   k.contact_ends = !task.says_contact || table.boolean("end.contact") ? 1 : 0;

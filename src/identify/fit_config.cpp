@@ -23,6 +23,8 @@ FitConfig read_fit_config(const std::filesystem::path& path, const model::Vehicl
     if (found == known.end())
       t.fail("name", "no parameter \"" + name + "\" in the vehicle",
              "paths of the vehicle's file" + io::did_you_mean(name, names));
+    if (name.starts_with("driver."))
+      t.fail("name", "\"" + name + "\" is chosen, not fitted", "parameters of the body, wings, springs and motors");
     if (std::ranges::count(offered, name) > 0) t.fail("name", "\"" + name + "\" comes twice", "each parameter once");
     offered.push_back(name);
     const FitParameter p{name, t.number("low", {found->low, found->high}), t.number("high", {found->low, found->high})};

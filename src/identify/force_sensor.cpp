@@ -18,6 +18,12 @@ std::vector<sim::Input> default_inputs() {
   return inputs;
 }
 
+std::vector<sim::Input> default_inputs(const model::Driver& driver) {
+  std::vector<sim::Input> inputs = default_inputs();
+  for (const sim::Input& input : inputs) check_limits(input, driver, "the inputs of a sweep, without --inputs");
+  return inputs;
+}
+
 MeasuredMap simulate_forces(const model::Vehicle& vehicle, const std::vector<sim::Input>& inputs,
                             const ForceSensor& sensor, std::uint64_t seed, const MapOptions& options) {
   if (!(sensor.noise_steps > 0)) return {"", inputs, whole_map(vehicle, inputs, options), {}};

@@ -17,6 +17,8 @@ struct ForceSensor {
 /// driver's limits. Below about 3 V, where wings hardly flip, and from about 16 V on, at the stops, the map jumps by up
 /// to 150 sd of this sensor, and slopes mean nothing.
 std::vector<sim::Input> default_inputs();
+/// The same; io::InputError if one is beyond the driver's limits.
+std::vector<sim::Input> default_inputs(const model::Driver& driver);
 
 /// The map as `sensor` measures it, with each value's sd; without noise: the exact map without standard deviations.
 MeasuredMap simulate_forces(const model::Vehicle& vehicle, const std::vector<sim::Input>& inputs,

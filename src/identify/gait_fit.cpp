@@ -94,11 +94,17 @@ std::vector<FittedAngle> fit_gait(const std::filesystem::path& path, const GaitO
   }
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver(m);
   std::vector<FittedAngle> list;
+  std::vector<std::string> known = {"t_s", "beat"};
   for (const char* side : {"left_", "right_", ""})
     for (const char* angle : model::kAngles)
       for (const char* unit : {"_rad", "_deg"}) {
         const std::string column = std::string(side) + angle + unit;
         if (std::ranges::count(table.names, column) == 0) continue;
+        known.push_back(column);
+        if (std::ranges::any_of(
+                list, [&](const FittedAngle& f) { return f.angle == angle && (f.side == "right") == (*side == 'r'); }))
+          fail(table, column, "is of an angle that another column has",
+               "one column of an angle; without left_ or right_ it is left");
         const std::vector<double> values = radians(table, column, std::string_view(unit) == "_deg");
         const Eigen::VectorXd y = Eigen::Map<const Eigen::VectorXd>(values.data(), samples), x = solver.solve(y);
         const auto n = static_cast<double>(samples);
@@ -119,13 +125,10 @@ std::vector<FittedAngle> fit_gait(const std::filesystem::path& path, const GaitO
     throw io::InputError(table.name +
                          ": no column of an angle; accepted: stroke_plane, stroke, deviation or rotation, "
                          "with left_ or right_ before, and _rad or _deg behind");
-  for (const std::string& name : table.names) {
-    const bool known =
-        name == "t_s" || name == "beat" || std::ranges::any_of(list, [&](const FittedAngle& f) {
-          return name.find(f.angle + "_rad") != std::string::npos || name.find(f.angle + "_deg") != std::string::npos;
-        });
-    if (!known) fail(table, name, "is no column of a gait", "t_s, beat, and angles in _rad or _deg");
-  }
+  for (const std::string& name : table.names)
+    if (std::ranges::count(known, name) == 0)
+      fail(table, name, "is no column of a gait",
+           "t_s, beat, and angles in _rad or _deg" + io::did_you_mean(name, {"left_stroke_rad", "right_stroke_rad"}));
   return list;
 }
 

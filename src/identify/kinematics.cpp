@@ -79,7 +79,11 @@ Beat simulated_beat(const model::Vehicle& vehicle, const sim::Input& input, cons
     for (std::size_t a = 0; a < 4; ++a) angles[a].push_back(now[a]);
   }
   if (batch.status(0) & sim::kFrozen) refuse_apart(vehicle.name, input);
-  return *beat_of(phases, angles);
+  const std::optional<Beat> beat = beat_of(phases, angles);
+  if (!beat)
+    throw io::InputError(vehicle.name + ": its beat has too few steps of " + io::shortest_digits(kStep_s) +
+                         " s for its harmonics; accepted: a lower flapping_Hz");
+  return *beat;
 }
 
 BeatParameters parameters_of(const std::vector<double>& curve, std::complex<double> first) {

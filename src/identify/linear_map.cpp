@@ -18,7 +18,7 @@ LinearMap read_published_map(const std::filesystem::path& path) {
 }
 
 LinearMap linear_map(const model::Vehicle& vehicle, const MapOptions& options) {
-  const std::vector<sim::Input> inputs = default_inputs();
+  const std::vector<sim::Input> inputs = default_inputs(vehicle.driver);
   const std::vector<Wrench> wrenches = whole_map(vehicle, inputs, options);
   LinearMap map;
   for (std::size_t line = 0; line < map.size(); ++line) {

@@ -1,6 +1,8 @@
 #include "io/command_line.hpp"
 
 #include <CLI/CLI.hpp>
+#include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <type_traits>
 
@@ -56,6 +58,12 @@ Option Command::option(const std::string& name, T& value, const std::string& hel
   if constexpr (std::is_unsigned_v<T>)  // CLI11 would accept -1
     option->check([](const std::string& text) {
       return text.find('-') == std::string::npos ? "" : "Value " + text + " is below 0";
+    });
+  if constexpr (std::is_same_v<T, double> || std::is_same_v<T, std::vector<double>>)  // ranges of CLI11 hold NaN
+    option->check([](const std::string& text) {
+      double x = 0;
+      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), x);
+      return error != std::errc() || std::isfinite(x) ? "" : "Value " + text + " is not finite";
     });
   return Option(option);
 }

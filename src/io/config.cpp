@@ -508,6 +508,10 @@ void Table::accept(const std::vector<std::string>& names) const {
 }
 
 bool Table::has(std::string_view key) const { return find(*section_, key).node != nullptr; }
+bool Table::is_table(std::string_view key) const {
+  const Entry entry = find(*section_, key);
+  return entry.node != nullptr && entry.node->is_table();
+}
 
 std::vector<std::string> Table::keys() const {
   std::vector<std::string> names;

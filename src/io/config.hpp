@@ -67,7 +67,8 @@ class Table {
 
   /// Refuses other keys of this table, so that a misspelt key is reported before a missing one. Then read only `names`.
   void accept(const std::vector<std::string>& names) const;
-  bool has(std::string_view key) const;   ///< counts as reading the key
+  bool has(std::string_view key) const;  ///< counts as reading the key
+  bool is_table(std::string_view key) const;
   std::vector<std::string> keys() const;  ///< sorted
   std::string path() const;               ///< full dotted path; empty for the root
   /// Throws an InputError of the caller's choice about a key, or about this table where `key` is empty.

@@ -3,7 +3,9 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "io/files.hpp"
@@ -92,6 +94,8 @@ int Program::run(int argc, char** argv, const std::function<void()>& job) {
       write_progress(progress_path_);
     }
     job();
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+      throw InputError(std::string("stdout: cannot be written: ") + std::strerror(errno));
     if (ranks_) ranks_->finish();
     return 0;
   } catch (const CLI::ParseError& e) {

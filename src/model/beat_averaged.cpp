@@ -25,7 +25,13 @@ struct Monomial {
 };
 using Sum = std::vector<Monomial>;
 
+constexpr std::size_t kMaxMonomials = 10'000;
+constexpr int kMaxDepth = 32;
+
 Sum times(const Sum& a, const Sum& b) {
+  if (a.size() * b.size() > kMaxMonomials)
+    throw ExpressionFault{"multiplied out, it has more than " + std::to_string(kMaxMonomials) + " terms",
+                          "fewer terms"};
   Sum all;
   for (const Monomial& x : a)
     for (const Monomial& y : b) {
@@ -95,7 +101,10 @@ class Reader {
 
   Sum atom() {
     if (take('(')) {
+      if (++depth_ > kMaxDepth)
+        fail("its parentheses are too deep", "at most " + std::to_string(kMaxDepth) + " in each other");
       Sum inner = sum();
+      --depth_;
       if (!take(')')) fail("a \"(\" is not closed");
       return inner;
     }
@@ -132,6 +141,7 @@ class Reader {
 
   std::string_view text_;
   std::size_t at_ = 0;
+  int depth_ = 0;
   const BeatAveraged& vehicle_;
 };
 
@@ -240,7 +250,7 @@ BeatAveraged read_beat_averaged(const io::Table& root, bool predicted) {
   if (const auto coefficients = root.optional_table("coefficients"))
     for (const std::string& name : coefficients->keys()) {
       check_name(*coefficients, name, v);
-      const bool known = coefficients->has(name + ".value");
+      const bool known = coefficients->is_table(name);
       BeatAveraged::Coefficient c{name, coefficients->number(known ? name + ".value" : name, any)};
       if (known) c.sd = coefficients->number(name + ".sd", {0, kLargest});
       if (predicted) c.predicted_at = known ? coefficients->number_or(name + ".predicted_at", c.value, any) : c.value;
@@ -248,6 +258,7 @@ BeatAveraged read_beat_averaged(const io::Table& root, bool predicted) {
     }
   if (predicted) return v;
   each("wrench", [&](const io::Table& wrenches, const std::string& name, const io::Table& t) {
+    if (!io::is_bare(name)) wrenches.fail(name, "is no name of a wrench", "letters, digits, underscores and dashes");
     BeatAveraged::Wrench w{name, {}, {}};
     const io::Range near{-kFarthest_m, kFarthest_m};
     if (t.has("at_m")) w.at_m = {t.number("at_m.x", near), t.number("at_m.y", near), t.number("at_m.z", near)};

@@ -47,11 +47,6 @@ struct WingWrench {
   Vec3<T> moment_Nm;       // y: about the rotation hinge; z: about the leading edge's z
 };
 
-template <class T>
-FLAPPY_INLINE WingWrench<T> scaled(const WingWrench<T>& w, const T& factor) {
-  return {factor * w.normal_force_N, factor * w.force_x_N, factor * w.force_z_N, factor * w.moment_Nm};
-}
-
 /// Scales the lift: the force normal to the plane of the strokes, and its moment about the leading edge's x.
 template <class T>
 FLAPPY_INLINE WingWrench<T> with_lift(const WingWrench<T>& w, const T& factor) {

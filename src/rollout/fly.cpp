@@ -49,6 +49,10 @@ void prepare_log_folder(const fs::path& folder, std::size_t count, const std::st
   }
   if (error) throw io::InputError(folder.string() + ": cannot be read: " + error.message());
   if (!foreign.empty()) refuse("holds " + *foreign.begin());
+  for (std::size_t i = 0; count > 1 && i < count;
+       ++i)  // else logs of an earlier run would stay beside those of one that is stopped
+    if (const fs::path old = folder / log_name(i, count); fs::exists(old / flightlog::log_file::kHeader))
+      fs::remove_all(old);
 }
 
 /// Writes the logs of flights, numbered from `first`; returns the number of logs written.

@@ -145,6 +145,15 @@ class Reader {
     if (c_.welded && c_.fleet.task.start.settled)
       root_.fail("flight.support",
                  "is \"welded\", but task " + io::toml_string(c_.fleet.task.name) + " starts from hover", "\"task\"");
+    if (c_.vehicle.effects.contains("tether") && c_.fleet.batch.world.ground_z_m <= sim::World{}.ground_z_m)
+      root_.fail("world.ground_z_m", "is missing, and the vehicle's tether hangs down to it", "the ground's height, m");
+    if (c_.changes.swapped_wings && (c_.vehicle.beat_averaged || c_.vehicle.jointed))
+      root_.fail("changes.swapped_wings", "is of a vehicle whose wings are no bodies of their own",
+                 "a vehicle with wings and motors");
+    if (c_.fleet.task.start.settled && c_.fleet.controller.kind == flight::kNoController)
+      root_.fail("task",
+                 io::toml_string(c_.fleet.task.name) + " starts from hover, but there is no controller that hovers",
+                 "a controller, or a task of another start");
     check_times();
     keep_texts();
     return std::move(c_);
@@ -256,6 +265,16 @@ class Reader {
       root_.fail("flight.step_s",
                  "does not divide the driver's hold of " + io::shortest_digits(c_.vehicle.driver.hold_s) + " s",
                  "hold_s / n");
+    if (!c_.vehicle.beat_averaged && !c_.vehicle.jointed &&
+        c_.vehicle.driver.hold_s * c_.vehicle.driver.flapping_Hz > 0.25)
+      root_.fail("vehicle", "its driver.hold_s is longer than a quarter of a beat",
+                 "a hold_s of at most 0.25 / flapping_Hz");
+    for (const flight::Wave& w : c_.excitation.waves)
+      if (std::max(w.from_hz, w.to_hz) > 0.5 * o.control_hz)
+        root_.fail(
+            "excitation",
+            "goes up to " + io::shortest_digits(std::max(w.from_hz, w.to_hz)) + " Hz, and is held for a control period",
+            "at most half of flight.control_hz");
     for (const double rate : {o.sensors.imu.rate_hz, o.sensors.mocap.rate_hz})
       if (rate * step > 1 + 1e-9)
         root_.fail("flight.step_s",
@@ -266,6 +285,16 @@ class Reader {
         files_.at("vehicle").root().fail(fault->path, fault->what, fault->accepted);
         return 0;
       });
+    if (const auto found = c_.vehicle.effects.find(model::MocapDelay::kInfo.id); found != c_.vehicle.effects.end()) {
+      const auto e = static_cast<std::size_t>(model::effect_index(model::MocapDelay::kInfo.id));
+      const double delay_s = model::effects()[e].values(found->second)[0];
+      if (delay_s < -o.sensors.mocap.latency_s)
+        root_.fail("sensors",
+                   "has a mocap.latency_s of " + io::shortest_digits(o.sensors.mocap.latency_s) +
+                       " s, and the vehicle's mocap_delay of " + io::shortest_digits(delay_s) +
+                       " s shows poses before they were",
+                   "a longer latency, or a delay of at least its negative");
+    }
     const char* const delay = model::CommandDelay::kInfo.id;
     if (const auto found = c_.vehicle.effects.find(delay);
         found != c_.vehicle.effects.end() && !c_.vehicle.beat_averaged) {

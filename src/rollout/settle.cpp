@@ -18,6 +18,21 @@ flight::Task staying() {
   return task;
 }
 
+/// The places of a world belong to the task, not to the hover at the origin: removes shapes, and moves surfaces so far away that the
+/// air does not feel them.
+void clear_origin(sim::World& world) {
+  constexpr double kClear_m = 0.5;
+  world.shapes.clear();
+  world.ground_z_m = std::min(world.ground_z_m, -kClear_m);
+  world.ceiling_z_m = std::max(world.ceiling_z_m, kClear_m);
+  for (sim::Wall& w : world.walls) {
+    const double missing_m = kClear_m + w.normal_x * w.x_m + w.normal_y * w.y_m;
+    if (missing_m <= 0) continue;
+    w.x_m -= missing_m * w.normal_x;
+    w.y_m -= missing_m * w.normal_y;
+  }
+}
+
 }  // namespace
 
 template <class T>
@@ -27,7 +42,7 @@ std::vector<flight::Snapshot<T>> settle(const flight::FleetOptions& options, std
   if (count == 0) return list;
   flight::FleetOptions o = options;
   o.task = staying();
-  o.batch.world.shapes.clear();  // their places belong to the task, not to the hover at the origin
+  clear_origin(o.batch.world);
   flight::Fleet<T> fleet(count, vehicle(o.first_flapper), o);
   const long settled = std::lround(seconds / fleet.period_s());
   std::vector<long> taken_at(count);  // control tick of each snapshot, spread over one beat

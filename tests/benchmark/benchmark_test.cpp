@@ -252,7 +252,14 @@ TEST_F(Benchmark, TakesNoPredictionOnceLabelsAreOpen) {
   EXPECT_EQ(test::refusal([&] { score_bench(command()); }),
             sums.string() + ": is missing, though labels were opened; accepted: what was sealed");
   EXPECT_EQ(asked_, 2);
-  // nor is a folder gone on with under another plan
+  // nor is a folder gone on with under other options
+  fs::remove_all(root_ / "bench" / "true_fits");
+  ScoreCommand other = command();
+  other.verdict = kConfigs + "gap/contrast_verdict.toml";
+  EXPECT_EQ(test::refusal([&] { score_bench(other); }),
+            (root_ / "bench").string() +
+                ": its predictions were begun with another --verdict; accepted: the same options, or a new benchmark");
+  // or under another plan
   fs::remove(root_ / "bench" / "manifest.json");
   EXPECT_EQ(
       test::refusal([&] { make(3); }),

@@ -84,9 +84,9 @@ TEST(SensorEffects, AreUndoneByTheDiagnosis) {
 // A marker shakes as the body does, not as the tracker's estimate of its attitude: noise of that leaves the point alone.
 TEST(SensorEffects, CarryTheMarkerOnTheTrueAttitude) {
   const gap::EffectValues offset = {*kAll.find("marker_offset")};
-  const std::string blurred = "sensors.mocap.attitude_noise_rad=0.1", sharp = "sensors.mocap.attitude_noise_rad=1e-12";
+  const std::string blurred = "sensors.mocap.attitude_noise_rad=0.05", sharp = "sensors.mocap.attitude_noise_rad=1e-12";
   const flightlog::FlightLog seen = open_loop(offset, {blurred}), same = open_loop(offset, {sharp});
-  EXPECT_GT(farthest(seen.mocap.qx, same.mocap.qx), 0.1);
+  EXPECT_GT(farthest(seen.mocap.qx, same.mocap.qx), 0.05);
   EXPECT_EQ(seen.mocap.x_m, same.mocap.x_m);
   EXPECT_EQ(seen.mocap.y_m, same.mocap.y_m);
   EXPECT_EQ(seen.mocap.z_m, same.mocap.z_m);

@@ -91,6 +91,12 @@ TEST(GaitFit, RefusesWhatIsNoGaitInOneLine) {
             ":4: beat: does not increase; accepted: times in their order");
   EXPECT_EQ(refused(beat("beat,stroke_rad,speed_m_s", 50, 1, 0, wing)),
             ": speed_m_s: is no column of a gait; accepted: t_s, beat, and angles in _rad or _deg");
+  EXPECT_EQ(refused(beat("beat,left_stroke_rad,rigth_stroke_rad", 50, 1, 0, wing)),
+            ": rigth_stroke_rad: is no column of a gait; accepted: t_s, beat, and angles in _rad or _deg; did you mean "
+            "\"right_stroke_rad\"?");
+  EXPECT_EQ(refused(beat("beat,stroke_rad,left_stroke_rad", 50, 1, 0, wing)),
+            ": stroke_rad: is of an angle that another column has; accepted: one column of an angle; without left_ or "
+            "right_ it is left");
   GaitOptions many;
   many.harmonics = 17;
   EXPECT_EQ(refused("", many), "--harmonics: 17 of them; accepted: 1 to 16");

@@ -111,6 +111,12 @@ TEST_F(Refusal, SaysWhatAndWhere) {
                 .rfind("wrench.both.moment_y_Nm: nothing is called \"left_hz\"", 0),
             0U);
   EXPECT_EQ(edited("bandwidth_Hz = 3.0", "bandwidth_Hz = 10.0").rfind("beat.bandwidth_Hz: ", 0), 0U);
+  EXPECT_EQ(edited("lift_N = { value = 0.0, sd = 1.0 }", "lift_N = 0.0"), "accepted");  // known exactly
+  EXPECT_EQ(edited("[wrench.both]", "[wrench.\"left wing\"]").rfind("wrench.\"left wing\": is no name of a wrench", 0),
+            0U);
+  EXPECT_EQ(edited("thrust_N_Hz * (left_Hz", std::string(40, '(') + "thrust_N_Hz * (left_Hz")
+                .rfind("wrench.both.moment_y_Nm: its parentheses are too deep", 0),
+            0U);
   EXPECT_EQ(edited("[actuator.left_Hz]", "[actuator.v_x]").rfind("actuator.v_x: something else has this name", 0), 0U);
   EXPECT_EQ(edited("[wrench.both]", "[effects.wing_damage]\n[wrench.both]")
                 .rfind("effects.wing_damage: unknown effect; accepted: com_offset,", 0),

@@ -160,6 +160,32 @@ TEST(FlyConfig, ReadsShapesAndLetsVehiclesWithPointsTouch) {
             "--set vehicle.contact.top.frictoin=1: contact.top.frictoin: unknown key;");
 }
 
+TEST(FlyConfig, RefusesWhatCannotBeMeant) {
+  const fs::path escape = source_path("configs/fly/escape.toml");
+  const auto refused = [&](const std::vector<std::string>& overrides, const fs::path& file) {
+    const std::string what = refusal(overrides, file);
+    return what.substr(what.find(": ") + 2);
+  };
+  EXPECT_EQ(refusal({"vehicle.effects.tether.line_kg_m=2e-4"}, escape), "accepted");
+  EXPECT_EQ(
+      refused({"vehicle.effects.tether.line_kg_m=2e-4"}, source_path("configs/fly/hover_direct.toml")),
+      "world.ground_z_m: is missing, and the vehicle's tether hangs down to it; accepted: the ground's height, m");
+  EXPECT_EQ(refused({"changes.swapped_wings=true"}, source_path("configs/fly/flapper_nimble.toml")),
+            "changes.swapped_wings: is of a vehicle whose wings are no bodies of their own; accepted: a vehicle with "
+            "wings and motors");
+  EXPECT_EQ(refused({"controller=../controllers/none.toml"}, escape),
+            "task: \"escape\" starts from hover, but there is no controller that hovers; accepted: a controller, or a "
+            "task of another start");
+  EXPECT_NE(refusal({"task.success.keep.until_s=0.1"}, escape).find("accepted: a number from 0.6 "), std::string::npos);
+  EXPECT_NE(refusal({"task.end.distance_m=-1"}, escape).find("accepted: a number from 0 "), std::string::npos);
+  EXPECT_NE(refusal({"task.hand_back.distance_m=-1"}, escape).find("accepted: a number from 0 "), std::string::npos);
+  EXPECT_NE(refusal({"vehicle.effects.mocap_delay.delay_s=-0.02", "sensors.mocap.latency_s=0.01"}, escape)
+                .find("shows poses before they were"),
+            std::string::npos);
+  EXPECT_NE(refusal({"vehicle.driver.hold_s=0.008"}, escape).find("longer than a quarter of a beat"),
+            std::string::npos);
+}
+
 TEST(FlyConfig, RefusesAVehicleWhoseForcesStandInFiles) {
   std::string text = io::read_text(source_path("configs/vehicles/flapper_nimble.toml"));
   text.replace(text.find("beat_averaged"), 13, "predicted").erase(text.find("[wrench."));

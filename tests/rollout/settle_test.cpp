@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "flight/fleets.hpp"
 #include "model/effects/registry.hpp"
@@ -86,6 +87,21 @@ TEST(Settle, SnapshotsDependOnTheFlapperAlone) {
     }
   }
   EXPECT_NE(all[0].phase, all[1].phase);
+}
+
+TEST(Settle, NothingIsNearTheHover) {
+  FleetOptions o = fleet_options(sensors("paper"), controller("pid"), task(holding(0, 0)));
+  const auto vehicle = [](std::uint32_t) {
+    model::Vehicle v = test::identified();
+    v.effects["ground_effect"], v.effects["ceiling_effect"], v.effects["wall_effect"];
+    return v;
+  };
+  const auto far = rollout::settle<float>(o, 1, 0.3, vehicle);
+  o.batch.world = {.ground_z_m = -0.03, .ceiling_z_m = 0.05, .walls = {{0.05, 0, -1, 0}}};
+  const auto near = rollout::settle<float>(o, 1, 0.3, vehicle);
+  for (std::size_t r = 0; r < far[0].body.size();
+       ++r)  // half a metre away, surfaces change the air's force by less than 1e-4
+    EXPECT_NEAR(near[0].body[r], far[0].body[r], 1e-4 + 1e-3 * std::abs(far[0].body[r])) << r;
 }
 
 TEST(Trim, IsAllThatActsUntilHandedBack) {

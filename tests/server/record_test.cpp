@@ -122,6 +122,9 @@ TEST(Record, SaysWhatIsMissingAndWhereTheMessagesAre) {
   const std::string line = test::refusal([&] { record(loopback(domain), mapping(domain), o); });
   EXPECT_NE(line.find("sitl.toml:"), std::string::npos) << line;
   EXPECT_NE(line.find("; the messages are in " + (folder / "log.mcap").string()), std::string::npos) << line;
+  EXPECT_EQ(test::refusal([&] { record(loopback(domain), mapping(domain), o); }),
+            (folder / "log.mcap").string() +
+                ": exists, and a flight cannot be recorded twice; accepted: a name that is not in use");
 }
 
 }  // namespace

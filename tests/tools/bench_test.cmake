@@ -161,7 +161,7 @@ expect_refused("${WORK}/heavy.toml:${line}:11: torso.mass_kg: -0.0109067 is out 
 expect_refused("${WORK}/heavy.toml:${line}:11: torso.mass_kg: -0.0109067 is out of range; accepted: a number from 1e-09 to 10"
   --vehicle ${WORK}/heavy.toml)
 
-expect_refused("flappy-bench: --fast: no such option; accepted: --help, --json, --log-level, --no-peers, --progress, --rounds, --seconds, --vehicle, --version; see flappy-bench --help" --fast)
+expect_refused("flappy-bench: --fast: no such option; accepted: --figures, --help, --json, --log-level, --no-peers, --progress, --rounds, --seconds, --vehicle, --version; see flappy-bench --help" --fast)
 expect_refused("flappy-bench: --rounds: Value 0 not in range 1 to 1000; see flappy-bench --help" --rounds 0)
 expect_refused("flappy-bench: config is required; see flappy-bench --help" batch)
 

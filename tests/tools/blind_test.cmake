@@ -46,7 +46,9 @@ expect_keys(${WORK}/family.json family=STRING seed=NUMBER draw=NUMBER crashes=AR
 expect_refused("--family d: no such family; accepted: a, b or c" fly --family d --seed 1 --out ${WORK}/c)
 expect_refused("--randomise: draws robots without --family; accepted: --own-parameters"
   fly --family a --randomise x.toml --seed 1 --out ${WORK}/c)
-expect_refused("--own-parameters, --conventions: are of a family; accepted: with --family" fly --conventions --seed 1 --out ${WORK}/c)
+expect_refused("flappy-blind: --conventions requires --family; see flappy-blind --help" fly --conventions --seed 1 --out ${WORK}/c)
+expect_refused("flappy-blind: --calm-reference requires --reference; see flappy-blind --help" fly --family a --calm-reference --seed 1 --out ${WORK}/c)
+expect_refused("--reference ${WORK}/c: is also --out; accepted: two folders" fly --family a --reference ${WORK}/c --seed 1 --out ${WORK}/c)
 
 expect_refused("--effect wnd: no such effect; accepted: what `flappy-blind effects` lists; did you mean \"wind\"?"
   ${fly} --effect wnd=1 --out ${WORK}/c)

@@ -100,6 +100,8 @@ foreach(flag IN ITEMS -ffast-math -freciprocal-math -fassociative-math -funsafe-
 endforeach()
 expect_refused("--name: \"1st\" begins no name; accepted: small letters, digits and _, a letter first, at most 40"
   ${WORK}/run --out ${WORK}/refused --name 1st)
+file(WRITE ${WORK}/foreign/px4/README.md "of somebody else\n")
+expect_refused("${WORK}/foreign/px4: is no app that flappy-export made; accepted: another --out" ${WORK}/run --out ${WORK}/foreign --for px4)
 
 # ---- any network that LibTorch trains: layer norm, another activation, a history, more layers
 

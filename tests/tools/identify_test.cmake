@@ -127,10 +127,12 @@ expect_refused("--parameters: \"left.motor.resistance\" is not fitted by ${SOURC
 expect_refused("${WORK}/still.csv: amplitude_V: column is missing; accepted: this column, or --amplitude"
   kinematics ${WORK}/still.csv --vehicle ${nominal})
 expect_refused("--from-s: is not before --to-s; accepted: a time before it"
+  kinematics ${WORK}/still.csv --vehicle ${nominal} --amplitude 10 --from-s 2 --to-s 1)
+expect_refused("flappy-identify: --from-s: Value nan is not finite; see flappy-identify --help"
   kinematics ${WORK}/still.csv --vehicle ${nominal} --amplitude 10 --from-s nan)
 expect_refused("${WORK}/none/beat.svg: cannot be written: No such file or directory"
   kinematics ${WORK}/still.csv --vehicle ${nominal} --amplitude 10 --csv ${WORK}/none.csv --svg ${WORK}/none/beat.svg)
-foreach(value IN ITEMS 100 nan -5)
+foreach(value IN ITEMS 100 -5)
   expect_refused("command line: amplitude_V: ${value} is beyond the vehicle's limits; accepted: 0 to 18"
     kinematics ${WORK}/still.csv --vehicle ${nominal} --amplitude ${value})
 endforeach()

@@ -86,7 +86,17 @@ EscapeRules hover_rules(EscapeRules r) {
   return r;
 }
 
-EscapeAssignment escape_assignment(const EscapeRules& r) {
+EscapeAssignment escape_assignment(const EscapeRules& r, const fs::path& config) {
+  const auto require = [&](bool holds, const char* accepted) {
+    if (!holds)
+      throw io::InputError(config.string() +
+                           ": is nothing that robots of families b and c can fly; accepted: " + accepted);
+  };
+  const flight::HandBack<double>& back = r.constants.hand_back;
+  require(r.task.history == 1, "a task without history");
+  require(r.constants.holds_trim > 0, "a task of base = \"trim\"");
+  require(back.enabled > 0 && back.on_estimate > 0, "a hand-back with on = \"estimate\"");
+  require(back.x_m < -kUnbounded && back.speed_x_m_s > kUnbounded, "a hand-back without x_m and speed_x_m_s");
   EscapeAssignment a;
   for (const auto& [name, signals] : r.task.observed_parts()) a.observation.push_back(name);
   a.policy = r.policy;

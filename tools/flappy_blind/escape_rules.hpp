@@ -17,8 +17,8 @@ EscapeRules read_escape_rules(const std::filesystem::path& policy_file, const st
 EscapeRules hover_rules(EscapeRules rules);
 
 /// Converts the rules for the interface of all families, which supports hand-back by distance, speeds, attitude and time only, and no
-/// termination.
-EscapeAssignment escape_assignment(const EscapeRules& rules);
+/// termination. Throws InputError, with the name `config`, for other rules.
+EscapeAssignment escape_assignment(const EscapeRules& rules, const std::filesystem::path& config);
 
 rollout::Outcome outcome_of(const Escape& escape);
 

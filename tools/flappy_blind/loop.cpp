@@ -1,8 +1,10 @@
 #include "loop.hpp"
 
+#include <atomic>
 #include <cstdio>
 #include <functional>
 #include <map>
+#include <optional>
 
 #include "benchmark/families.hpp"
 #include "benchmark/records.hpp"
@@ -11,10 +13,13 @@
 #include "escape_rules.hpp"
 #include "io/append_file.hpp"
 #include "io/files.hpp"
+#include "io/parallel.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
+#include "io/sha256.hpp"
 #include "io/toml_writer.hpp"
 #include "learn/trainer.hpp"
+#include "rollout/fly_config.hpp"
 
 namespace flappy::blind {
 namespace {
@@ -33,6 +38,9 @@ constexpr std::string_view kParts[] = {"singles", "typical",         "withheld",
 struct Scored {
   explicit Scored(const fs::path& at) : folder(at), manifest(benchmark::read_manifest(at)) {
     benchmark::check_predictions(folder, manifest);
+    if (io::sha256(io::read_text(manifest.vehicle)) != manifest.vehicle_sha256)
+      throw io::InputError(manifest.vehicle + ": has changed since " + at.string() +
+                           " was made; accepted: the vehicle that was diagnosed");
     const Json sealed = benchmark::open_labels(folder, manifest);
     for (const Json& json : sealed.at("cases")) {
       benchmark::Label l = benchmark::label_from(json);
@@ -56,37 +64,22 @@ struct Robot {
 
 class Loop {
  public:
-  explicit Loop(const LoopCommand& command) : command_(command) {
-    start_ = learn::read_train_init(command.run);
-    const EscapeRules shipped = read_escape_rules(fs::path(command.run) / "best.json", command.config),
-                      hover = hover_rules(shipped);
+  explicit Loop(const LoopCommand& command) : command_(command), start_(learn::read_train_init(command.run)) {
     for (const std::string& folder : command.folders) {
       const Scored& s = *scored_.emplace_back(std::make_unique<Scored>(folder));
-      std::size_t robots = 0;
-      for (const auto& [number, label] : s.labels) {
-        if (command.robots > 0 && robots == command.robots) break;
-        if (!escapes_of(s.manifest.family, label.robot(s.manifest.vehicle), hover)(0)) {
-          ++unsteady_[s.manifest.family];
-          continue;
-        }
-        if (command.costly && !costs_escapes(s.manifest.family, label.robot(s.manifest.vehicle), shipped)) {
-          ++as_good_[s.manifest.family];
-          continue;
-        }
-        ++robots;
-        robots_.push_back({&s, &label, s.prediction(number),
-                           command.out / fs::path(s.manifest.family + "_" + benchmark::number_text(number))});
-      }
       if (s.labels.empty())
         throw io::InputError(folder + ": no robot with an effect and rich flights; accepted: a benchmark with " +
                              io::joined({std::begin(kParts), std::end(kParts)}));
+      if (s.manifest.vehicle_sha256 != scored_.front()->manifest.vehicle_sha256)
+        throw io::InputError(folder + ": is of another vehicle; accepted: benchmarks of one vehicle");
     }
   }
 
   Json run() {
     io::make_folder(command_.out);
     const io::FolderLock lock(command_.out);
-    if (!train() || !fly()) {
+    io::stop_on_interrupt();
+    if (!choose() || !train() || !fly()) {
       std::printf("stopped; what is done stays: the same command goes on\n");
       return nullptr;
     }
@@ -94,28 +87,73 @@ class Loop {
   }
 
  private:
-  bool costs_escapes(const std::string& family, Assignment a, const EscapeRules& rules) const {
-    const auto succeeded = [&] {
-      const auto succeeds = escapes_of(family, a, rules);
-      std::size_t count = 0;
-      for (std::size_t n = 0; n < command_.escapes; ++n) count += succeeds(n);
-      return count;
-    };
-    const std::size_t with_effect = succeeded();
-    a.effects.clear();
-    return with_effect < succeeded();
+  /// Chooses the robots, in the order of their cases; false if it was interrupted.
+  bool choose() {
+    const fs::path policy = fs::path(command_.run) / "best.json";
+    const EscapeRules shipped = read_escape_rules(policy, command_.config), hover = hover_rules(shipped);
+    std::map<std::string, std::size_t> benches;
+    io::ProgressLine progress("choosing robots");
+    for (const auto& s : scored_) {
+      const std::string& family = s->manifest.family;
+      const std::size_t before = benches[family]++;  // benchmarks of the same family
+      const std::string name = family + (before > 0 ? std::to_string(before + 1) : "") + "_";
+      std::size_t robots = 0, seen = 0;
+      for (const auto& [number, label] : s->labels) {
+        if (command_.robots > 0 && robots == command_.robots) break;
+        if (io::interrupted()) return false;
+        progress.show(static_cast<double>(seen++) / static_cast<double>(s->labels.size()), "family " + family);
+        Robot r{s.get(), &label, s->prediction(number), command_.out / fs::path(name + benchmark::number_text(number))};
+        Assignment a = label.robot(s->manifest.vehicle);
+        if (!escapes_of(family, a, hover)(0)) {
+          ++unsteady_[family];
+          continue;
+        }
+        if (command_.costly) {
+          io::make_folder(r.own);
+          const std::optional<std::size_t> with = succeeded(r, kPolicies[0], a, policy);
+          a.effects.clear();
+          const std::optional<std::size_t> without = succeeded(r, "without_effect", a, policy);
+          if (!with || !without) return false;
+          if (*with >= *without) {
+            ++as_good_[family];
+            continue;
+          }
+        }
+        ++robots;
+        robots_.push_back(std::move(r));
+      }
+    }
+    return true;
   }
 
-  static fs::path result_of(const Robot& r) { return r.own / "result.json"; }
+  /// Of the escapes that robot `a` flies with a policy: how many succeed; nothing if it was interrupted. Kept under `name` in the
+  /// robot's folder, with the hash of what they depend on.
+  std::optional<std::size_t> succeeded(const Robot& r, const std::string& name, const Assignment& a,
+                                       const fs::path& policy) const {
+    const fs::path file = r.own / (name + ".json");
+    std::string flown =
+        io::read_text(r.of->folder / "manifest.json") + io::read_text(policy) + std::to_string(command_.escapes);
+    for (const auto& [part, text] : rollout::read_fly_config(command_.config).resolved) flown += text;
+    const std::string of = io::sha256(flown);
+    if (fs::exists(file))
+      if (const Json kept = benchmark::read_json(file); kept.value("of", "") == of)
+        return kept.at("succeeded").get<std::size_t>();
+    const auto succeeds = escapes_of(r.of->manifest.family, a, read_escape_rules(policy, command_.config));
+    std::atomic<std::size_t> count = 0;
+    io::parallel_for(command_.escapes, command_.threads, [&](std::size_t n) {
+      if (!io::interrupted()) count += succeeds(n);
+    });
+    if (io::interrupted()) return std::nullopt;
+    io::write_atomically(file,
+                         Json{{"of", of}, {"escapes", command_.escapes}, {"succeeded", count.load()}}.dump(1) + "\n");
+    return count;
+  }
+
   fs::path without() const { return fs::path(command_.out) / "file"; }
 
   /// Trains by the predictions alone, without the labels' effects.
   bool train() {
-    io::stop_on_interrupt();
     const fs::path declared = scored_.front()->manifest.vehicle;
-    for (const auto& s : scored_)
-      if (s->manifest.vehicle_sha256 != scored_.front()->manifest.vehicle_sha256)
-        throw io::InputError(s->folder.string() + ": is of another vehicle; accepted: benchmarks of one vehicle");
     if (!train_on(declared, without(), 0)) return false;
     std::vector<const Robot*> open;
     for (const Robot& r : robots_) {
@@ -146,40 +184,27 @@ class Loop {
     return !learn::train(config, options).stopped;
   }
 
-  bool fly() {
-    std::vector<const Robot*> open;
-    for (const Robot& r : robots_)
-      if (!fs::exists(result_of(r)) || benchmark::read_json(result_of(r)).at("escapes") != command_.escapes)
-        open.push_back(&r);
-    return benchmark::work_through("flying", open.size(), command_.threads, nullptr,
-                                   [&](std::size_t i) { fly(*open[i]); });
+  fs::path policy_of(const Robot& r, std::size_t p) const {
+    const fs::path runs[] = {command_.run, without(), r.said.corrected.empty() ? without() : r.own / "corrected"};
+    return runs[p] / "best.json";
   }
 
-  void fly(const Robot& r) const {
-    const Assignment a = r.label->robot(r.of->manifest.vehicle);
-    const fs::path policies[] = {fs::path(command_.run) / "best.json", without() / "best.json",
-                                 (r.said.corrected.empty() ? without() : r.own / "corrected") / "best.json"};
-    Json json = {{"escapes", command_.escapes}};
-    for (std::size_t p = 0; p < std::size(policies); ++p) {
-      const auto succeeds = escapes_of(r.of->manifest.family, a, read_escape_rules(policies[p], command_.config));
-      std::size_t succeeded = 0;
-      for (std::size_t n = 0; n < command_.escapes; ++n) {
-        if (io::interrupted()) return;
-        succeeded += succeeds(n);
-      }
-      json[kPolicies[p]] = succeeded;
-    }
-    io::write_atomically(result_of(r), json.dump(1) + "\n");
+  bool fly() {
+    const bool all = benchmark::work_through("flying", robots_.size(), command_.threads, nullptr, [&](std::size_t i) {
+      const Robot& r = robots_[i];
+      for (std::size_t p = 0; p < std::size(kPolicies); ++p)
+        succeeded(r, kPolicies[p], r.label->robot(r.of->manifest.vehicle), policy_of(r, p));
+    });
+    return all && !io::interrupted();
   }
 
   /// A function that flies the escape of a number and returns whether it succeeds.
-  static std::function<bool(std::size_t)> escapes_of(const std::string& family, const Assignment& a,
-                                                     const EscapeRules& rules) {
+  std::function<bool(std::size_t)> escapes_of(const std::string& family, const Assignment& a,
+                                              const EscapeRules& rules) const {
     if (family == "a")
       return [robot = case_of(a), rules](std::size_t n) { return outcome_of(escape(robot, n, rules)).success(); };
-    return [&of = benchmark::family_named(family), a, asked = escape_assignment(rules)](std::size_t n) {
-      return of.escape(a, n, asked).success;
-    };
+    return [&of = benchmark::family_named(family), a, asked = escape_assignment(rules, command_.config)](
+               std::size_t n) { return of.escape(a, n, asked).success; };
   }
 
   struct Row {
@@ -191,29 +216,30 @@ class Loop {
     std::map<std::string, Row> rows;
     std::string lines = "family,case,part,effects,verdict,named,escapes,as_shipped,file,corrected,seed,draw\n";
     for (const Robot& r : robots_) {
-      const Json json = benchmark::read_json(result_of(r));
+      std::array<std::size_t, std::size(kPolicies)> count{};
+      for (std::size_t p = 0; p < count.size(); ++p)
+        count[p] = *succeeded(r, kPolicies[p], r.label->robot(r.of->manifest.vehicle), policy_of(r, p));
       const benchmark::Label& label = *r.label;
       const std::string& family = r.of->manifest.family;
       const benchmark::Answer said = answer_of(r.said);
       lines += family + "," + std::to_string(label.planned.number) + "," + label.planned.part + "," +
                io::joined(label.truth().effects, "+") + "," + said.kind + "," + io::joined(said.effects, "+") + "," +
-               std::to_string(json.at("escapes").get<std::size_t>());
+               std::to_string(command_.escapes);
       for (Row* row : {&rows[family], &rows["all"]}) {
         ++row->robots;
-        row->escapes += json.at("escapes").get<std::size_t>();
-        for (std::size_t p = 0; p < std::size(kPolicies); ++p)
-          row->succeeded[p] += json.at(kPolicies[p]).get<std::size_t>();
-        row->better += json.at("corrected") > json.at("file");
-        row->worse += json.at("corrected") < json.at("file");
+        row->escapes += command_.escapes;
+        for (std::size_t p = 0; p < std::size(kPolicies); ++p) row->succeeded[p] += count[p];
+        row->better += count[2] > count[1];
+        row->worse += count[2] < count[1];
       }
-      for (const char* policy : kPolicies) lines += "," + std::to_string(json.at(policy).get<std::size_t>());
+      for (const std::size_t c : count) lines += "," + std::to_string(c);
       lines += "," + std::to_string(label.planned.seed) + "," + std::to_string(label.draw) + "\n";
     }
     std::string text =
         "| family | robots | better with the diagnosis (95 %) | as good | worse | better, ties half | success as "
         "shipped "
         "| trained on with the file | with the corrected vehicle |\n|---|---|---|---|---|---|---|---|---|\n";
-    Json all;
+    Json all = Json::object();
     for (const auto& [family, row] : rows) {
       const rollout::Rate better = rollout::rate_of(row.better, row.robots);
       char line[300];

@@ -99,6 +99,7 @@ Json fly_with_firmware(const RobotOptions& o, const FamilyOptions& f, const OnBo
   a.vehicle_file = o.vehicle;
   for (const BlindEffect& e : effects_of(o.effects)) a.effects.emplace_back(e.id, e.magnitude);
   a.own_parameters = f.own_parameters, a.conventions = f.conventions;
+  a.power = o.power, a.wings = o.wings;
   a.seed = o.seed;
   const std::array<double, 4> start = {b.start[0], b.start[1], b.start[2] + kOrigin_m, b.start[3]};
   // what the laboratory declares of the sensors is what its firmware knows
@@ -174,23 +175,30 @@ int main(int argc, char** argv) {
   blind::RobotOptions robot;
   std::string programme = "rich";
   blind::add_robot_options(fly, robot);
-  fly.option("--programme", programme, "rich: excitation, a path, turns; hover: calm")
-      .one_of({"rich", "hover"})
-      .shows_default();
-  fly.option("--family", of.family, kFamily);
-  fly.flag("--hover", of.hover, "as --programme hover");
-  fly.option("--reference", of.reference,
-             "of a family: folder for a session of the same robot without the effects, flown before");
-  fly.flag("--calm-reference", of.calm_reference, "the reference hovers and follows slow paths");
-  fly.flag("--own-parameters", of.own_parameters, "of a family: draw the parameters of each body");
-  fly.flag("--conventions", of.conventions, "of a family: draw sensors and declarations as laboratories have them");
+  const io::Option programmed = fly.option("--programme", programme, "rich: excitation, a path, turns; hover: calm")
+                                    .one_of({"rich", "hover"})
+                                    .shows_default();
+  const io::Option family = fly.option("--family", of.family, kFamily);
+  const io::Option hovers = fly.flag("--hover", of.hover, "as --programme hover");
+  const io::Option reference =
+      fly.option("--reference", of.reference,
+                 "of a family: folder for a session of the same robot without the effects, flown before")
+          .needs(family);
+  fly.flag("--calm-reference", of.calm_reference, "the reference hovers and follows slow paths").needs(reference);
+  fly.flag("--own-parameters", of.own_parameters, "of a family: draw the parameters of each body").needs(family);
+  fly.flag("--conventions", of.conventions, "of a family: draw sensors and declarations as laboratories have them")
+      .needs(family);
   blind::OnBoardOptions on_board;
-  fly.option("--exported", on_board.exported,
-             "of a family: one flight under what flappy-export wrote, into --out itself");
-  fly.option("--firmware", on_board.firmware, "mistake of the firmware around it").shows_default();
-  fly.option("--begin", on_board.begin_s, "when the policy acts, s").range(0.0, 60.0).shows_default();
-  fly.option("--duration", on_board.lasts_s, "of that flight, s").range(0.1, 60.0).shows_default();
-  fly.option("--start", on_board.start, "x, y, z in m and heading in rad");
+  const io::Option exported = fly.option("--exported", on_board.exported,
+                                         "of a family: one flight under what flappy-export wrote, into --out itself")
+                                  .needs(family)
+                                  .excludes(reference)
+                                  .excludes(programmed)
+                                  .excludes(hovers);
+  fly.option("--firmware", on_board.firmware, "mistake of the firmware around it").needs(exported).shows_default();
+  fly.option("--begin", on_board.begin_s, "when the policy acts, s").range(0.0, 60.0).needs(exported).shows_default();
+  fly.option("--duration", on_board.lasts_s, "of that flight, s").range(0.1, 60.0).needs(exported).shows_default();
+  fly.option("--start", on_board.start, "x, y, z in m and heading in rad").needs(exported);
   fly.option("--out", robot.out, "folder for flight_1, flight_2, flight_3").required();
   io::Command escape = program.app().command("escape", "flies a policy's manoeuvre many times over");
   blind::EscapeOptions escapes{.robot = {}, .policy = {}, .config = io::config_path("fly/escape.toml")};
@@ -218,13 +226,15 @@ int main(int argc, char** argv) {
   make.option("--family", made.family, "of whose robots: a, b or c").shows_default();
   make.option("--out", made.out, "folder for the cases").required();
   make.option("--set", set, "development or reported: which seeds").one_of({"development", "reported"}).required();
-  make.flag("--contrast", made.plan.contrast, "robots with reference flights of another session");
+  const io::Option contrast =
+      make.flag("--contrast", made.plan.contrast, "robots with reference flights of another session");
   std::vector<std::string> parts(std::begin(benchmark::kParts), std::end(benchmark::kParts));
   parts.insert(parts.end(), std::begin(benchmark::kContrastParts), std::end(benchmark::kContrastParts));
   make.option("--part", made.plan.parts, "these parts alone").one_of(parts);
   make.option("--cases", made.plan.at_most, "of each part at most").range(1, 1000);
   make.option("--flights", made.plan.flights, "of each session at most, with --contrast")
       .range(std::size_t{1}, blind::Family::kFlights)
+      .needs(contrast)
       .shows_default();
   make.option("--vehicle", made.vehicle, "the robot as declared").shows_default();
   make.option("--randomise", made.randomise, "what robots of the part parameters are drawn from").shows_default();
@@ -271,10 +281,11 @@ int main(int argc, char** argv) {
           return benchmark::true_values(blind::case_of(a), effects, uncertain, 1);
         };
       made.ranks = program.ranks("work: make\n");
-      if (!benchmark::make_bench(made)) std::printf("stopped; what has flown stays: the same command goes on\n");
+      if (benchmark::make_bench(made)) program.write_json({{"out", made.out.string()}});
+      else std::printf("stopped; what has flown stays: the same command goes on\n");
     } else if (plan.given()) {
-      if (!benchmark::foresee_bench(foreseen))
-        std::printf("stopped; what is planned stays: the same command goes on\n");
+      if (benchmark::foresee_bench(foreseen)) program.write_json({{"folders", foreseen.folders.size()}});
+      else std::printf("stopped; what is planned stays: the same command goes on\n");
     } else if (score.given()) {
       scored.ranks = program.ranks("priors: " + io::sha256(io::read_text(scored.priors)) +
                                    ", discrepancy: " + io::sha256(io::read_text(scored.discrepancy)) + ", verdict: " +
@@ -285,19 +296,21 @@ int main(int argc, char** argv) {
       const nlohmann::ordered_json found = blind::run_loop(looped);
       if (!found.is_null()) program.write_json(found);
     } else if (calibrate.given()) program.write_json(benchmark::calibrate(calibrated));
-    else if (list.given() && !of.family.empty())
-      for (const blind::FamilyEffect& e : benchmark::family_named(of.family).effects())
-        std::printf("%-30s %s\n", e.id.c_str(), e.typical.c_str());
-    else if (list.given())
-      for (const std::string& name : blind::effect_names()) std::printf("%s\n", name.c_str());
-    else if (escape.given()) program.write_json(blind::fly_escapes(escapes));
+    else if (list.given()) {
+      nlohmann::ordered_json all = nlohmann::ordered_json::object();  // what is typical, by effect
+      if (of.family.empty())
+        for (const std::string& name : blind::effect_names()) all[name] = nullptr, std::printf("%s\n", name.c_str());
+      else
+        for (const blind::FamilyEffect& e : benchmark::family_named(of.family).effects())
+          all[e.id] = e.typical, std::printf("%-30s %s\n", e.id.c_str(), e.typical.c_str());
+      program.write_json(all);
+    } else if (escape.given()) program.write_json(blind::fly_escapes(escapes));
     else if (detectability.given()) program.write_json(benchmark::run_detectability(command));
     else {
       of.hover = of.hover || programme == "hover";
-      if (of.family.empty() && (of.own_parameters || of.conventions))
-        throw io::InputError("--own-parameters, --conventions: are of a family; accepted: with --family");
+      if (!of.reference.empty() && of.reference == robot.out)
+        throw io::InputError("--reference " + of.reference + ": is also --out; accepted: two folders");
       if (!on_board.exported.empty()) {
-        if (of.family.empty()) throw io::InputError("--exported: flies robots of a family; accepted: with --family");
         if (on_board.start.size() != 4) throw io::InputError("--start: accepted: four numbers, x y z heading");
         program.write_json(blind::fly_with_firmware(robot, of, on_board));
         return;

@@ -77,6 +77,10 @@ int main(int argc, char** argv) {
     if (!train_config.empty()) io::read_text(train_config);  // it is needed late
     const std::vector<design::Record> known = known_records(folder, config);
     config.search.ranks = program.ranks("design: " + io::sha256(config.resolved) + "\n");
+    if (config.search.ranks != nullptr && !train_config.empty())
+      throw io::InputError(
+          "--train: policies are trained by one process; accepted: several ranks for the search, then the same "
+          "command with --train alone");
     io::stop_on_interrupt();
     if (program.writes()) {
       io::make_folder(folder);

@@ -27,8 +27,11 @@ design::Policy trained(const fs::path& folder, const fs::path& config) {
   const auto file = [&](const char* key) {
     return std::string(key) + "=" + fs::absolute(folder / (std::string(key) + ".toml")).string();
   };
-  if (!fs::exists(run_folder / "run.json"))
-    run("flappy-train", {config, "--out", run_folder, "--set", file("vehicle"), "--set", file("controller")});
+  learn::refuse_other_run_in(run_folder, learn::read_train_config(config, {file("vehicle"), file("controller")}),
+                             nullptr);
+  const bool starts = !fs::exists(run_folder / "run.json");
+  if (starts || learn::unfinished_run_in(run_folder)) fs::remove(found);
+  if (starts) run("flappy-train", {config, "--out", run_folder, "--set", file("vehicle"), "--set", file("controller")});
   else if (learn::unfinished_run_in(run_folder)) run("flappy-train", {"--resume", run_folder});
   if (!io::interrupted() && !fs::exists(found)) run("flappy-eval", {run_folder, "--no-baselines", "--json", found});
   if (!fs::exists(found)) return {};

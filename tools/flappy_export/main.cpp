@@ -90,7 +90,8 @@ void write_all(const fs::path& folder, const std::string& prefix, const std::map
                                   std::string("policy.pt"), std::string("policy.onnx")})
     if (!files.contains(name)) fs::remove(folder / name);
   for (const char* firmware : deploy::kFirmwares)  // an app of another run could be flashed by mistake
-    if (std::ranges::none_of(files, [&](const auto& f) { return f.first.starts_with(std::string(firmware) + "/"); }))
+    if (deploy::is_app(folder / firmware, firmware) &&
+        std::ranges::none_of(files, [&](const auto& f) { return f.first.starts_with(std::string(firmware) + "/"); }))
       fs::remove_all(folder / firmware);
   io::sync_folder(folder);
 }
@@ -154,6 +155,17 @@ void write_for_runtimes(Export& e, const Request& request, const learn::Finished
   json["agreement"] = json_of(rows);
 }
 
+/// Throws io::InputError if the folder is something else than an app, or the policy is too wide for the firmware's stack.
+void check_app(const fs::path& folder, const std::string& firmware, const policy::PolicyNetwork& network) {
+  constexpr int kWidest = 128;  // 1 KiB on the stack of the control task, which has 1.8 KiB in a Crazyflie
+  if (fs::exists(folder) && !fs::is_empty(folder) && !deploy::is_app(folder, firmware))
+    throw io::InputError(folder.string() + ": is no app that flappy-export made; accepted: another --out");
+  if (const int widest = std::ranges::max(network.widths); widest > kWidest)
+    throw io::InputError("--for " + firmware + ": the policy is " + std::to_string(widest) +
+                         " wide, too much for the stack of the control task; accepted: networks.actor of at most " +
+                         std::to_string(kWidest));
+}
+
 void run(const Request& request, const io::Program& program) {
   const bool is_name = !request.name.empty() && request.name.size() <= 40 && request.name[0] >= 'a' &&
                        request.name[0] <= 'z' &&
@@ -165,6 +177,7 @@ void run(const Request& request, const io::Program& program) {
     throw io::InputError("--name: the firmware's app knows names of flappy_ alone; accepted: --for without --name");
   const learn::FinishedRun run = learn::read_finished_run(request.run);
   const policy::PolicyNetwork network = deploy::network_of(run.fly);
+  if (!request.firmware.empty()) check_app(fs::path(request.out) / request.firmware, request.firmware, network);
   if (request.int8 && (network.layer_norm || network.linear || network.hidden > policy::Activation::tanh))
     throw io::InputError(
         "--int8: whole numbers hold no layer norm, linear output, elu or silu; accepted: a policy of relu or tanh "

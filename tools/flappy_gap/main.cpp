@@ -205,12 +205,19 @@ int main(int argc, char** argv) {
   io::Command plan = program.app().command("plan", "before any flight: which effects flights could tell apart");
   gap::PlanCommand planned;
   plan.option("--vehicle", planned.settings.vehicle, "the vehicle's file, as it is believed").required();
-  plan.option("--manoeuvre", planned.settings.manoeuvre, "what is flown, by its name in --experiments").shows_default();
-  plan.option("--experiments", planned.settings.experiments, "folder of manoeuvres [configs/gap/experiments]");
-  plan.option("--like", planned.settings.like, "flight logs whose inputs and paths are flown, in place of --manoeuvre");
-  plan.option("--sensors", planned.settings.sensors, "file of the sensors; else the manoeuvres'");
-  plan.option("--flights", planned.settings.flights, "number of flights").range(1, 100).shows_default();
-  plan.option("--duration", planned.settings.duration_s, "of a flight at most, s").range(2.0, 600.0).shows_default();
+  const io::Option like = plan.option("--like", planned.settings.like,
+                                      "flight logs whose inputs and paths are flown, in place of --manoeuvre");
+  plan.option("--manoeuvre", planned.settings.manoeuvre, "what is flown, by its name in --experiments")
+      .excludes(like)
+      .shows_default();
+  plan.option("--experiments", planned.settings.experiments, "folder of manoeuvres [configs/gap/experiments]")
+      .excludes(like);
+  plan.option("--sensors", planned.settings.sensors, "file of the sensors; else the manoeuvres'").excludes(like);
+  plan.option("--flights", planned.settings.flights, "number of flights").range(1, 100).excludes(like).shows_default();
+  plan.option("--duration", planned.settings.duration_s, "of a flight at most, s")
+      .range(2.0, 600.0)
+      .excludes(like)
+      .shows_default();
   plan.flag("--reference", planned.settings.reference, "with as many reference flights of the same robot");
   takes_constants(plan, planned.settings);
   plan.option("--magnitude", planned.magnitudes, "EFFECT=FACTOR on the typical magnitude");
@@ -256,10 +263,12 @@ int main(int argc, char** argv) {
       program.write_json(gap::run_plan(planned));
     } else if (learn.given()) {
       gap::run_learn_discrepancy(lessons);
+      program.write_json({{"out", lessons.out}});
     } else {
       if (!software.empty()) {
         std::vector<std::string> all = command.settings.flights;
-        for (const std::string& set : command.settings.reference) all.push_back(set.substr(set.find('=') + 1));
+        for (const gap::NamedFlights& set : gap::sets_of(command.settings.reference))
+          all.insert(all.end(), set.flights.begin(), set.flights.end());
         const nlohmann::ordered_json found = gap::check_flown(software, all);
         faulty = !found["as_exported"];
         if (faulty) {

@@ -31,7 +31,8 @@ Json run(const CalibrationSettings& s, io::Program& program) {
   FitOptions options = s.fit.options(s.source.options(vehicle));
   options.progress = [](const std::string&, double, double) { return !io::interrupted(); };
   const std::vector<double*> true_values = fitted_values(config, truth);
-  const std::vector<sim::Input> inputs = s.inputs.empty() ? default_inputs() : read_inputs(s.inputs, vehicle.driver);
+  const std::vector<sim::Input> inputs =
+      s.inputs.empty() ? default_inputs(vehicle.driver) : read_inputs(s.inputs, vehicle.driver);
   const std::vector<sim::Input> held =
       s.held_out.empty() ? std::vector<sim::Input>{} : read_inputs(s.held_out, vehicle.driver);
   // for each seed: done or not, total error, error on held-out inputs; then for each parameter whether it was seen, and

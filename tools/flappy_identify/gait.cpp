@@ -54,7 +54,8 @@ Command add_gait(const io::Command& program) {
   app.option("measured", s->measured, "table of a beat or more: t_s or beat, and angles in _rad or _deg").required();
   s->frequency = app.option("--frequency-Hz", s->frequency_Hz, "beats per second, of a table by t_s");
   app.option("--harmonics", s->options.harmonics, "of the beat (8)");
-  app.option("--residual", s->options.residual, "rms that no beat explains, as a share of the angle's, at most (0.1)");
+  app.option("--residual", s->options.residual, "rms that no beat explains, as a share of the angle's, at most (0.1)")
+      .range(0.0, 1.0);
   app.option("--out", s->out, "file for the lines of the vehicle file");
   return {app, [s] { return run(*s); }};
 }

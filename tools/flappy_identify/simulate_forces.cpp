@@ -24,7 +24,7 @@ Command add_simulate_forces(const io::Command& program) {
   return {app, [s] {
             const model::Vehicle vehicle = s->source.read_vehicle();
             const std::vector<sim::Input> inputs =
-                s->inputs.empty() ? default_inputs() : read_inputs(s->inputs, vehicle.driver);
+                s->inputs.empty() ? default_inputs(vehicle.driver) : read_inputs(s->inputs, vehicle.driver);
             io::check_output(s->out, {s->inputs, s->source.vehicle});
             ForceSensor sensor;
             if (s->noise == "none") sensor.noise_steps = 0;

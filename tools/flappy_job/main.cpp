@@ -83,9 +83,12 @@ int main(int argc, char** argv) {
     }
     if (watch.given()) {
       io::stop_on_interrupt();
-      bool over = false;
+      bool over = false, exists = watched == 0;
       for (const server::JobStatus& each : client.list())
-        if (watched == 0 || each.id == watched) job::print(each), over |= each.id == watched && job::is_over(each);
+        if (watched == 0 || each.id == watched)
+          exists = true, job::print(each), over |= each.id == watched && job::is_over(each);
+      if (!exists)
+        throw io::InputError(std::to_string(watched) + ": no such job; accepted: those that flappy-job list shows");
       if (!over)
         client.watch(
             [&](const server::JobStatus& each) {

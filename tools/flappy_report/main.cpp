@@ -1,5 +1,6 @@
 // flappy-report: shows results as one page that opens anywhere, and writes their figures for a paper.
 #include <cstdio>
+#include <system_error>
 
 #include "io/files.hpp"
 #include "io/program.hpp"
@@ -35,6 +36,15 @@ std::vector<fs::path> draw_all(const std::vector<Section>& sections, const fs::p
   return files;
 }
 
+/// Whether a page was shown to the user.
+bool opened(const std::filesystem::path& page) {
+  try {
+    return io::run({"xdg-open", page.string()}).exit_code == 0;
+  } catch (const std::system_error&) {
+    return false;
+  }
+}
+
 Json report(Request request) {
   if (!request.goal_m.empty() && request.goal_m.size() != 3)
     throw io::InputError("--goal: has " + std::to_string(request.goal_m.size()) + " numbers; accepted: X,Y,Z in m");
@@ -52,7 +62,7 @@ Json report(Request request) {
     figures = draw_all(sections, folder, paper).size();
     std::printf("%s: %zu figures\n", folder.c_str(), figures);
   }
-  if (request.open) io::run({"xdg-open", request.out.string()});
+  if (request.open && !opened(request.out)) std::printf("--open: xdg-open failed; open the page yourself\n");
   Json list = Json::array();
   for (const Section& s : sections)
     list.push_back({{"kind", s.kind()}, {"title", s.title()}, {"figures", s.figures().size()}});

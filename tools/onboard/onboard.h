@@ -30,6 +30,9 @@
 #if FLAPPY_POLICY_OBS != FLAPPY_CONTROLLER_OBS || FLAPPY_POLICY_ACT != 4
 #error "flappy_policy.h does not take what flappy_controller.h shows, or does not give four numbers"
 #endif
+#if !FLAPPY_CONTROLLER_FEEDBACK
+#error "the run has no controller, which this loop flies when the policy does not act"
+#endif
 #if FLAPPY_CONTROLLER_INPUTS > 0
 #error "the vehicle has inputs in place of two motors: flappy-export --for crazyflie writes its firmware"
 #endif

@@ -46,6 +46,11 @@ static inline int flappy_plausible_pose(flappy_vector position_m, flappy_quatern
          flappy_abs(square - 1.0F) < FLAPPY_CONTROLLER_LENGTH_LIMIT;
 }
 
+static inline int flappy_plausible_motion(const flappy_motion *x) {
+  return flappy_plausible_pose(x->position_m, x->attitude) && flappy_plausible(x->velocity_m_s, 1e4F) &&
+         flappy_plausible(x->body_rate_rad_s, 1e4F);
+}
+
 /* A sample of an instant that is after b, but no more than two control periods after the last tick: one from further ahead
    would have every good one refused until the clock has caught up. */
 static inline int flappy_controller_timely(const flappy_controller *c, uint32_t taken_us, uint32_t b) {
@@ -90,13 +95,21 @@ static inline void flappy_controller_stay(flappy_controller *c) {
   c->hover_heading = flappy_heading(&R);
 }
 
-/* At rest at this pose of the torso, integrators at 0; the task begins. */
-static inline void flappy_controller_start(flappy_controller *c, uint32_t now_us, flappy_vector position_m,
-                                           flappy_quaternion attitude) {
+/* At rest at this pose of the torso, integrators at 0; the task begins. Returns 0, and starts level at the origin, if the pose is
+   not finite or its quaternion not of length 1. */
+static inline int flappy_controller_start(flappy_controller *c, uint32_t now_us, flappy_vector position_m,
+                                          flappy_quaternion attitude) {
   const flappy_controller_constants *k = &flappy_controller_k;
   const flappy_vector none = flappy_vector_of(0.0F, 0.0F, 0.0F);
-  const flappy_matrix R = flappy_rotation_matrix(attitude);
+  const int plausible = flappy_plausible_pose(position_m, attitude);
   flappy_estimator *e = &c->estimator;
+  flappy_matrix R;
+  if (!plausible) {
+    position_m = none;
+    attitude.w = 1.0F;
+    attitude.x = attitude.y = attitude.z = 0.0F;
+  }
+  R = flappy_rotation_matrix(attitude);
   e->horizon.attitude = attitude;
   e->horizon.position_m = flappy_plus(position_m, flappy_rotate(&R, k->imu_position_m));
   e->horizon.velocity_m_s = none;
@@ -122,6 +135,7 @@ static inline void flappy_controller_start(flappy_controller *c, uint32_t now_us
   c->newest_us = c->oldest = c->in_ring = c->in_frames = 0;
   flappy_controller_hover(c);
   flappy_controller_begin(c);
+  return plausible;
 }
 
 /* A sample of the IMU: its mean since the one before. It is dropped, and 0 returned, unless it is newer than that one, no
@@ -183,10 +197,11 @@ static inline int flappy_controller_tick(flappy_controller *c, uint32_t now_us) 
   return flappy_controller_advance(c);
 }
 
-/* The same where the autopilot around it estimates: no sample is passed then. */
+/* The same where the autopilot around it estimates: no sample is passed then. An estimate that is not finite, or whose quaternion
+   is not of length 1, is dropped: the last one stays. */
 static inline int flappy_controller_tick_with(flappy_controller *c, uint32_t now_us, const flappy_motion *estimate) {
   c->now_us = now_us;
-  c->estimate = *estimate;
+  if (flappy_plausible_motion(estimate)) c->estimate = *estimate;
   return flappy_controller_advance(c);
 }
 

@@ -135,6 +135,7 @@ static inline int flappy_controller_selftest(void) {
   flappy_controller c;
   uint32_t bad, i, now_us;
   flappy_float nan;
+  flappy_motion seen;
   if (flappy_controller_crc() != FLAPPY_CONTROLLER_CRC32) return FLAPPY_CONTROLLER_FAILED_CRC;
   if (!(flappy_controller_test_fly(&c) <= 1e-4F)) return FLAPPY_CONTROLLER_FAILED_TRACE;
   nan.bits = 0x7fc00000U;
@@ -158,5 +159,13 @@ static inline int flappy_controller_selftest(void) {
         !flappy_all_finite((const float *)&c.feedback, (uint32_t)sizeof c.feedback))
       return FLAPPY_CONTROLLER_FAILED_NAN;
   }
+  seen = c.estimate;
+  seen.body_rate_rad_s.y = nan.number;
+  (void)flappy_controller_tick_with(&c, c.now_us + FLAPPY_CONTROLLER_CONTROL_US, &seen);
+  if (!flappy_all_finite((const float *)&c.estimate, (uint32_t)sizeof c.estimate)) return FLAPPY_CONTROLLER_FAILED_NAN;
+  seen.attitude.w = nan.number;
+  if (flappy_controller_start(&c, c.now_us, c.estimate.position_m, seen.attitude) ||
+      !flappy_all_finite((const float *)&c.estimate, (uint32_t)sizeof c.estimate))
+    return FLAPPY_CONTROLLER_FAILED_NAN;
   return 0;
 }

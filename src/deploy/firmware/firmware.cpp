@@ -246,6 +246,13 @@ std::map<std::string, std::string> px4_files(const rollout::FlyConfig& config) {
         "--for crazyflie");
   if (const std::string why_not = no_controller(config); !why_not.empty())
     throw io::InputError("--for px4: " + why_not + "; accepted: a task that leaves the controller to fly");
+  if (config.fleet.controller.kind == flight::kNoController)
+    throw io::InputError(
+        "--for px4: without a controller its motors would stop when the policy has acted for a second; accepted: a run "
+        "with a controller");
+  if (std::abs(config.fleet.control_hz * 2e-3 - 1) > 1e-9)
+    throw io::InputError("--for px4: its loop runs at 500 Hz, and this controller at " +
+                         io::shortest_digits(config.fleet.control_hz) + " Hz; accepted: control_hz = 500");
   if (const std::size_t n = config.fleet.task.observation().size() + 4; n > kDebugArray)
     throw io::InputError("--for px4: the policy gets and gives " + std::to_string(n) +
                          " numbers; accepted: at most 58, which its log holds");
@@ -268,6 +275,11 @@ std::map<std::string, std::string> px4_files(const rollout::FlyConfig& config) {
 }
 
 }  // namespace
+
+bool is_app(const std::filesystem::path& folder, const std::string& firmware) {
+  return std::filesystem::exists(
+      folder / (firmware == "px4" ? "src/modules/flappy_control/flappy_px4.cpp" : "src/flappy_crazyflie.c"));
+}
 
 std::map<std::string, std::string> firmware_files(const std::string& firmware, const rollout::FlyConfig& config,
                                                   const std::map<std::string, std::string>& headers) {

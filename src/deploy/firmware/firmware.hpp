@@ -1,6 +1,7 @@
 // The sources around the exported headers that make them an app of a known firmware.
 #pragma once
 
+#include <filesystem>
 #include <map>
 #include <string>
 
@@ -10,6 +11,9 @@ namespace flappy::deploy {
 
 /// Names of the firmwares that firmware_files() knows.
 inline constexpr const char* kFirmwares[] = {"crazyflie", "px4"};
+
+/// Whether the folder is an app that firmware_files() made for `firmware`.
+bool is_app(const std::filesystem::path& folder, const std::string& firmware);
 
 /// [path below the app's folder] text of an out-of-tree app for `firmware`, its log's configuration and mapping; `headers`
 /// are flappy_policy.h and flappy_controller.h. io::InputError where the vehicle is none for this firmware, or the task's

@@ -46,6 +46,10 @@ Inferences check_inferences(const std::filesystem::path& folder, const Contract&
                             const std::vector<LoggedInput>& inputs) {
   const std::size_t seen = contract.observation.size(), acts = contract.action.size();
   const std::vector<std::size_t> at = places(folder, contract, log);
+  for (const Contract::Input& c : contract.inputs)
+    if (std::ranges::count(inputs, c.name, &LoggedInput::name) == 0)
+      io::refuse(folder, "steers by " + c.name + ", which the log lacks",
+                 "a log whose inputs are those of contract.json");
   const ExportedC exported(folder, Build::exact);
   Inferences found;
   std::vector<std::vector<double>> offsets(inputs.size());

@@ -58,7 +58,8 @@ rollout::FlyConfig read_pilot(const std::string& manoeuvre) {
   return pilot;
 }
 
-/// Sets of reference flights, the first of which is the reference. NAME=LOG begins a set, or goes on with it.
+}  // namespace
+
 std::vector<NamedFlights> sets_of(const std::vector<std::string>& reference) {
   std::vector<NamedFlights> sets;
   std::size_t now = 0;
@@ -77,8 +78,6 @@ std::vector<NamedFlights> sets_of(const std::vector<std::string>& reference) {
   }
   return sets;
 }
-
-}  // namespace
 
 void check_effect(const std::string& option, const std::string& id, const model::Vehicle& vehicle) {
   std::vector<std::string> known;

@@ -39,6 +39,10 @@ struct NamedFlights {
   std::vector<std::string> flights;
 };
 
+/// Sets of reference flights, the first of which is the reference. NAME=LOG begins a set, or goes on with it. Throws io::InputError for
+/// a name that is none.
+std::vector<NamedFlights> sets_of(const std::vector<std::string>& reference);
+
 struct DiagnosisRequest {
   DiagnosisSettings settings;        ///< `reference` without other sets and names
   std::vector<NamedFlights> others;  ///< the other sets of `reference`

@@ -1,5 +1,5 @@
 // A bias of every accelerometer axis that grows with the vibration along it: K_2 (mean over a beat of (f - mean f)^2),
-// taken over the previous wing beat, which ends where the phase wraps; 0 in the first beat.
+// taken over the previous wing beat, which ends where the phase wraps; 0 until the phase first wraps.
 // [1] IEEE Std 1293-2018: the second-order coefficient K_2. Consumer parts: 1e-3 s^2/m (10 mg/g^2 / 9.81 m/s^2).
 #pragma once
 

@@ -135,6 +135,9 @@ class Recording {
 
 Recorded record(const io::DdsConfig& dds, const Mapping& mapping, const RecordOptions& options) {
   if (options.out.has_parent_path()) io::make_folder(options.out.parent_path());
+  if (const fs::path mcap = Recording::mcap_of(options.out); fs::exists(mcap))
+    throw io::InputError(mcap.string() +
+                         ": exists, and a flight cannot be recorded twice; accepted: a name that is not in use");
   Recorded recorded = Recording(dds, mapping, options).run();
   try {
     recorded.report = import_recording({recorded.mcap}, mapping, options.out).report;

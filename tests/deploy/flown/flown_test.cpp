@@ -11,6 +11,7 @@
 #include "deploy/header/exported_files.hpp"
 #include "deploy/header/policy_vectors.hpp"
 #include "full.hpp"
+#include "refusal.hpp"
 #include "rollout/fly_fixture.hpp"
 #include "rollout/rollout.hpp"
 
@@ -247,6 +248,9 @@ TEST_F(InferencesTest, KnowsTheExportedPolicy) {
   EXPECT_TRUE(check().as_exported());
   log_.inferences[0].numbers.assign(log_.inferences[0].numbers.size(), 0);  // before the first inference
   EXPECT_EQ(check().rows, log_.inferences.size() - 1);
+  const std::string missing = inputs_.back().name;
+  inputs_.pop_back();
+  EXPECT_NE(test::refusal([&] { check(); }).find("steers by " + missing + ", which the log lacks"), std::string::npos);
 }
 
 TEST_F(InferencesTest, SeesAnotherPolicyAndOtherInputs) {
