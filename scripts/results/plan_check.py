@@ -64,6 +64,8 @@ def robot(number, effect, parameters, times):
     sets = [part for o in overrides for part in ("--set", o)]
     if not (folder / "flight/flight.toml").exists():
         run(BIN / "flappy-fly", ROOT / "configs/gap/experiments/tour.toml", "--seed", SEED * 1000 + number, "--log", folder / "flight", *sets)
+    if subprocess.run([BIN / "flappy-gap", "check", folder / "flight"], capture_output=True).returncode != 0:
+        return None  # it cannot be flown with this effect
     if not (folder / "plan/plan.json").exists():
         run(BIN / "flappy-gap", "plan", "--vehicle", VEHICLE, "--like", folder / "flight", "--magnitude", f"{effect}={times}", "--out", folder / "plan",
             "--threads", 1)
@@ -89,7 +91,9 @@ def main():
     draw.shuffle(names)
     jobs = [(i, names[i % len(names)], draw.choice([0.5, 1, 2])) for i in range(ROBOTS)]
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        rows = list(pool.map(lambda j: robot(j[0], j[1], effects[j[1]], j[2]), jobs))
+        flown = list(pool.map(lambda j: robot(j[0], j[1], effects[j[1]], j[2]), jobs))
+    rows = [row for row in flown if row]
+    print(f"{len(rows)} of {len(flown)} robots fly with their effect\n")
     print("| robot | effect | times typical | expected nats | realised nats | expected probability | named |\n|---|---|---|---|---|---|---|")
     for r in rows:
         e = r["expected"]
