@@ -3,8 +3,8 @@
 
     scripts/results/learners.py BIN ROOT OUT [--seconds 600] [--cells PATTERN] [--seeds 0,1] [--table]
 
-All processors that the process may use are used: `taskset -c 0` before it gives one. BIN holds the programs, ROOT is the project, OUT keeps each cell as JSON: what is there is not run again. A cell is a tool, a task, a variant ("own": its
-defaults; "recipe": what it can take of configs/train) and a seed. Only training is timed; processor time of ours includes evaluations. Unseen robots: 500 flights of another seed,
+BIN holds the programs, ROOT is the project, OUT keeps each cell as JSON: what is there is not run again. A cell is a tool, a task, a variant ("own": its
+defaults; "recipe": what it can take of configs/train) and a seed. It uses all processors that the process may use: with `taskset -c 0` before it, one. Only training is timed; processor time of ours includes evaluations. Unseen robots: 500 flights of another seed,
 of the same tasks, by each tool's own policy without exploration. The quadrotor is flown by each tool's own simulator (rltools_quadrotor.cpp). Python needs the modules of requirements() and flappy.
 """
 

@@ -11,7 +11,7 @@ namespace flappy::benchmark {
 namespace {
 
 /// Below kSeedsOfAFamily: robots flown by hand or for tables of detectable magnitudes. Already used: 700001 to 799999
-/// and, from each family's first seed, the 120,000 from each of 5,000,000, 5,500,000, ..., 8,000,000 on.
+/// and, from each family's first seed, the 120,000 from each of 5,000,000, 5,500,000, ..., 8,500,000 on.
 constexpr std::uint64_t kSeedsOfAFamily = 10'000'000, kReported = 9'000'000, kSeedsOfAPart = 10'000;
 /// Least number of cases of most parts; rounded up so that all effects of a part have as many.
 constexpr std::size_t kAtLeast = 100;

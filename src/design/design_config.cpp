@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "flappy/vehicle_file.hpp"
 #include "io/files.hpp"
 #include "io/sha256.hpp"
 
@@ -84,14 +85,11 @@ DesignConfig read_design_config(const std::filesystem::path& path, const std::ve
   c.verify.designs = static_cast<std::size_t>(verify.integer("designs", 0, 1000));
   c.verify.vehicles = static_cast<std::size_t>(verify.integer("vehicles", 1, 1'000'000));
   c.verify.step_s = verify.number("step_s", {1e-6, 1e-3});
-  const auto whole = [](double times) { return times > 0.5 && std::abs(times - std::round(times)) < 1e-6 * times; };
-  const double hold_s = c.judge.space.published.driver.hold_s;
   for (const double step_s : {c.judge.hover.fleet.batch.step_s, c.judge.escape.fleet.batch.step_s, c.verify.step_s})
-    if (hold_s > 0 && !whole(hold_s / step_s))
-      root.fail("vehicle", "driver.hold_s is no multiple of the step of " + io::shortest_digits(step_s) + " s",
-                "whole steps");
+    model::read_vehicle_for_steps(root.file("vehicle"), step_s);  // refuses a hold that is no multiple of the step
   for (const rollout::FlyConfig* fly : {&c.judge.hover, &c.judge.escape})
-    if (!whole(1 / (fly->fleet.control_hz * c.verify.step_s)))
+    if (const double steps = 1 / (fly->fleet.control_hz * c.verify.step_s);
+        steps < 0.5 || std::abs(steps - std::round(steps)) > 1e-6)
       verify.fail("step_s", "is no whole share of the control period",
                   "1/n of " + io::shortest_digits(1 / fly->fleet.control_hz) + " s");
   root.finish();

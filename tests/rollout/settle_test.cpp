@@ -99,8 +99,8 @@ TEST(Settle, NothingIsNearTheHover) {
   const auto far = rollout::settle<float>(o, 1, 0.3, vehicle);
   o.batch.world = {.ground_z_m = -0.03, .ceiling_z_m = 0.05, .walls = {{0.05, 0, -1, 0}}};
   const auto near = rollout::settle<float>(o, 1, 0.3, vehicle);
-  for (std::size_t r = 0; r < far[0].body.size();
-       ++r)  // half a metre away, surfaces change the air's force by less than 1e-4
+  // half a metre away, surfaces change the air's force by less than 1e-4
+  for (std::size_t r = 0; r < far[0].body.size(); ++r)
     EXPECT_NEAR(near[0].body[r], far[0].body[r], 1e-4 + 1e-3 * std::abs(far[0].body[r])) << r;
 }
 

@@ -59,12 +59,14 @@ struct Robot {
   const Scored* of;
   const benchmark::Label* label;
   benchmark::Prediction said;
-  fs::path own;  ///< folder of this robot's results
+  Assignment made;  ///< as its maker made it, with its effects
+  fs::path own;     ///< folder of this robot's results
 };
 
 class Loop {
  public:
   explicit Loop(const LoopCommand& command) : command_(command), start_(learn::read_train_init(command.run)) {
+    for (const auto& [file, text] : rollout::read_fly_config(command.config).resolved) escape_text_ += text;
     for (const std::string& folder : command.folders) {
       const Scored& s = *scored_.emplace_back(std::make_unique<Scored>(folder));
       if (s.labels.empty())
@@ -102,17 +104,18 @@ class Loop {
         if (command_.robots > 0 && robots == command_.robots) break;
         if (io::interrupted()) return false;
         progress.show(static_cast<double>(seen++) / static_cast<double>(s->labels.size()), "family " + family);
-        Robot r{s.get(), &label, s->prediction(number), command_.out / fs::path(name + benchmark::number_text(number))};
-        Assignment a = label.robot(s->manifest.vehicle);
-        if (!escapes_of(family, a, hover)(0)) {
+        Robot r{s.get(), &label, s->prediction(number), label.robot(s->manifest.vehicle),
+                command_.out / fs::path(name + benchmark::number_text(number))};
+        if (!escapes_of(family, r.made, hover)(0)) {
           ++unsteady_[family];
           continue;
         }
         if (command_.costly) {
           io::make_folder(r.own);
-          const std::optional<std::size_t> with = succeeded(r, kPolicies[0], a, policy);
-          a.effects.clear();
-          const std::optional<std::size_t> without = succeeded(r, "without_effect", a, policy);
+          Assignment healthy = r.made;
+          healthy.effects.clear();
+          const std::optional<std::size_t> with = succeeded(r, kPolicies[0], r.made, policy);
+          const std::optional<std::size_t> without = succeeded(r, "without_effect", healthy, policy);
           if (!with || !without) return false;
           if (*with >= *without) {
             ++as_good_[family];
@@ -126,19 +129,17 @@ class Loop {
     return true;
   }
 
-  /// Of the escapes that robot `a` flies with a policy: how many succeed; nothing if it was interrupted. Kept under `name` in the
-  /// robot's folder, with the hash of what they depend on.
-  std::optional<std::size_t> succeeded(const Robot& r, const std::string& name, const Assignment& a,
+  /// Flies the escapes of `flown`, which is the robot of `r` or a variant of it, and counts those that succeed. The count is kept in
+  /// the folder of `r` as NAME.json, with a hash of its inputs, and is read from there the next time. Empty after Ctrl-C.
+  std::optional<std::size_t> succeeded(const Robot& r, const std::string& name, const Assignment& flown,
                                        const fs::path& policy) const {
     const fs::path file = r.own / (name + ".json");
-    std::string flown =
-        io::read_text(r.of->folder / "manifest.json") + io::read_text(policy) + std::to_string(command_.escapes);
-    for (const auto& [part, text] : rollout::read_fly_config(command_.config).resolved) flown += text;
-    const std::string of = io::sha256(flown);
+    const std::string of = io::sha256(io::read_text(r.of->folder / "manifest.json") + io::read_text(policy) +
+                                      std::to_string(command_.escapes) + escape_text_);
     if (fs::exists(file))
       if (const Json kept = benchmark::read_json(file); kept.value("of", "") == of)
         return kept.at("succeeded").get<std::size_t>();
-    const auto succeeds = escapes_of(r.of->manifest.family, a, read_escape_rules(policy, command_.config));
+    const auto succeeds = escapes_of(r.of->manifest.family, flown, read_escape_rules(policy, command_.config));
     std::atomic<std::size_t> count = 0;
     io::parallel_for(command_.escapes, command_.threads, [&](std::size_t n) {
       if (!io::interrupted()) count += succeeds(n);
@@ -192,8 +193,7 @@ class Loop {
   bool fly() {
     const bool all = benchmark::work_through("flying", robots_.size(), command_.threads, nullptr, [&](std::size_t i) {
       const Robot& r = robots_[i];
-      for (std::size_t p = 0; p < std::size(kPolicies); ++p)
-        succeeded(r, kPolicies[p], r.label->robot(r.of->manifest.vehicle), policy_of(r, p));
+      for (std::size_t p = 0; p < std::size(kPolicies); ++p) succeeded(r, kPolicies[p], r.made, policy_of(r, p));
     });
     return all && !io::interrupted();
   }
@@ -217,8 +217,7 @@ class Loop {
     std::string lines = "family,case,part,effects,verdict,named,escapes,as_shipped,file,corrected,seed,draw\n";
     for (const Robot& r : robots_) {
       std::array<std::size_t, std::size(kPolicies)> count{};
-      for (std::size_t p = 0; p < count.size(); ++p)
-        count[p] = *succeeded(r, kPolicies[p], r.label->robot(r.of->manifest.vehicle), policy_of(r, p));
+      for (std::size_t p = 0; p < count.size(); ++p) count[p] = *succeeded(r, kPolicies[p], r.made, policy_of(r, p));
       const benchmark::Label& label = *r.label;
       const std::string& family = r.of->manifest.family;
       const benchmark::Answer said = answer_of(r.said);
@@ -274,6 +273,7 @@ class Loop {
   std::map<std::string, std::size_t> unsteady_;  ///< by family: robots that fail hover_rules()
   std::map<std::string, std::size_t> as_good_;   ///< by family: robots whose effect costs no escape
   std::shared_ptr<const learn::TrainInit> start_;
+  std::string escape_text_;  ///< all files of command_.config, resolved
 };
 
 }  // namespace

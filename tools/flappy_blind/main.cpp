@@ -297,7 +297,7 @@ int main(int argc, char** argv) {
       if (!found.is_null()) program.write_json(found);
     } else if (calibrate.given()) program.write_json(benchmark::calibrate(calibrated));
     else if (list.given()) {
-      nlohmann::ordered_json all = nlohmann::ordered_json::object();  // what is typical, by effect
+      nlohmann::ordered_json all = nlohmann::ordered_json::object();  // effect: its typical magnitude in words, or null
       if (of.family.empty())
         for (const std::string& name : blind::effect_names()) all[name] = nullptr, std::printf("%s\n", name.c_str());
       else

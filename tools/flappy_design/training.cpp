@@ -30,9 +30,10 @@ design::Policy trained(const fs::path& folder, const fs::path& config) {
   learn::refuse_other_run_in(run_folder, learn::read_train_config(config, {file("vehicle"), file("controller")}),
                              nullptr);
   const bool starts = !fs::exists(run_folder / "run.json");
-  if (starts || learn::unfinished_run_in(run_folder)) fs::remove(found);
+  const bool goes_on = !starts && learn::unfinished_run_in(run_folder).has_value();
+  if (starts || goes_on) fs::remove(found);
   if (starts) run("flappy-train", {config, "--out", run_folder, "--set", file("vehicle"), "--set", file("controller")});
-  else if (learn::unfinished_run_in(run_folder)) run("flappy-train", {"--resume", run_folder});
+  else if (goes_on) run("flappy-train", {"--resume", run_folder});
   if (!io::interrupted() && !fs::exists(found)) run("flappy-eval", {run_folder, "--no-baselines", "--json", found});
   if (!fs::exists(found)) return {};
   const auto json = nlohmann::ordered_json::parse(io::read_text(found));
