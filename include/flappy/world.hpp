@@ -33,6 +33,8 @@ struct World {
   double ceiling_z_m = 1e3;
   std::vector<Wall> walls;
   std::vector<Shape> shapes;
+  /// Whether the ground is somewhere else than at its default, which nothing reaches.
+  bool has_ground() const { return ground_z_m > World{}.ground_z_m; }
 };
 
 /// Bits of Batch::status().

@@ -216,6 +216,8 @@ Reward<double> read_reward(const io::Table& table) {
   r.arrival = weight("arrival");
   r.kept = weight("kept");
   r.until_s = table.number_or("reward.until_s", 0, {0, 1e6});
+  if (r.kept != 0 && r.until_s == 0)
+    table.fail("reward.kept", "is never paid without until_s", "reward.until_s, s, the time at which it is paid");
   const auto per = [&](const char* name) {
     return 1 / table.number_or(std::string("reward.") + name, kFar, io::positive());
   };

@@ -145,7 +145,27 @@ void mirror_left(Vehicle& v) {
   v.jointed->right = v.jointed->left;
 }
 
+/// Refuses an input that changes an angle which it cannot move.
+void check_moved(const io::Table& root, const Jointed& v) {
+  for (const Jointed::Input& i : v.inputs)
+    for (std::size_t k = 0; k < kAngles.size(); ++k) {
+      const auto any = [&](auto is) { return is(v.left.angles[k].mode) || is(v.right.angles[k].mode); };
+      const auto check = [&](const std::string& key, double change, bool moves, const char* accepted) {
+        if (change == 0 || moves) return;
+        const std::string path = "input." + i.name + "." + key + "." + kAngles[k];
+        root.fail(path, "changes an angle that it cannot move", accepted);
+      };
+      const bool driven = any([](Jointed::Mode m) { return m == Jointed::Mode::driven; });
+      const bool held = any([](Jointed::Mode m) { return m != Jointed::Mode::free; });
+      check("scale", i.scale[k], driven, "an angle that is driven");
+      check("scale_opposed", i.scale_opposed[k], driven, "an angle that is driven");
+      check("offset_rad", i.offset_rad[k], held, "an angle that is driven or fixed");
+      check("offset_opposed_rad", i.offset_opposed_rad[k], held, "an angle that is driven or fixed");
+    }
+}
+
 void check_gait(const io::Table& root, const Jointed& v) {
+  check_moved(root, v);
   const auto limit = [](double x) { return "at most " + io::toml_number(x); };
   if (most(v, [](const auto& i) { return std::abs(i.timing) + std::abs(i.timing_opposed); }) > kLargestTiming)
     root.fail("input", "all timing together stops the phase", limit(kLargestTiming) + " of all inputs at their ends");

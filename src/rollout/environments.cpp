@@ -64,10 +64,13 @@ class EnvironmentsOf final : public Environments {
       prepare();
     }
     fleet_->restored(0);
-    io::parallel_for(count(), fleet_->options().batch.threads, [&](std::size_t i) {
-      lives_[i].episode = seed ? 0 : lives_[i].episode + 1;
-      start(i);
-      observe(i, observation + i * observed_.size());
+    io::parallel_for(fleet_->blocks(), fleet_->options().batch.threads, [&](std::size_t block) {
+      const auto [first, last] = fleet_->flappers(block);  // they share the block's set of effects
+      for (std::size_t i = first; i < last; ++i) {
+        lives_[i].episode = seed ? 0 : lives_[i].episode + 1;
+        start(i);
+        observe(i, observation + i * observed_.size());
+      }
     });
     std::fill_n(ended_.get(), count(), false);
   }

@@ -145,7 +145,7 @@ class Reader {
     if (c_.welded && c_.fleet.task.start.settled)
       root_.fail("flight.support",
                  "is \"welded\", but task " + io::toml_string(c_.fleet.task.name) + " starts from hover", "\"task\"");
-    if (c_.vehicle.effects.contains("tether") && c_.fleet.batch.world.ground_z_m <= sim::World{}.ground_z_m)
+    if (c_.vehicle.effects.contains("tether") && !c_.fleet.batch.world.has_ground())
       root_.fail("world.ground_z_m", "is missing, and the vehicle's tether hangs down to it", "the ground's height, m");
     if (c_.changes.swapped_wings && (c_.vehicle.beat_averaged || c_.vehicle.jointed))
       root_.fail("changes.swapped_wings", "is of a vehicle whose wings are no bodies of their own",

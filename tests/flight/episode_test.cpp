@@ -457,6 +457,9 @@ TEST(Voltages, HaveNoControllerBesideThem) {
     std::string text = voltages_task();
     return refused(text.replace(text.find(from), from.size(), to));
   };
+  EXPECT_NE(
+      replaced("[reward]\n", "[reward]\nkept = 2.0\n").find("reward.kept: is never paid without until_s; accepted"),
+      std::string::npos);
   EXPECT_NE(replaced("kind = \"voltages\"\nleft_V", "kind = \"volts\"\nleft_V")
                 .find("action.kind: \"volts\" is not known; accepted: \"wing_beat\", \"voltages\""),
             std::string::npos);

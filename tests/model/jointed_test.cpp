@@ -167,6 +167,10 @@ TEST(JointedFile, RefusesWhatNoWingDoes) {
             "left.stroke: is driven without a harmonic; accepted: cos_rad, sin_rad, or mode = \"fixed\"");
   EXPECT_EQ(refused("timing_opposed = 4.0", "timing_opposed = 6.0"),
             "input: all timing together stops the phase; accepted: at most 0.8 of all inputs at their ends");
+  EXPECT_EQ(
+      refused("lag_s = 0.004 ", "scale.stroke_plane = 0.1\nlag_s = 0.004 "),
+      "input.amplitude.scale.stroke_plane: changes an angle that it cannot move; accepted: an angle that is driven");
+  EXPECT_EQ(refused("lag_s = 0.004 ", "offset_rad.stroke_plane = 0.1\nlag_s = 0.004 "), "accepted");
   EXPECT_EQ(refused("lag_s = 0.004 ", "lag_s = 0.0 "),
             "input.amplitude.lag_s: 0 is out of range; accepted: a number from 1e-05 to 1");
   EXPECT_EQ(refused("mode = \"fixed\"", "mode = \"loose\"").substr(0, 56),

@@ -27,8 +27,10 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// Policies that every robot flies, in this order.
-constexpr const char* kPolicies[] = {"as_shipped", "file", "corrected"};
+/// Policies that every robot flies. The last two were trained on with a corrected vehicle, the last with one that has what is left as a
+/// smooth load. A robot without such a vehicle flies the policy before it.
+enum Policy { kAsShipped, kFile, kCorrected, kWithResidual, kPolicies };
+constexpr std::array<const char*, kPolicies> kNames = {"as_shipped", "file", "corrected", "with_residual"};
 
 /// Parts of a benchmark whose robots have an effect and are diagnosed from rich flights. Each robot occurs once in them.
 constexpr std::string_view kParts[] = {"singles", "typical",         "withheld",      "outside",
@@ -114,7 +116,7 @@ class Loop {
           io::make_folder(r.own);
           Assignment healthy = r.made;
           healthy.effects.clear();
-          const std::optional<std::size_t> with = succeeded(r, kPolicies[0], r.made, policy);
+          const std::optional<std::size_t> with = succeeded(r, kNames[kAsShipped], r.made, policy);
           const std::optional<std::size_t> without = succeeded(r, "without_effect", healthy, policy);
           if (!with || !without) return false;
           if (*with >= *without) {
@@ -156,17 +158,20 @@ class Loop {
   bool train() {
     const fs::path declared = scored_.front()->manifest.vehicle;
     if (!train_on(declared, without(), 0)) return false;
-    std::vector<const Robot*> open;
-    for (const Robot& r : robots_) {
-      io::make_folder(r.own);
-      if (r.said.corrected.empty()) continue;  // no corrected vehicle: its logs were faulty
-      io::write_atomically(r.own / "vehicle_corrected.toml", r.said.corrected);
-      open.push_back(&r);
-    }
-    return benchmark::work_through("training", open.size(), command_.threads, nullptr, [&](std::size_t i) {
-      train_on(open[i]->own / "vehicle_corrected.toml", open[i]->own / "corrected", 1);
-    });
+    std::vector<fs::path> runs;
+    for (const Robot& r : robots_)
+      for (const Policy p : {kCorrected, kWithResidual}) {
+        const std::string& vehicle = p == kCorrected ? r.said.corrected : r.said.with_residual;
+        if (vehicle.empty()) continue;
+        runs.push_back(r.own / kNames[p]);
+        io::make_folder(r.own);
+        io::write_atomically(vehicle_of(runs.back()), vehicle);
+      }
+    return benchmark::work_through("training", runs.size(), command_.threads, nullptr,
+                                   [&](std::size_t i) { train_on(vehicle_of(runs[i]), runs[i], 1); });
   }
+
+  static fs::path vehicle_of(const fs::path& run) { return run.string() + ".toml"; }
 
   /// Resumes an unfinished run in the folder; false if it was interrupted.
   bool train_on(const fs::path& vehicle, const fs::path& folder, int threads) const {
@@ -185,15 +190,17 @@ class Loop {
     return !learn::train(config, options).stopped;
   }
 
-  fs::path policy_of(const Robot& r, std::size_t p) const {
-    const fs::path runs[] = {command_.run, without(), r.said.corrected.empty() ? without() : r.own / "corrected"};
-    return runs[p] / "best.json";
+  /// Flies the escapes of a robot with a policy; empty after Ctrl-C.
+  std::optional<std::size_t> flown(const Robot& r, Policy p) const {
+    if (p == kWithResidual && r.said.with_residual.empty()) p = kCorrected;
+    if (p == kCorrected && r.said.corrected.empty()) p = kFile;  // its logs were faulty
+    const fs::path run = p == kAsShipped ? fs::path(command_.run) : p == kFile ? without() : r.own / kNames[p];
+    return succeeded(r, kNames[p], r.made, run / "best.json");
   }
 
   bool fly() {
     const bool all = benchmark::work_through("flying", robots_.size(), command_.threads, nullptr, [&](std::size_t i) {
-      const Robot& r = robots_[i];
-      for (std::size_t p = 0; p < std::size(kPolicies); ++p) succeeded(r, kPolicies[p], r.made, policy_of(r, p));
+      for (int p = 0; p < kPolicies; ++p) flown(robots_[i], static_cast<Policy>(p));
     });
     return all && !io::interrupted();
   }
@@ -208,16 +215,22 @@ class Loop {
   }
 
   struct Row {
-    std::size_t robots = 0, better = 0, worse = 0, escapes = 0;
-    std::array<std::size_t, std::size(kPolicies)> succeeded{};
+    std::size_t robots = 0, escapes = 0, with_residual = 0;
+    std::array<std::size_t, kPolicies> succeeded{}, better{}, worse{};  ///< better and worse than kFile
+    /// Share of the robots that fly better with the policy than with kFile; ties count half.
+    double ties_half(Policy p) const {
+      return 0.5 +
+             (static_cast<double>(better[p]) - static_cast<double>(worse[p])) / (2.0 * static_cast<double>(robots));
+    }
   };
 
   Json told() const {
     std::map<std::string, Row> rows;
-    std::string lines = "family,case,part,effects,verdict,named,escapes,as_shipped,file,corrected,seed,draw\n";
+    std::string lines = "family,case,part,effects,verdict,named,escapes," +
+                        io::joined({kNames.begin(), kNames.end()}, ",") + ",seed,draw\n";
     for (const Robot& r : robots_) {
-      std::array<std::size_t, std::size(kPolicies)> count{};
-      for (std::size_t p = 0; p < count.size(); ++p) count[p] = *succeeded(r, kPolicies[p], r.made, policy_of(r, p));
+      std::array<std::size_t, kPolicies> count{};
+      for (int p = 0; p < kPolicies; ++p) count[p] = *flown(r, static_cast<Policy>(p));
       const benchmark::Label& label = *r.label;
       const std::string& family = r.of->manifest.family;
       const benchmark::Answer said = answer_of(r.said);
@@ -227,33 +240,41 @@ class Loop {
       for (Row* row : {&rows[family], &rows["all"]}) {
         ++row->robots;
         row->escapes += command_.escapes;
-        for (std::size_t p = 0; p < std::size(kPolicies); ++p) row->succeeded[p] += count[p];
-        row->better += count[2] > count[1];
-        row->worse += count[2] < count[1];
+        row->with_residual += !r.said.with_residual.empty();
+        for (int p = 0; p < kPolicies; ++p) {
+          row->succeeded[p] += count[p];
+          row->better[p] += count[p] > count[kFile];
+          row->worse[p] += count[p] < count[kFile];
+        }
       }
       for (const std::size_t c : count) lines += "," + std::to_string(c);
       lines += "," + std::to_string(label.planned.seed) + "," + std::to_string(label.draw) + "\n";
     }
     std::string text =
-        "| family | robots | better with the diagnosis (95 %) | as good | worse | better, ties half | success as "
-        "shipped "
-        "| trained on with the file | with the corrected vehicle |\n|---|---|---|---|---|---|---|---|---|\n";
+        "| family | robots | better with the diagnosis (95 %) | as good | worse | better, ties half | with what is "
+        "left (robots) "
+        "| success as shipped | trained on with the file | with the corrected vehicle | with what is left |\n"
+        "|---|---|---|---|---|---|---|---|---|---|---|\n";
     Json all = Json::object();
     for (const auto& [family, row] : rows) {
-      const rollout::Rate better = rollout::rate_of(row.better, row.robots);
-      char line[300];
-      const auto share = [&row = row](std::size_t p) {
+      const std::size_t better = row.better[kCorrected], worse = row.worse[kCorrected];
+      const rollout::Rate rate = rollout::rate_of(better, row.robots);
+      const auto share = [&row = row](Policy p) {
         return static_cast<double>(row.succeeded[p]) / static_cast<double>(row.escapes);
       };
-      const std::size_t ties = row.robots - row.better - row.worse;
-      const double half =
-          (static_cast<double>(row.better) + static_cast<double>(ties) / 2) / static_cast<double>(row.robots);
-      std::snprintf(line, sizeof line, "| %s | %zu | %.3f (%.3f to %.3f) | %zu | %zu | %.3f | %.3f | %.3f | %.3f |\n",
-                    family.c_str(), row.robots, better.value, better.low, better.high, ties, row.worse, half, share(0),
-                    share(1), share(2));
+      char line[300];
+      std::snprintf(line, sizeof line,
+                    "| %s | %zu | %.3f (%.3f to %.3f) | %zu | %zu | %.3f | %.3f (%zu) | %.3f | %.3f | %.3f | %.3f |\n",
+                    family.c_str(), row.robots, rate.value, rate.low, rate.high, row.robots - better - worse, worse,
+                    row.ties_half(kCorrected), row.ties_half(kWithResidual), row.with_residual, share(kAsShipped),
+                    share(kFile), share(kCorrected), share(kWithResidual));
       text += line;
-      all[family] = {{"robots", row.robots},   {"better", row.better}, {"worse", row.worse},   {"ties_half", half},
-                     {"as_shipped", share(0)}, {"file", share(1)},     {"corrected", share(2)}};
+      all[family] = {{"robots", row.robots},
+                     {"better", better},
+                     {"worse", worse},
+                     {"ties_half", row.ties_half(kCorrected)},
+                     {"ties_half_with_residual", row.ties_half(kWithResidual)}};
+      for (int p = 0; p < kPolicies; ++p) all[family][kNames[p]] = share(static_cast<Policy>(p));
     }
     text += "\nleft out, for they do not hover at the goal for three seconds without a policy:";
     for (const auto& [family, count] : unsteady_) text += " " + family + " " + std::to_string(count);

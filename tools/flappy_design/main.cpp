@@ -42,7 +42,8 @@ void show(const design::Search& search, const std::vector<double>& most) {
   }
 }
 
-void verify(const design::Judge& judge, const design::Search& search, const design::DesignConfig& config,
+/// False if it was interrupted.
+bool verify(const design::Judge& judge, const design::Search& search, const design::DesignConfig& config,
             const std::vector<design::Generation>& history, const std::filesystem::path& folder,
             const std::string& train_config) {
   std::vector<design::Record> chosen = design::choose(search, config.verify.designs);
@@ -51,13 +52,14 @@ void verify(const design::Judge& judge, const design::Search& search, const desi
   io::ProgressLine line("verified");
   for (std::size_t i = 0; i < chosen.size() && !io::interrupted(); ++i) {
     verified.push_back(design::verify(judge, search, config, chosen[i], io::format("%02zu", i)));
-    if (io::interrupted()) return;  // its gains may be half tuned
+    if (io::interrupted()) return false;  // its gains may be half tuned
     const std::filesystem::path own = folder / "designs" / verified.back().name;
     design::write_design(own, judge, verified.back());
     if (!train_config.empty()) verified.back().policy = trained(own, train_config);
     design::write_results(folder, judge, search, history, verified);
     line.show(static_cast<double>(i + 1) / static_cast<double>(chosen.size()));
   }
+  return !io::interrupted();
 }
 
 }  // namespace
@@ -100,15 +102,15 @@ int main(int argc, char** argv) {
       return !io::interrupted();
     });
     if (!program.writes()) return;
+    const auto stopped = [] { std::printf("stopped; the same command goes on\n"); };
     if (!done) {
       design::write_records(folder, search, history);
-      std::printf("stopped; the same command goes on\n");
-      return;
+      return stopped();
     }
     const std::vector<double> most = design::given_away(search);
     show(search, most);
     design::write_results(folder, judge, search, history, {});
-    if (config.verify.designs > 0) verify(judge, search, config, history, folder, train_config);
+    if (config.verify.designs > 0 && !verify(judge, search, config, history, folder, train_config)) return stopped();
     program.write_json({{"designs", history.back().designs},
                         {"front", history.back().front},
                         {"hypervolume", history.back().hypervolume},

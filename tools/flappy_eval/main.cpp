@@ -347,9 +347,8 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
     }
     for (const double magnitude : kMagnitudes) {
       std::optional<Summary> flown;
-      const bool hangs = effect.info.id == std::string_view("tether") &&
-                         config.fleet.batch.world.ground_z_m <= sim::World{}.ground_z_m;
-      if (hangs) json["refused"] = "there is no ground to hang down to; accepted: world.ground_z_m";
+      if (effect.info.id == std::string_view("tether") && !config.fleet.batch.world.has_ground())
+        json["refused"] = "there is no ground to hang down to; accepted: world.ground_z_m";
       else if (!over) try {
           const FlyConfig with = with_effect(config, effect, magnitude);
           const flight::Fleet<float> one(1, with.vehicle, with.fleet);  // throws on all ranks alike

@@ -2,6 +2,7 @@
 
 #include "benchmark/predict/baselines.hpp"
 #include "flappy/vehicle_file.hpp"
+#include "gap/diagnose/corrected_vehicle.hpp"
 #include "gap/diagnose/diagnose.hpp"
 
 namespace flappy::benchmark {
@@ -9,6 +10,16 @@ namespace flappy::benchmark {
 bool abstains(const gap::Verdict& verdict) {
   return verdict.kind == gap::VerdictKind::group || verdict.probability < 0.5;
 }
+
+namespace {
+
+/// The vehicle's file without its posterior, which is long and not scored.
+std::string text_of(model::Vehicle vehicle) {
+  vehicle.posterior.reset();
+  return model::vehicle_text(vehicle);
+}
+
+}  // namespace
 
 Prediction predict(const Question& q) {
   gap::DiagnosisSettings settings;
@@ -28,8 +39,12 @@ Prediction predict(const Question& q) {
   if (!q.experiments.empty() && abstains(d.result.verdict)) propose_experiment(request, d);
   Prediction p;
   if (d.corrected) {
-    d.corrected->posterior.reset();  // long, and not scored
-    p.corrected = model::vehicle_text(*d.corrected);
+    if (d.inference.residual && d.inference.residual->helps) {
+      p.with_residual = text_of(*std::move(d.corrected));
+      d.inference.residual.reset();
+      d.corrected = gap::corrected_vehicle(request.vehicle, d.inference, request.uncertain);
+    }
+    p.corrected = text_of(*std::move(d.corrected));
     if (q.baselines) {
       const gap::Flights flights = tests_of(d.flights);
       p.baselines = baselines(flights, *d.uncertain, d.inference, q.withheld, settings.threads);

@@ -26,7 +26,8 @@ struct Prediction {
   std::map<std::string, Baseline> baselines;  ///< by name; all but "black_box", which the scorer adds
   std::vector<double> features;               ///< features of the residuals, for the black box (baselines.hpp)
   std::string corrected;                      ///< text of the corrected vehicle file; empty if the logs are faulty
-  bool crashed = false;                       ///< the robot crashed in the proposed flight, so nothing was predicted
+  std::string with_residual;  ///< the same with what is left as a smooth load; empty if that does not help
+  bool crashed = false;       ///< the robot crashed in the proposed flight, so nothing was predicted
 };
 
 /// Whether a verdict gives no single answer: it is a group, or its probability is below one half.
@@ -38,7 +39,7 @@ struct Question {
   /// TOML files. All but the vehicle may be empty: gap::DiagnosisSettings.
   std::filesystem::path vehicle, priors, discrepancy, verdict, sessions;
   std::vector<std::string> withheld;  ///< effects to leave out of the catalogue
-  bool residual = false;              ///< give the corrected vehicle what is left, as a smooth load
+  bool residual = false;              ///< make a second corrected vehicle, which has what is left as a smooth load
   bool baselines = true;              ///< also compute Prediction::baselines and ::features
   /// Folder of manoeuvres (*.toml), one of which is proposed if the verdict abstains; empty: none.
   std::filesystem::path experiments;
