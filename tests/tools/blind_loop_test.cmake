@@ -37,6 +37,6 @@ expect_match("line of a robot" "${line}" "^c,1,singles,[a-z_]+,[a-z]+,[a-z_+]*,1
 run(${loop} --costly)
 expect_equal("exit code of loop --costly, which says ${err}" "${code}" 0)
 expect_match("robots that are left out" "${out}" "as often as without their effect: (none|c 1)\n")
-expect_keys(${WORK}/single_loop/c_0001/without_effect.json of=STRING escapes=NUMBER succeeded=NUMBER)
+expect_keys(${WORK}/single_loop/c_0001/as_shipped.json of=STRING escapes=NUMBER succeeded=NUMBER)
 file(APPEND ${WORK}/single/predictions/0001.json " ")
 expect_refused("${WORK}/single/predictions/0001.json: has changed; accepted: what was sealed" ${loop})

@@ -114,11 +114,15 @@ class Loop {
         }
         if (command_.costly) {
           io::make_folder(r.own);
-          Assignment healthy = r.made;
-          healthy.effects.clear();
           const std::optional<std::size_t> with = succeeded(r, kNames[kAsShipped], r.made, policy);
-          const std::optional<std::size_t> without = succeeded(r, "without_effect", healthy, policy);
-          if (!with || !without) return false;
+          if (!with) return false;
+          std::optional<std::size_t> without = *with;
+          if (*with < command_.escapes) {
+            Assignment healthy = r.made;
+            healthy.effects.clear();
+            without = succeeded(r, "without_effect", healthy, policy);
+          }
+          if (!without) return false;
           if (*with >= *without) {
             ++as_good_[family];
             continue;
