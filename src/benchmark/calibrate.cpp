@@ -10,6 +10,7 @@
 #include "gap/diagnose/verdict.hpp"
 #include "io/files.hpp"
 #include "io/program.hpp"
+#include "io/sha256.hpp"
 #include "io/text.hpp"
 
 namespace flappy::benchmark {
@@ -96,6 +97,21 @@ double moved_prior(const ScoredHypothesis& a, const VerdictRule& from, const Ver
   return 0;
 }
 
+/// InputError if the benchmark in `folder` was scored with other constants than those of `verdict`.
+void check_verdict(const fs::path& folder, const Manifest& manifest, const fs::path& verdict) {
+  const std::string options = io::read_text(folder / "predictions" / "options.txt"), option = "--verdict ";
+  const std::size_t at = options.find(option) + option.size();
+  std::string scored_with = options.substr(at, options.find('\n', at) - at);
+  if (scored_with == "default") {
+    const bool contrast = !manifest.cases.front().references(folder).empty();
+    scored_with =
+        io::sha256(io::read_text(io::config_path(contrast ? "gap/contrast_verdict.toml" : "gap/verdict.toml")));
+  }
+  if (io::sha256(io::read_text(verdict)) != scored_with)
+    throw io::InputError("--verdict " + verdict.string() + ": " + folder.string() +
+                         " was scored with another; accepted: the file that it was scored with");
+}
+
 class Calibration {
  public:
   explicit Calibration(const CalibrateCommand& command)
@@ -106,6 +122,7 @@ class Calibration {
       const Manifest manifest = read_manifest(folder);
       if (!fs::exists(true_fits(folder)))
         throw io::InputError(folder.string() + ": was not scored; accepted: folders of flappy-blind score");
+      check_verdict(folder, manifest, command.verdict);
       std::map<std::size_t, CaseTruth> truths;
       const Json sealed = open_labels(folder, manifest);
       for (const Json& json : sealed.at("cases")) {

@@ -363,13 +363,12 @@ bool needs_change_over_noise(const ScoredCase& c) {
 }
 
 Scores score(const std::vector<ScoredCase>& cases) {
-  std::vector<ScoredCase> counted = cases;
-  std::erase_if(counted, within_noise);
+  std::vector<ScoredCase> absolute, contrasts;
+  for (const ScoredCase& c : cases)
+    if (!within_noise(c)) (std::ranges::count(kContrastParts, c.truth.part) > 0 ? contrasts : absolute).push_back(c);
   Scores s;
-  const auto of_contrast = [](const ScoredCase& c) { return std::ranges::count(kContrastParts, c.truth.part) > 0; };
-  if (!std::ranges::all_of(counted, of_contrast)) s.lines = absolute_lines(counted);
-  if (std::ranges::any_of(counted, of_contrast))
-    std::ranges::move(contrast_lines(counted), std::back_inserter(s.lines));
+  if (!absolute.empty()) s.lines = absolute_lines(absolute);
+  if (!contrasts.empty()) std::ranges::move(contrast_lines(contrasts), std::back_inserter(s.lines));
   s.unbeaten = unbeaten_lines(s.lines);
   return s;
 }
@@ -504,9 +503,7 @@ std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases) {
   std::erase_if(unknown, [&](const ScoredCase* c) { return !left(*c); });
   l.push_back(line("contrast_where", "contrast, unknown or a remainder: where it acts is as sealed", Bar::at_least,
                    0.80, 0.95, share(unknown, described)));
-  std::vector<ScoredCase> own = cases;
-  std::erase_if(own, [](const ScoredCase& c) { return std::ranges::count(kContrastParts, c.truth.part) == 0; });
-  ScoreLine ece = calibration_line(own);
+  ScoreLine ece = calibration_line(cases);
   ece.key = "contrast_ece", ece.what = "contrast: calibration error (ECE) over all parts";
   l.push_back(std::move(ece));
   ScoreLine coverage = coverage_line(changed);

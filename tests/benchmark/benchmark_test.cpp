@@ -208,6 +208,10 @@ TEST_F(Benchmark, LearnsWhatANatIsWorth) {
   // nearly one half each, which is the best that can be said of both
   EXPECT_LT(json.at("score_before").get<double>(), json.at("score").get<double>() - 0.1);
   EXPECT_GT(json.at("score").get<double>(), std::log(0.4));
+  calibrated.verdict = calibrated.out, calibrated.out = root_ / "again.toml";
+  EXPECT_EQ(test::refusal([&] { calibrate(calibrated); }),
+            "--verdict " + calibrated.verdict.string() + ": " + (root_ / "bench").string() +
+                " was scored with another; accepted: the file that it was scored with");
 }
 
 TEST_F(Benchmark, OpensLabelsOnceAllPredictionsAreSealed) {

@@ -328,7 +328,8 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
     if (e.stopped) return std::nullopt;
     return rollout::summarise(e.flights);
   };
-  const double all = static_cast<double>(model::catalogue_of(config.vehicle).size() * std::size(kMagnitudes)) + 1;
+  const std::vector<model::CatalogueEffect>& effects = model::causes_of(config.vehicle);
+  const double all = static_cast<double>(effects.size() * std::size(kMagnitudes)) + 1;
   const auto without = fly(config);
   progress.show(++done / all);
   Json list = Json::array();
@@ -338,7 +339,7 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
     std::snprintf(text, sizeof text, "%8.1f", flown ? 100 * flown->success.value : 0);
     return flown ? std::string(text) : "       -";
   };
-  for (const model::CatalogueEffect& effect : model::catalogue_of(config.vehicle)) {
+  for (const model::CatalogueEffect& effect : effects) {
     std::string row;
     Json json = {{"effect", effect.info.id}, {"typical", Json::object()}, {"success", Json::array()}};
     for (int i = 0; i < effect.info.magnitudes; ++i) {
