@@ -76,9 +76,13 @@ class Job:
         self.number = int(self.ask("submit", "train", config, *sets(values))["job"])
 
     def ask(self, *words: str) -> dict:
-        """The answer to a command of flappy-job."""
+        """The answer to a command of flappy-job. Raises RuntimeError if the server does not answer within a minute."""
+        command, until_s = ["flappy-job", *self.dds, "--json"], time.monotonic() + 60
         with tempfile.NamedTemporaryFile(suffix=".json") as answer:
-            subprocess.run(["flappy-job", *self.dds, "--json", answer.name, *words], check=True, stdout=subprocess.DEVNULL)
+            while subprocess.run([*command, answer.name, *words], stdout=subprocess.DEVNULL).returncode:
+                if words[0] == "submit" or time.monotonic() > until_s:
+                    raise RuntimeError(f"flappy-job {words[0]} fails")
+                time.sleep(1)  # the server may be starting anew
             return json.loads(Path(answer.name).read_text())
 
     def evaluations(self) -> Iterator[tuple[int, float]]:

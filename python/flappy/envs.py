@@ -228,7 +228,7 @@ class FlappyVectorEnv(_Named, gymnasium.vector.VectorEnv[Floats, Floats, Any]):
             if steps < 1:
                 raise ValueError(f"max_episode_steps: is {max_episode_steps!r}; accepted: a whole number from 1, or None")
             if steps * self._core.step_s < self._core.longest_s:
-                shorter = [*overrides, f"task.end.time_s={(1 - 1e-6) * steps * self._core.step_s!r}"]
+                shorter = [*overrides, f"task.end.time_s={max((1 - 1e-6) * steps, 1) * self._core.step_s!r}"]
                 self._core.close()
                 self._core = _core_of(config, shorter, num_envs, mode, copy, first, threads)
         self._same_step = mode == AutoresetMode.SAME_STEP

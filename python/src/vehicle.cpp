@@ -95,6 +95,9 @@ sim::FlapperState state_of(const nb::dict& given) {
               .c_str());
     if (!std::ranges::all_of(std::span(array.data(), part->width), [](double x) { return std::isfinite(x); }))
       throw nb::value_error((name + ": is not finite; accepted: finite numbers").c_str());
+    if (name == "attitude" &&
+        std::ranges::all_of(std::span(array.data(), part->width), [](double x) { return x == 0; }))
+      throw nb::value_error("attitude: is 0, no rotation; accepted: a quaternion (w, x, y, z)");
     std::copy_n(array.data(), part->width, reinterpret_cast<double*>(&s) + part->first);
   }
   return s;

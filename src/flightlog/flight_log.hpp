@@ -269,6 +269,8 @@ LogFiles flight_log_files(const FlightLog& log);
 /// Writes a log whole or not at all, replacing a flight log with all its files, truth.csv and vehicle included.
 /// InputError if the folder holds other files or cannot be written, or if read_flight_log() would refuse the log.
 void write_flight_log(const std::filesystem::path& folder, const FlightLog& log);
+/// InputError where `folder` exists and holds anything that does not belong to a flight log.
+void require_replaceable(const std::filesystem::path& folder);
 
 /// Adds truth.csv to a log; all `columns` have one length. InputError if the folder holds no flight log.
 void write_truth(const std::filesystem::path& folder, const std::vector<std::string>& names,

@@ -32,7 +32,23 @@ void require_log(const fs::path& folder) {
   if (!fs::exists(folder / kHeader, ignored)) refuse(folder, "is no flight log", "a folder with " + kHeader);
 }
 
-/// InputError where `folder` exists and holds anything that does not belong to a flight log.
+/// A temporary folder next to another one; the destructor removes it.
+struct SiblingFolder {
+  explicit SiblingFolder(const fs::path& beside) : path(beside.string() + ".tmp" + std::to_string(getpid())) {
+    fs::create_directories(path);
+  }
+  ~SiblingFolder() {
+    std::error_code ignored;
+    fs::remove_all(path, ignored);
+  }
+  SiblingFolder(const SiblingFolder&) = delete;
+  SiblingFolder& operator=(const SiblingFolder&) = delete;
+
+  fs::path path;
+};
+
+}  // namespace
+
 void require_replaceable(const fs::path& folder) {
   std::error_code error;
   const fs::file_status status = fs::status(folder, error);
@@ -52,23 +68,6 @@ void require_replaceable(const fs::path& folder) {
   if (error) refuse(folder, "cannot be written: " + error.message(), "");
   if (!empty && !has_header) refuse(folder, "holds files, but no " + kHeader, kAccepted);
 }
-
-/// A temporary folder next to another one; the destructor removes it.
-struct SiblingFolder {
-  explicit SiblingFolder(const fs::path& beside) : path(beside.string() + ".tmp" + std::to_string(getpid())) {
-    fs::create_directories(path);
-  }
-  ~SiblingFolder() {
-    std::error_code ignored;
-    fs::remove_all(path, ignored);
-  }
-  SiblingFolder(const SiblingFolder&) = delete;
-  SiblingFolder& operator=(const SiblingFolder&) = delete;
-
-  fs::path path;
-};
-
-}  // namespace
 
 std::vector<fs::path> flights_in(const fs::path& folder) {
   std::error_code error;

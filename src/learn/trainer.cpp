@@ -47,9 +47,10 @@ class Trainer {
     const fs::path& folder = options_.folder;
     if (options_.from) resume(Checkpoint(*options_.from));
     else if (writes()) write_config();
-    if (writes()) {
-      if (options_.from) forget_after(updates());
+    if (writes()) {  // nothing is removed before all that is read has been accepted
       metrics_.emplace(folder, kColumns, records_);
+      if (options_.from) forget_after(updates());
+      fs::remove(folder / "summary.json");  // that of a stop: the run goes on
     }
     if (options_.init && !options_.from) {  // evaluate the initial policy, so that no worse one becomes the best
       const auto from = Clock::now();
@@ -474,7 +475,6 @@ TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
   if (writes) lock.emplace(options.folder);
   if (writes && !options.from) refuse_run_in(options.folder);
   Trainer trainer(config, options);
-  if (writes) std::filesystem::remove(options.folder / "summary.json");  // that of a stop: the run goes on
   TrainSummary summary = trainer.run();
   if (!writes) return summary;
   summary.policy_sha256 = io::sha256(io::read_text(options.folder / "best.json"));

@@ -11,7 +11,7 @@
 // Each rank flies its share of flappers and validation vehicles and does its share of every batch; the first one writes
 // the folder. In every step, the actor of the step before flies while the learner samples earlier steps' transitions:
 // the lag is always one step, so results do not depend on speed. All files but timing.jsonl, summary.json, run.json,
-// events and log.txt are the same for any number of threads and resumptions.
+// events, log.txt and the heads of checkpoints are the same for any number of threads and resumptions.
 #pragma once
 
 #include <chrono>

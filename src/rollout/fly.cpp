@@ -8,6 +8,7 @@
 #include "flightlog/ros/flight_mcap.hpp"
 #include "io/parallel.hpp"
 #include "model/jointed.hpp"
+#include "rollout/outcome.hpp"
 #include "rollout/rollout.hpp"
 #include "sim/storage.hpp"
 
@@ -42,17 +43,23 @@ void prepare_log_folder(const fs::path& folder, std::size_t count, const std::st
   std::set<std::string> foreign;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
-    bool belongs = count == 1 && is_log;  // write_flight_log() checks the files
+    bool belongs = count == 1 && is_log;
     const bool number = name.size() < 10 && name.find_first_not_of("0123456789") == std::string::npos;
     if (count > 1 && number) belongs = std::stoul(name) < count && name == log_name(std::stoul(name), count);
     if (!belongs) foreign.insert(name);
   }
   if (error) throw io::InputError(folder.string() + ": cannot be read: " + error.message());
   if (!foreign.empty()) refuse("holds " + *foreign.begin());
-  for (std::size_t i = 0; count > 1 && i < count;
-       ++i)  // else logs of an earlier run would stay beside those of one that is stopped
-    if (const fs::path old = folder / log_name(i, count); fs::exists(old / flightlog::log_file::kHeader))
-      fs::remove_all(old);
+  // logs of an earlier run would stay beside those of one that is stopped, or too short
+  std::vector<fs::path> old = {folder};
+  if (count > 1) {
+    old.clear();
+    for (std::size_t i = 0; i < count; ++i) old.push_back(folder / log_name(i, count));
+  }
+  std::ranges::for_each(old, flightlog::require_replaceable);
+  for (const fs::path& log : old)
+    if (fs::exists(log / flightlog::log_file::kHeader)) fs::remove_all(log);
+  io::make_folder(folder);
 }
 
 /// Writes the logs of flights, numbered from `first`; returns the number of logs written.
@@ -122,16 +129,20 @@ FlyResult fly_all(const FlyConfig& config, const FlyOptions& options) {
       result.handed_back += fleet.handed_back(i);
       const double captured_s = fleet.captured_s(i);
       if (captured_s > 0) result.capture_s.push_back(captured_s);
-      result.successes += captured_s > 0 && fleet.lost_s(i) == 0 && !scores[i].crashed;
+      result.successes +=
+          Outcome{
+              .captured_s = captured_s, .lost_s = fleet.lost_s(i), .status = fleet.events(i), .ended = fleet.ended(i)}
+              .success();
     }
     result.flown_s = flights.t_s();
     result.steps += flights.physics_steps();
     if (logged) result.logs += write_logs(flights, first, options);
-    if (!options.mcap.empty())
-      if (const auto log = flights.recorders().front().log()) {
-        flightlog::ros::write_flight_mcap(options.mcap, *log);
-        result.mcap = true;
-      }
+    if (!options.mcap.empty()) {
+      const auto log = flights.recorders().front().log();
+      result.mcap = log.has_value();
+      if (log) flightlog::ros::write_flight_mcap(options.mcap, *log);
+      else fs::remove(options.mcap);  // of an earlier flight
+    }
     all_scores.insert(all_scores.end(), scores.begin(), scores.end());
   }
   result.summary = summarise(all_scores);

@@ -28,7 +28,7 @@ struct FlyResult {
   std::array<std::size_t, 6> ended{};  ///< number of flights whose task ended first by each bit of Ended; they fly on
   std::size_t handed_back = 0;
   std::vector<double> capture_s;  ///< capture times of the flights that captured their goal
-  std::size_t successes = 0;      ///< flights that captured the goal, kept it as the task demands, and did not crash
+  std::size_t successes = 0;      ///< flights that succeed (outcome.hpp)
   std::size_t logs = 0;
   bool mcap = false;       ///< whether the mcap file was written: the flight was long enough
   std::uint64_t hash = 0;  ///< hash of the final motion states of all vehicles, in order

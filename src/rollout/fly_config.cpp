@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "flappy/vehicle_file.hpp"
 #include "io/sha256.hpp"
@@ -12,6 +13,9 @@
 
 namespace flappy::rollout {
 namespace {
+
+/// Number of steps that a command_delay keeps its commands.
+constexpr int kKeptSteps = model::CommandDelay::kSlots - 2;
 
 using Overrides = std::vector<std::string>;
 
@@ -298,13 +302,12 @@ class Reader {
     const char* const delay = model::CommandDelay::kInfo.id;
     if (const auto found = c_.vehicle.effects.find(delay);
         found != c_.vehicle.effects.end() && !c_.vehicle.beat_averaged) {
-      constexpr int kKept = model::CommandDelay::kSlots - 2;
       const auto e = static_cast<std::size_t>(model::effect_index(delay));
       const double late_s = model::effects()[e].values(found->second)[0];
-      if (late_s > kKept * step)
+      if (late_s > kKeptSteps * step)
         root_.fail("flight.step_s",
                    "is too short for a command_delay of " + io::shortest_digits(late_s) + " s, of which " +
-                       std::to_string(kKept) + " steps are kept",
+                       std::to_string(kKeptSteps) + " steps are kept",
                    "a longer step, or a shorter delay");
     }
   }
@@ -334,10 +337,24 @@ class Reader {
   FlyConfig c_;
 };
 
+/// Limits drawn delays to what can be flown: no pose is seen before it was, and commands are kept for so many steps.
+void limit_delays(const flight::FleetOptions& fleet, model::Vehicle& v) {
+  const auto limit = [&](const char* effect, double low, double high) {
+    const auto found = v.effects.find(effect);
+    if (found == v.effects.end()) return;
+    const auto e = static_cast<std::size_t>(model::effect_index(effect));
+    double& delay_s = found->second[model::effects()[e].parameters[0].name];
+    delay_s = std::clamp(delay_s, low, high);
+  };
+  limit(model::MocapDelay::kInfo.id, -fleet.sensors.mocap.latency_s, std::numeric_limits<double>::infinity());
+  if (!v.beat_averaged) limit(model::CommandDelay::kInfo.id, 0, kKeptSteps * fleet.batch.step_s);
+}
+
 }  // namespace
 
 model::Vehicle FlyConfig::vehicle_of(std::uint32_t flapper, std::uint32_t episode) const {
   model::Vehicle v = randomisation ? randomisation->sample({fleet.seed, flapper, episode}) : vehicle;
+  if (randomisation) limit_delays(fleet, v);
   for (const auto& [id, values] : added_effects) v.effects[id] = values;
   apply(changes, v);
   return v;

@@ -42,11 +42,12 @@ const std::vector<std::string> kTruthNames = [] {
   return names;
 }();
 
-/// Each sample is taken at the first control tick at or after its time.
+/// Each sample is taken at the first control tick at or after its time, from the first tick that is asked about.
 class TickSampler {
  public:
   explicit TickSampler(double rate_hz) : rate_hz_(rate_hz) {}
   bool due(double t_s) {
+    if (!std::exchange(started_, true)) count_ = static_cast<std::uint32_t>(std::ceil(t_s * rate_hz_ - 1e-9));
     if (t_s < static_cast<double>(count_) / rate_hz_ - 1e-9) return false;
     ++count_;
     return true;
@@ -57,6 +58,7 @@ class TickSampler {
  private:
   double rate_hz_;
   std::uint32_t count_ = 0;
+  bool started_ = false;
 };
 
 }  // namespace

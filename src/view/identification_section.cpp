@@ -87,6 +87,9 @@ void add_map(Section& section, const Json& map) {
              .categories = {},
              .series = {}};
     const auto x = values.get<std::vector<double>>();
+    const std::vector<double> first = before.at(channel), last = after.at(channel);
+    if (x.empty() || first.size() != x.size() || last.size() != x.size())
+      throw Json::other_error::create(600, "map: " + channel + " has different numbers of points, or none", &map);
     const auto [low, high] = std::ranges::minmax(x);
     f.series.push_back({.name = "equal",
                         .colour = Colour::black,
@@ -95,20 +98,10 @@ void add_map(Section& section, const Json& map) {
                         .low = {},
                         .high = {},
                         .dashed = true});
-    f.series.push_back({.name = "before",
-                        .draw = Draw::points,
-                        .colour = Colour::grey,
-                        .x = x,
-                        .y = before.at(channel).get<std::vector<double>>(),
-                        .low = {},
-                        .high = {}});
-    f.series.push_back({.name = "fitted",
-                        .draw = Draw::points,
-                        .colour = Colour::blue,
-                        .x = x,
-                        .y = after.at(channel).get<std::vector<double>>(),
-                        .low = {},
-                        .high = {}});
+    f.series.push_back(
+        {.name = "before", .draw = Draw::points, .colour = Colour::grey, .x = x, .y = first, .low = {}, .high = {}});
+    f.series.push_back(
+        {.name = "fitted", .draw = Draw::points, .colour = Colour::blue, .x = x, .y = last, .low = {}, .high = {}});
     section.add(f);
   }
 }

@@ -79,6 +79,7 @@ void add_curves(Section& section, const std::vector<Run>& runs) {
                         {.title = "updates per second", .low = 0.0});
   for (std::size_t k = 0; k < runs.size(); ++k) {
     const Run& r = runs[k];
+    if (r.metrics.names.empty() || r.timing.names.empty()) continue;  // no evaluation yet
     const std::vector<double>&updates = r.metrics.column("update"), &rate = r.metrics.column("success_rate");
     success.series.push_back(line(r, k, updates, rate, 100));
     over_time.series.push_back(line(r, k, r.timing.column("wall_s"), rate, 100));
@@ -93,7 +94,7 @@ void add_curves(Section& section, const std::vector<Run>& runs) {
   const std::pair<const char*, const char*> kEnds[] = {{"captured_share", "captured the goal"},
                                                        {"handed_back_share", "handed back"},
                                                        {"terminated_share", "ended early"}};
-  for (std::size_t k = 0; k < 3; ++k) {
+  for (std::size_t k = 0; k < 3 && !runs[0].metrics.names.empty(); ++k) {
     Series s = line(runs[0], k, runs[0].metrics.column("update"), runs[0].metrics.column(kEnds[k].first), 100);
     s.name = kEnds[k].second;
     ends.series.push_back(std::move(s));
@@ -149,7 +150,8 @@ void add_difference(Section& section, const Run& run) {
   }
   const std::map<std::string, std::string> shipped = learn::read_train_config(shipped_file).resolved;
   std::vector<std::array<std::string, 4>> rows;
-  for (const auto& entry : fs::directory_iterator(run.folder / "config")) {
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(run.folder / "config", none)) {
     const std::string file = entry.path().filename().string();
     const auto other = shipped.find(file);
     std::map<std::string, std::string> own = flattened(io::read_text(entry.path()));

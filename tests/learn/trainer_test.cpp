@@ -283,6 +283,7 @@ TEST(Trainer, RefusesWhatDoesNotFit) {
   };
   refused(c, {}, "holds a run; accepted: a new folder, or --resume");
   refused(small_training({"reward.scale=2.0"}), newest_checkpoint(folder).path(), "is of another configuration");
+  EXPECT_TRUE(fs::exists(folder / "summary.json")) << "what is refused removes nothing";
   const fs::path brief = fresh("brief");  // flies too short for its task: nothing has begun
   EXPECT_THROW(train_in(brief, small_training({"flight.duration_s=0.3"})), io::InputError);
   EXPECT_FALSE(fs::exists(brief / "config"));

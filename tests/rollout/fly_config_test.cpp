@@ -52,6 +52,27 @@ TEST(FlyConfig, OverridesReachTheFileTheyName) {
   EXPECT_EQ(c.vehicle_of(0).torso.mass_kg, c.vehicle_of(1).torso.mass_kg);
 }
 
+TEST(FlyConfig, LimitsDrawnDelays) {
+  const Folder folder;
+  folder.write("random.toml",
+               "schema = 1\n[[randomise]]\nparameters = [\"effects.mocap_delay.delay_s\"]\nlaw = \"replace_normal\"\n"
+               "mean = -0.005\nsd = 0.004\n[[randomise]]\nparameters = [\"effects.command_delay.delay_s\"]\n"
+               "law = \"replace_normal\"\nmean = 0.012\nsd = 0.002\n");
+  const rollout::FlyConfig c = rollout::read_fly_config(
+      kHover, {"vehicle.effects.mocap_delay.delay_s=0.0", "vehicle.effects.command_delay.delay_s=0.0",
+               "randomisation=" + (folder / "random.toml").string(), "sensors.mocap.latency_s=0.006",
+               "flight.step_s=5e-5", "flight.duration_s=0.01"});
+  double least_s = 0, most_s = 0;
+  for (std::uint32_t i = 0; i < 64; ++i) {
+    const auto effects = c.vehicle_of(i).effects;
+    least_s = std::min(least_s, effects.at("mocap_delay").at("delay_s"));
+    most_s = std::max(most_s, effects.at("command_delay").at("delay_s"));
+  }
+  EXPECT_EQ(least_s, -0.006);
+  EXPECT_EQ(most_s, 254 * 5e-5);
+  EXPECT_EQ(rollout::fly(c, {.count = 64}).summary.flights, 64u);
+}
+
 TEST(FlyConfig, DrawsFromThePosteriorOfTheVehicle) {
   const Folder folder;
   model::Vehicle v = test::identified();

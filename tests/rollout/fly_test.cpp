@@ -168,6 +168,20 @@ TEST(Fly, RefusesFoldersOfOthers) {
   EXPECT_EQ(message([&] { fly(c, {.count = 2, .log_folder = folder / "many"}); }),
             (folder / "many").string() + ": holds 0002" + accepted);
   EXPECT_EQ(message([&] { fly(c, {.count = 3, .log_folder = folder / "many"}); }), "accepted");
+  fs::create_directories(folder / "many/0001");
+  folder.write("many/0001/flight.toml", "");
+  folder.write("many/0001/notes.txt", "");
+  EXPECT_EQ(message([&] { fly(c, {.count = 3, .log_folder = folder / "many"}); }),
+            (folder / "many/0001").string() +
+                ": holds notes.txt, which is no part of a flight log; accepted: a new folder, an empty one, or a "
+                "flight log to replace");
+  // a flight that is too short for a log leaves none of before
+  fs::create_directories(folder / "one");
+  folder.write("one/flight.toml", "");
+  folder.write("one.mcap", "");
+  fly(c, {.log_folder = folder / "one", .mcap = folder / "one.mcap"});
+  EXPECT_TRUE(fs::is_empty(folder / "one"));
+  EXPECT_FALSE(fs::exists(folder / "one.mcap"));
 }
 
 // ---- logs

@@ -228,6 +228,7 @@ TEST(DdsConfig, RefusesWhatIsNotMeant) {
     EXPECT_NE(refused(text).find(part), std::string::npos) << refused(text);
   };
   says("[dds]\ndomain = 233", "c.toml:2:10: dds.domain: 233 is out of range");
+  says("[dds]\ndomain = 231\nkeys = \"/\"", "231 takes no keys; accepted: with keys, a domain of at most 230");
   says("[dds]\nreach = \"lan\"", "accepted: \"loopback\", \"host\", \"network\"");
   says("[dds]\npeers = [\"192.0.2.7\"]", "reach = \"network\"");
   says("[dds]\nreach = \"network\"\npeers = [\"a\\\"/><x\"]", "is no address");

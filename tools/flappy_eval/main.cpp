@@ -63,6 +63,9 @@ FlyConfig read_config(const Request& r) {
   } else if (policy.extension() == ".json") {
     overrides.push_back(file_override("actor", policy));
   }
+  for (const std::string key : {"flight.seed", "flight.threads", "flight.first_flapper"})
+    if (std::ranges::any_of(r.overrides, [&](const std::string& o) { return o.starts_with(key + "="); }))
+      throw io::InputError("--set " + key + ": is not used; accepted: --seed and --threads");
   if (!r.vehicle.empty()) overrides.push_back(file_override("vehicle", r.vehicle));
   if (!r.task.empty()) overrides.push_back(file_override("task", r.task));
   overrides.insert(overrides.end(), r.overrides.begin(), r.overrides.end());

@@ -180,7 +180,7 @@ int main(int argc, char** argv) {
   app.option("--from", from, "another checkpoint of that folder").needs(resumed);
   app.option("--init", init, "what to start with: a run folder (its best actor and its critics), or an actor alone")
       .excludes(resumed);
-  app.option("--threads", threads, "0: all").range(0, 1024);
+  const io::Option of_threads = app.option("--threads", threads, "0: all").range(0, 1024);
   app.option("--set", overrides, "override a key: learn.updates=1000, task.reward.goal=1")
       .one_at_a_time()
       .excludes(resumed);
@@ -203,7 +203,7 @@ int main(int argc, char** argv) {
       program.write_json(learn::json_of(train::train_one(config, options)));
     };
     const auto with_threads = [&](std::vector<std::string> list) {
-      if (threads > 0) list.push_back("threads=" + std::to_string(threads));
+      if (of_threads.given()) list.push_back("threads=" + std::to_string(threads));
       return list;
     };
     if (!resume.empty()) {

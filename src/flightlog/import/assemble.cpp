@@ -271,16 +271,23 @@ void derive_pitch(Stream& s, double gravity_m_s2) {
   s.columns["pitch_rad"] = std::move(pitch);
 }
 
+/// Share of a column that may be out of range: a few flipped bits. More are another unit.
+constexpr double kFew = 0.01;
+
 /// Replaces the columns of angles by those of the quaternion.
 void turn_angles(Stream& s) {
   if (!s.columns.contains("roll_rad")) return;
-  const Column roll = s.columns["roll_rad"], pitch = s.columns["pitch_rad"], yaw = s.columns["yaw_rad"];
+  Column roll = s.columns["roll_rad"], pitch = s.columns["pitch_rad"];
+  const Column yaw = s.columns["yaw_rad"];
   constexpr double kMax_rad = 2 * std::numbers::pi + 0.1;
-  for (const auto& [name, angles] : {std::pair("roll_rad", &roll), std::pair("pitch_rad", &pitch)})
-    if (const double angle = farthest(*angles); std::abs(angle) > kMax_rad)
+  for (const auto& [name, angles] : {std::pair("roll_rad", &roll), std::pair("pitch_rad", &pitch)}) {
+    const auto beyond = [&](double angle) { return std::isfinite(angle) && std::abs(angle) > kMax_rad; };
+    if (static_cast<double>(std::ranges::count_if(*angles, beyond)) > kFew * static_cast<double>(angles->size()))
       s.mapping.table.table("columns").fail(
-          name, "reaches " + io::shortest_digits(angle) + ": likely in degrees",
+          name, "reaches " + io::shortest_digits(farthest(*angles)) + ": likely in degrees",
           "radians: " + s.mapping.name + ".scale." + name + " = 0.017453292519943295");
+    std::ranges::replace_if(*angles, beyond, std::numeric_limits<double>::quiet_NaN());
+  }
   for (const char* name : {"roll_rad", "pitch_rad", "yaw_rad"}) s.columns.erase(name);
   for (std::size_t i = 0; i < roll.size(); ++i) {
     const auto about = [](double angle, double x, double y, double z) {
@@ -318,9 +325,8 @@ bool has_none(const Stream& s, std::size_t i) {
 
 const std::string kBeyond = " is out of range";
 
-/// InputError where more than 1 % of a column is out of range: that is another unit, not a few flipped bits.
+/// InputError where more than kFew of a column is out of range.
 void require_range(const Stream& s) {
-  constexpr double kFew = 0.01;
   for (const auto& [name, column] : s.columns)
     if (const auto beyond = s.report.why_unusable.find(name + kBeyond);
         beyond != s.report.why_unusable.end() &&

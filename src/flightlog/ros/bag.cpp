@@ -171,24 +171,26 @@ class SqliteBag : public Bag {
 
 class SplitBag : public Bag {
  public:
-  explicit SplitBag(std::vector<std::unique_ptr<Bag>> parts) : parts_(std::move(parts)) {}
+  SplitBag(std::vector<std::unique_ptr<Bag>> parts, std::vector<std::string> warnings)
+      : parts_(std::move(parts)), warnings_(std::move(warnings)) {}
   std::optional<BagMessage> next() override {
     for (; part_ < parts_.size(); ++part_)
       if (auto message = parts_[part_]->next()) return message;
     return {};
   }
   std::vector<std::string> topics() const override { return of_all(&Bag::topics); }
-  std::vector<std::string> warnings() const override { return of_all(&Bag::warnings); }
+  std::vector<std::string> warnings() const override { return of_all(&Bag::warnings, warnings_); }
 
  private:
-  std::vector<std::string> of_all(std::vector<std::string> (Bag::*list)() const) const {
-    std::vector<std::string> all;
+  std::vector<std::string> of_all(std::vector<std::string> (Bag::*list)() const,
+                                  std::vector<std::string> all = {}) const {
     for (const auto& part : parts_)
       for (const std::string& each : (*part.*list)()) all.push_back(each);
     return all;
   }
 
   std::vector<std::unique_ptr<Bag>> parts_;
+  std::vector<std::string> warnings_;
   std::size_t part_ = 0;
 };
 
@@ -234,9 +236,12 @@ std::unique_ptr<Bag> Bag::open(const fs::path& path) {
   std::error_code ignored;
   if (fs::is_directory(path, ignored)) {
     std::vector<std::unique_ptr<Bag>> parts;
-    for (const fs::path& part : parts_of(path)) parts.push_back(open(part));
+    std::vector<std::string> warnings;
+    for (const fs::path& part : parts_of(path))
+      if (beginning(part).size() < mcap::kMagic.size()) warnings.push_back(part.string() + ": is empty: left out");
+      else parts.push_back(open(part));
     if (parts.empty()) throw io::InputError(path.string() + ": holds no bag; accepted: " + std::string(kAccepted));
-    return std::make_unique<SplitBag>(std::move(parts));
+    return std::make_unique<SplitBag>(std::move(parts), std::move(warnings));
   }
   if (beginning(path) == kSqliteMagic) return std::make_unique<SqliteBag>(path);
   return std::make_unique<McapBag>(path);

@@ -25,16 +25,16 @@ struct Range {
 
 }  // namespace
 
-void check_same_streams(const std::vector<flightlog::FlightHeader>& headers, const std::vector<std::string>& folders) {
-  for (std::size_t f = 1; f < headers.size(); ++f) {
+void check_same_streams(const std::vector<flightlog::FlightLog>& logs, const std::vector<std::string>& folders) {
+  for (std::size_t f = 1; f < logs.size(); ++f) {
     const auto check = [&](const char* file, bool first, bool here) {
       if (first != here)
-        throw io::InputError(folders[f] + "/flight.toml: has " + (here ? "" : "no ") + file + ", but " + folders[0] +
-                             " has " + (first ? "it" : "none") + "; accepted: flights with the same streams");
+        throw io::InputError(folders[f] + ": has " + (here ? "" : "no ") + file + ", but " + folders[0] + " has " +
+                             (first ? "it" : "none") + "; accepted: flights with the same streams");
     };
-    check("power.csv", headers[0].power.has_value(), headers[f].power.has_value());
-    check("wings.csv", headers[0].wings.has_value(), headers[f].wings.has_value());
-    check("imu.csv", headers[0].imu.rate_hz > 0, headers[f].imu.rate_hz > 0);
+    check("power.csv", logs[0].power.has_value(), logs[f].power.has_value());
+    check("wings.csv", logs[0].wings.has_value(), logs[f].wings.has_value());
+    check("imu.csv", logs[0].header.imu.rate_hz > 0, logs[f].header.imu.rate_hz > 0);
   }
 }
 

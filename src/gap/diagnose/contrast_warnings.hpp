@@ -9,9 +9,9 @@
 
 namespace flappy::gap {
 
-/// Throws io::InputError if the flights do not have the same streams. `headers`: of references, then of test flights;
-/// `folders`: for messages.
-void check_same_streams(const std::vector<flightlog::FlightHeader>& headers, const std::vector<std::string>& folders);
+/// Throws io::InputError if the flights do not have the same streams. `logs`: references, then test flights; `folders`:
+/// for messages.
+void check_same_streams(const std::vector<flightlog::FlightLog>& logs, const std::vector<std::string>& folders);
 
 /// One line each, with what it costs the answer: another vehicle file, other sensors, too short, other regimes.
 std::vector<std::string> contrast_warnings(const std::vector<flightlog::FlightHeader>& headers, const Flights& flights);

@@ -38,16 +38,6 @@ std::vector<int> read_channels(const std::vector<std::string>& names, bool beat_
   return list;
 }
 
-model::Vehicle read_believed_vehicle(const std::string& file) {
-  model::Vehicle vehicle = model::read_any_vehicle(file);
-  if (vehicle.beat_averaged) return vehicle;
-  vehicle = model::read_vehicle_for_steps(file, kHoldStep_s);
-  if (!vehicle.effects.empty())
-    io::Config::load(file).root().fail("effects", "a diagnosis asks what is missing in the vehicle as it was believed",
-                                       "a vehicle without effects");
-  return vehicle;
-}
-
 rollout::FlyConfig read_pilot(const std::string& manoeuvre) {
   rollout::FlyConfig pilot =
       rollout::read_fly_config(manoeuvre.empty() ? fs::path(io::config_path("fly/hover.toml")) : fs::path(manoeuvre));
@@ -59,6 +49,16 @@ rollout::FlyConfig read_pilot(const std::string& manoeuvre) {
 }
 
 }  // namespace
+
+model::Vehicle read_believed_vehicle(const std::string& file) {
+  model::Vehicle vehicle = model::read_any_vehicle(file);
+  if (vehicle.beat_averaged) return vehicle;
+  vehicle = model::read_vehicle_for_steps(file, kHoldStep_s);
+  if (!vehicle.effects.empty())
+    io::Config::load(file).root().fail("effects", "a diagnosis asks what is missing in the vehicle as it was believed",
+                                       "a vehicle without effects");
+  return vehicle;
+}
 
 std::vector<NamedFlights> sets_of(const std::vector<std::string>& reference) {
   std::vector<NamedFlights> sets;
@@ -159,7 +159,7 @@ Diagnosed diagnose_flights(const DiagnosisRequest& request, const std::vector<st
   for (const std::string& folder : folders) logs.push_back(flightlog::read_flight_log(folder));
   std::vector<flightlog::FlightHeader> headers;
   for (const flightlog::FlightLog& log : logs) headers.push_back(log.header);
-  if (references > 0) check_same_streams(headers, folders);
+  if (references > 0) check_same_streams(logs, folders);
   Diagnosed d;
   if (std::vector<flightlog::DataFault> faults = data_faults(logs, folders); !faults.empty()) {
     d.result = result_of(tests, std::move(faults));
@@ -177,6 +177,10 @@ Diagnosed diagnose_flights(const DiagnosisRequest& request, const std::vector<st
     d.flights.push_back(prediction_of(request.vehicle, folders[f], std::move(logs[f]), request.channels));
   InferenceOptions options = request.options;
   options.progress = progress;
+  const bool ground =
+      std::ranges::any_of(headers, [](const auto& h) { return h.ambient.ground_z_m > sim::World{}.ground_z_m; });
+  const bool hangs_nowhere = !ground && std::ranges::count(options.withheld, model::Tether::kInfo.id) == 0;
+  if (hangs_nowhere) options.withheld.emplace_back(model::Tether::kInfo.id);
   if (references > 0 && !reference.fit) {
     if (progress) progress(0, "fitting the reference");
     reference.fit = std::make_unique<const ReferenceFit>(reference.flights, request.uncertain, options);
@@ -185,6 +189,7 @@ Diagnosed diagnose_flights(const DiagnosisRequest& request, const std::vector<st
   d.uncertain = request.uncertain;
   d.uncertain->set_minors(d.inference.minors);
   d.result = result_of(tests, d.flights, *d.uncertain, d.inference);
+  if (hangs_nowhere) d.result.untestable.emplace_back(model::Tether::kInfo.id);
   d.result.reference = request.settings.reference;
   if (references > 0) d.result.warnings = contrast_warnings(headers, d.flights);
   if (d.inference.complete) d.corrected = corrected_vehicle(request.vehicle, d.inference, request.uncertain);
@@ -200,7 +205,7 @@ Diagnosed diagnose(const DiagnosisRequest& request,
   for (const NamedFlights& other : request.others) {
     if (!d.result.complete) break;
     d.result.sets.push_back({other.name, diagnose_flights(request, other.flights, reference, progress).result});
-    d.result.complete = d.result.complete && d.result.sets.back().diagnosis.complete;
+    if (!d.result.sets.back().diagnosis.complete) break;
   }
   return d;
 }

@@ -21,8 +21,10 @@ std::string hypotheses_table(const Diagnosis& d) {
   std::string table =
       "rank,kind,effects,group,remainder,probability,log_evidence,loss,closure,closure_low,closure_high,parameter,"
       "value,low,high,unit\n";
-  for (std::size_t i = 0; i < d.hypotheses.size(); ++i) {
-    const RankedHypothesis& h = d.hypotheses[i];
+  std::vector<RankedHypothesis> ranked = d.hypotheses;
+  std::ranges::stable_sort(ranked, std::greater{}, &RankedHypothesis::probability);
+  for (std::size_t i = 0; i < ranked.size(); ++i) {
+    const RankedHypothesis& h = ranked[i];
     const std::string closure =
         h.closure ? digits(h.closure->value) + "," + digits(h.closure->low) + "," + digits(h.closure->high) : ",,";
     const std::string first = std::to_string(i + 1) + "," + name_of(h.kind) + "," + io::joined(h.effects, "+") + "," +

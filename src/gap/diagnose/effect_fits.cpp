@@ -63,10 +63,8 @@ ScaledEvidence weigh_freely(const RobotFit& robot, const Hypothesis& hypothesis,
 /// Evidence of a fitted hypothesis with the half-normal priors of its one-sided magnitudes.
 double explained_by(const Hypothesis& h, const Fit& fit, const Posterior& p) {
   const Eigen::MatrixXd& axes = fit.directions.axes;
-  const Index n = axes.cols();
-  return p.log_evidence +
-         one_sided(h, fit.at + axes * p.mean.head(n), axes * p.covariance.topLeftCorner(n, n) * axes.transpose())
-             .log_factor;
+  const Posterior own = Fitter::of_directions(fit, p);
+  return p.log_evidence + one_sided(h, fit.at + axes * own.mean, axes * own.covariance * axes.transpose()).log_factor;
 }
 
 /// The function of the place along which the law of an effect deviates most from the catalogue's.
@@ -122,7 +120,7 @@ Baselines weigh_baselines(const RobotFit& robot, const VerdictRule& rule) {
 
 ScreenedCatalogue screen_catalogue(const RobotFit& robot, const InferenceOptions& options) {
   ScreenedCatalogue c;
-  if (robot.evidence().policy().validate) c.untestable = untestable(robot, options.withheld);
+  c.untestable = untestable(robot, options.withheld);
   for (ScreenedEffect& s : screen(robot.fitter(), robot.parameters(), robot.magnitudes())) {
     if (std::ranges::count(c.untestable, s.effect)) continue;
     const bool finalist = static_cast<int>(c.finalists.size()) < options.max_finalists;

@@ -193,18 +193,17 @@ void keep_tests(std::size_t references, Inference& d) {
   for (ScoredHypothesis& a : d.hypotheses) keep(a.held_out);
 }
 
-/// With what effects of models gain by chance where references do not cover the regimes of the tests.
-VerdictRule rule_of(const InferenceOptions& options, const RobotFit& robot) {
-  VerdictRule rule = options.rule;
+}  // namespace
+
+VerdictRule rule_for(const RobotFit& robot, VerdictRule rule) {
   if (!robot.evidence().contrasts() || robot.evidence().basis().covers_all()) return rule;
   rule.gain.outside_by_chance_nats = rule.gain.by_chance_nats;
   rule.gain.by_chance_nats = rule.gain.uncovered_by_chance_nats;
   for (const model::CatalogueEffect& e : model::causes_of(robot.uncertain().nominal()))
-    if (!std::ranges::count(options.discrepancy.of_models, e.info.id)) rule.gain.outside.emplace_back(e.info.id);
+    if (!std::ranges::count(robot.evidence().discrepancy().of_models, e.info.id))
+      rule.gain.outside.emplace_back(e.info.id);
   return rule;
 }
-
-}  // namespace
 
 ReferenceFit::ReferenceFit(const Flights& flights, const sim::Randomisation& uncertain, const InferenceOptions& options)
     : fit(RobotFit::of_references(flights, uncertain, options.discrepancy, options.withheld, options.threads)),
@@ -227,7 +226,7 @@ Inference infer(const Flights& flights, const sim::Randomisation& uncertain, Inf
   const RobotFit robot = reference != nullptr
                              ? RobotFit(reference->fit, flights)
                              : RobotFit(flights, uncertain, options.discrepancy, options.withheld, threads);
-  const VerdictRule& rule = options.rule = rule_of(options, robot);
+  const VerdictRule& rule = options.rule = rule_for(robot, options.rule);
   const Baselines baselines = weigh_baselines(robot, rule);
 
   progress(0.3, "screening effects");

@@ -57,7 +57,7 @@ struct ResidualLoad {
   std::map<std::string, double> limits;  ///< largest flown velocity or rate, by name of the load's limit
   /// Mean losses in held-out flights of the corrected vehicle without the load and with it; none: a single flight.
   std::optional<double> loss_without, loss;
-  bool helps = true;  ///< whether it predicts flights held out better; else the corrected vehicle does without it
+  bool helps = false;  ///< whether it predicts flights held out better; else the corrected vehicle does without it
 };
 
 /// Log evidence of a hypothesis that is refuted, or whose vehicle cannot be simulated.
@@ -102,6 +102,9 @@ struct ReferenceFit {
   RobotFit fit;                   ///< as RobotFit::of_references
   CorrectedParameters corrected;  ///< without effects
 };
+
+/// The rule, with what effects of models gain by chance where references do not cover the regimes of the tests.
+VerdictRule rule_for(const RobotFit& robot, VerdictRule rule);
 
 /// Runs all stages on the flights of one robot. After a stop it decides among the hypotheses fitted by then.
 /// `reference`: of the reference flights among them; null: there are none.

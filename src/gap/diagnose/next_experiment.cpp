@@ -52,11 +52,14 @@ VectorXd open_place(const Hypothesis& h, const Fit& fit, const VectorXd& paramet
 
 std::vector<Rival> rivals_of(const Inference& d, const sim::Randomisation& uncertain, const NextOptions& options) {
   const bool contrast = !options.references.empty();
+  sim::Randomisation as_filed = uncertain;
+  as_filed.set_minors(std::vector<double>(uncertain.minors().size(), 0));
   std::vector<Rival> rivals;
   for (const ScoredHypothesis& a : d.hypotheses) {
     if (a.probability < options.least_probability) break;
     if (a.kind == HypothesisKind::unknown || a.has_remainder()) continue;
-    const Hypothesis h(uncertain, a.effects);
+    const bool file = a.kind == HypothesisKind::none && !contrast;
+    const Hypothesis h(file ? as_filed : uncertain, a.effects);
     if (a.kind == HypothesisKind::none || (contrast && a.kind == HypothesisKind::parameters)) {
       const VectorXd at = contrast ? d.parameters.at : h.start();
       rivals.push_back({name_of(a), a.probability, h, at, {MatrixXd(h.size(), 0), VectorXd(0)}, MatrixXd(0, 0), false});

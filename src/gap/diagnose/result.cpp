@@ -76,6 +76,7 @@ std::vector<Suspect> suspects_of(const std::vector<RankedHypothesis>& hypotheses
       if (h.effects.size() == 1 && !h.remainder) at->closure = h.closure;
     }
   }
+  if (!(any > 0)) return {};  // all effects are refuted
   std::ranges::stable_sort(all, std::greater{}, &Suspect::probability);
   all.resize(std::min(all.size(), kSuspects));
   for (Suspect& s : all) s.probability /= any;

@@ -150,7 +150,9 @@ std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::strin
     return lines;
   }
   for (const NamedDiagnosis& s : diagnosis.sets)
-    lines.push_back(s.name + ": " + verdict_line(s.diagnosis.verdict, true));
+    lines.push_back(
+        s.name + ": " +
+        (s.diagnosis.complete ? verdict_line(s.diagnosis.verdict, true) : "stopped before every effect was weighed"));
   for (const std::string& warning : diagnosis.warnings) lines.push_back("warning: " + warning);
   std::vector<const RankedHypothesis*> ranked;
   for (const RankedHypothesis& c : diagnosis.hypotheses) ranked.push_back(&c);

@@ -28,7 +28,10 @@ void refute(const Evidence& evidence, const Flights& flights, double min_share, 
   if (!(explainable > kMinExplainable * refit)) return;
   for (ScoredHypothesis& a : d.hypotheses) {
     if (a.kind == HypothesisKind::unknown) continue;
-    const double share = a.fitted() ? (refit - mean_square(evidence, flights, a.held_out)) / explainable : 0;
+    const double left = a.kind == HypothesisKind::none ? mean_square(evidence, flights, d.nominal)
+                        : a.fitted()                   ? mean_square(evidence, flights, a.held_out)
+                                                       : refit;
+    const double share = (refit - left) / explainable;
     if (share < min_share) a.log_evidence = kRefuted;
   }
 }

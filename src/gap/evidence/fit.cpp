@@ -30,6 +30,14 @@ constexpr double kFollows = 0.1;
 constexpr int kMaxEffectSteps = 2;
 constexpr int kMaxEffectRefits = 6;
 
+/// Directions of a fit with a column.
+std::vector<Index> seen_directions(const Fit& fit) {
+  std::vector<Index> seen;
+  for (std::size_t d = 0; d < fit.columns.size(); ++d)
+    if (fit.columns[d].size() > 0) seen.push_back(static_cast<Index>(d));
+  return seen;
+}
+
 }  // namespace
 
 Directions Fitter::axes(const Hypothesis& hypothesis) {
@@ -351,15 +359,17 @@ Reduced Fitter::reduce(const Fit& fit, const Regressors& r) const {
 
 /// `damping`: precision added around the present point (Levenberg); if not 0, without a covariance.
 Posterior Fitter::solve(const Fit& fit, const Regressors& r, Reduced reduced, double damping) const {
-  std::vector<Index> seen;
-  for (std::size_t d = 0; d < fit.columns.size(); ++d)
-    if (fit.columns[d].size() > 0) seen.push_back(static_cast<Index>(d));
-  const auto own = static_cast<Index>(seen.size()), k = static_cast<Index>(fit.columns.size());
+  const auto own = static_cast<Index>(seen_directions(fit).size());
   reduced.sums.diagonal().head(own).array() += damping;
-  const Posterior p = Evidence::posterior(reduced, r.all, r.prior_mean(), damping == 0);
+  return of_directions(fit, Evidence::posterior(reduced, r.all, r.prior_mean(), damping == 0));
+}
+
+Posterior Fitter::of_directions(const Fit& fit, const Posterior& p) {
+  const std::vector<Index> seen = seen_directions(fit);
+  const auto own = static_cast<Index>(seen.size()), k = static_cast<Index>(fit.columns.size());
   Posterior all{p.log_evidence, VectorXd::Zero(k), MatrixXd::Identity(k, k)};
   all.mean(seen) = p.mean.head(own);
-  if (damping == 0) all.covariance(seen, seen) = p.covariance.topLeftCorner(own, own);
+  if (p.covariance.size() > 0) all.covariance(seen, seen) = p.covariance.topLeftCorner(own, own);
   return all;
 }
 

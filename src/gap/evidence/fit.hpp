@@ -84,6 +84,9 @@ class Fitter {
 
   /// The columns of a fit, without empty ones.
   static Regressors own_regressors(const Fit& fit);
+  /// The part of a posterior of own_regressors() and others that is of the fit's directions; those without a column keep
+  /// their prior.
+  static Posterior of_directions(const Fit& fit, const Posterior& posterior);
   /// The columns of a fit, then nuisances and background magnitudes with the robot's scales. A named effect keeps its
   /// background, as the model may have errors along it.
   Regressors regressors(const Fit& fit) const;

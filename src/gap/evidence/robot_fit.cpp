@@ -1,6 +1,7 @@
 #include "gap/evidence/robot_fit.hpp"
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <string_view>
 
@@ -26,6 +27,8 @@ constexpr double kMinGain_nats = 2;
 constexpr double kLawFactorSd = 1, kMaxLawFactor = 32;
 
 constexpr const char* kDelay = "delay_s";
+constexpr const char* kDiverges =
+    "the vehicle: its simulation of these flights diverges; accepted: a vehicle that flies what was flown";
 
 /// Whether an effect has a magnitude for each wing, and no other.
 bool of_sides(const model::CatalogueEffect& effect) {
@@ -121,6 +124,7 @@ std::vector<Background> RobotFit::all_backgrounds(const ModelDiscrepancy& discre
 void RobotFit::linearise_around(const Fit& parameters) {
   const Directions none{MatrixXd(no_effects_.size(), 0), VectorXd(0)};
   nominal_ = fitter_.linearise(no_effects_, no_effects_.start(), none);
+  if (nominal_.residual.empty()) throw io::InputError(kDiverges);
   const Residuals residual = fitter_.linearise(no_effects_, parameters.at, none).residual;
   take_evidence(evidence().with_weights(residual));
   take_evidence(evidence().with_noise(residual));
@@ -155,6 +159,7 @@ std::vector<Background> RobotFit::session_changes(const SessionVariation& sessio
 void RobotFit::fit_parameters() {
   const Directions none{MatrixXd(no_effects_.size(), 0), VectorXd(0)};
   nominal_ = fitter_.linearise(no_effects_, no_effects_.start(), none);
+  if (nominal_.residual.empty()) throw io::InputError(kDiverges);
   take_evidence(evidence().with_weights(nominal_.residual));
   parameters_ = fitter_.fit(no_effects_, no_effects_.start(), kFirstIterations);
   take_evidence(evidence().with_noise(parameters_.residual));
@@ -219,8 +224,11 @@ bool RobotFit::refit_with_minors() {
   take(there, parameters_);
   // new columns: with those of another point a fit may stop a hundred nats below a better point nearby
   parameters_ = fitter_.fit(no_effects_, parameters_.mean(), kRefitIterations);
-  take_scales();
-  const double gain = log_evidence() - before;
+  double gain = -std::numeric_limits<double>::infinity();
+  if (parameters_.flown()) {
+    take_scales();
+    gain = log_evidence() - before;
+  }
   if (gain < -kMinGain_nats) {
     take(minors, parameters);
     take_scales();

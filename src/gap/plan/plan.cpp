@@ -95,7 +95,7 @@ class Planner {
     const model::Vehicle any = model::read_any_vehicle(path);
     if (any.beat_averaged || any.jointed)
       throw io::InputError(path + ": has no wings that motors drive; accepted: a vehicle with wings and motors");
-    return model::read_vehicle_for_steps(path, kHoldStep_s);
+    return read_believed_vehicle(path);
   }
   const Manoeuvre* find(const std::string& name) const {
     const auto at = std::ranges::find(manoeuvres_, name, &Manoeuvre::name);
@@ -189,8 +189,8 @@ class Planner {
     ModelDiscrepancy discrepancy = discrepancy_;
     if (session.reference)
       discrepancy.session = read_session_variation(file(settings_.sessions, "gap/session_variation.toml"));
-    const VerdictRule rule = rule_of(session);
     const RobotFit robot = RobotFit::planned(flights, uncertain_, discrepancy, threads_);
+    const VerdictRule rule = rule_for(robot, rule_of(session));
     return separation_of(flights, robot, asked_, rule, threads_, sure);
   }
 

@@ -144,16 +144,18 @@ class Separator {
       if (gains[t]) factors[t] = 1, steps[t] = sure(t, *gains[t]) ? 0.5 : 2;
     for (int k = 0; k < kDoublings && std::ranges::any_of(factors, [](double f) { return f > 0; }); ++k) {
       for (std::size_t t = 0; t < n; ++t) {
-        factors[t] *= steps[t];
-        if (asked_[t].times * factors[t] > largest_factor(*asked_[t].effect)) factors[t] = 0;
+        const double before = std::exchange(factors[t], factors[t] * steps[t]);
+        const double most = largest_factor(*asked_[t].effect) / asked_[t].times;
+        if (factors[t] > most) factors[t] = before < most ? most : 0;
+        steps[t] = factors[t] / before;
       }
       const std::vector<std::optional<VectorXd>> next = gains_at(factors);
       for (std::size_t t = 0; t < n; ++t) {
         if (factors[t] == 0) continue;
         const bool reached = next[t] && sure(t, *next[t]) == (steps[t] > 1);
         if (reached)
-          found[t] = steps[t] > 1 ? between(t, 0.5 * factors[t], *gains[t], factors[t], *next[t])
-                                  : between(t, factors[t], *next[t], 2 * factors[t], *gains[t]);
+          found[t] = steps[t] > 1 ? between(t, factors[t] / steps[t], *gains[t], factors[t], *next[t])
+                                  : between(t, factors[t], *next[t], factors[t] / steps[t], *gains[t]);
         if (reached || !next[t]) factors[t] = 0;
         gains[t] = next[t];
       }

@@ -159,15 +159,24 @@ Json to_json(const Validation& v) {
 
 Validation validation_of(const Json& json) {
   Validation v;
-  for (const Json& r : json.at("ladder")) {
+  const auto require = [](bool has, const char* what, const Json& where) {
+    if (!has) throw Json::other_error::create(500, what, &where);
+  };
+  const Json& ladder = json.at("ladder");
+  require(!ladder.empty(), "\"ladder\" of validation is empty", ladder);
+  for (const Json& r : ladder) {
+    for (const auto& [channel, e] : ladder.front().at("held_out").items())
+      require(r.at("held_out").contains(channel), "\"held_out\" of a rung lacks a channel of the first", r);
     v.ladder.push_back({r.at("added"), {}});
     for (const auto& [channel, e] : r.at("held_out").items())
       v.ladder.back().errors.push_back({channel, e.at("rms"), e.at("low"), e.at("high"), e.at("by_type")});
   }
   for (const Json& c : json.at("controls"))
     v.controls.push_back({c.at("effect"), c.at("channel"), c.at("gain"), c.at("best_of_shifted")});
-  for (const Json& a : json.at("agreements"))
+  for (const Json& a : json.at("agreements")) {
+    require(!a.at("value").empty(), "\"value\" of an agreement is empty", a);
     v.agreements.push_back({a.at("name"), a.at("value"), a.at("sd"), number_of(a.at("p_value"))});
+  }
   return v;
 }
 

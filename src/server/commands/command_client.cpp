@@ -57,11 +57,11 @@ CommandClient::CommandClient(const io::DdsConfig& config, double timeout_s)
       command_(participant_, topic_name(config.name_space, 0, "command"), kAnswers),
       results_(participant_, topic_name(config.name_space, 0, "command_result"), kAnswers),
       jobs_(participant_, topic_name(config.name_space, 0, "jobs"), kAnswers),
-      files_(participant_, topic_name(config.name_space, 0, "files"), kPieces),
+      files_topic_(topic_name(config.name_space, 0, "files")),
       waiting_(participant_) {
-  for (const Entity* reader : {&results_.entity(), &jobs_.entity(), &files_.entity()}) waiting_.add(*reader);
+  for (const Entity* reader : {&results_.entity(), &jobs_.entity()}) waiting_.add(*reader);
   const double until_s = io::steady_seconds() + timeout_s_;
-  while (command_.readers() == 0 || results_.writers() == 0 || jobs_.writers() == 0 || files_.writers() == 0) {
+  while (command_.readers() == 0 || results_.writers() == 0 || jobs_.writers() == 0) {
     if (io::steady_seconds() > until_s)
       throw io::InputError(jobs_.writers() > 0 ? "the server takes no commands; accepted: one with dds.commands = true"
                                                : "no server within " + io::shortest_digits(timeout_s_) +
@@ -74,6 +74,15 @@ void CommandClient::take_jobs() {
   jobs_.take([&](const JobStatusMessage& m, const dds_sample_info_t&) { heard_.push_back(status_of(m)); });
 }
 
+void CommandClient::take_pieces(const std::string& id) {
+  if (!files_) return;
+  files_->take([&](const FileChunk& m, const dds_sample_info_t&) {
+    if (m.id != id) return;
+    pieces_.push_back(
+        {m.name, {reinterpret_cast<const char*>(m.data._buffer), m.data._length}, m.size, m.offset, m.left});
+  });
+}
+
 CommandResult CommandClient::await(const std::string& id) {
   std::optional<CommandResult> result;
   for (const double until_s = io::steady_seconds() + timeout_s_; !result;) {
@@ -82,6 +91,7 @@ CommandResult CommandClient::await(const std::string& id) {
       if (m.id == id) result = {m.id, m.accepted, m.job, m.message};
     });
     take_jobs();
+    take_pieces(id);
     if (!result && io::steady_seconds() > until_s)
       throw io::InputError("the server does not answer within " + io::shortest_digits(timeout_s_) + " s");
   }
@@ -133,6 +143,7 @@ void CommandClient::watch(const std::function<bool(const JobStatus& job)>& see,
                           const std::function<bool()>& keep_going) {
   while (keep_going()) {
     waiting_.wait(kLook);
+    results_.take([](const CommandResultMessage&, const dds_sample_info_t&) {});  // of other clients
     take_jobs();
     for (const JobStatus& job : std::exchange(heard_, {}))
       if (!see(job)) return;
@@ -141,7 +152,16 @@ void CommandClient::watch(const std::function<bool(const JobStatus& job)>& see,
 
 std::size_t CommandClient::fetch(std::uint64_t job, const fs::path& folder,
                                  const std::function<void(const JobFile&)>& see) {
-  const auto ask_for = [&](const std::string& name, const std::function<void(const FileChunk&)>& piece) {
+  if (!files_) {
+    files_.emplace(participant_, files_topic_, kPieces);
+    waiting_.add(files_->entity());
+    for (const double until_s = io::steady_seconds() + timeout_s_; files_->writers() == 0;) {
+      if (io::steady_seconds() > until_s) throw io::InputError("the server sends no files");
+      io::sleep_until(io::steady_seconds() + 0.005);
+    }
+  }
+  const auto ask_for = [&](const std::string& name, const std::function<void(const Piece&)>& see_piece) {
+    pieces_.clear();
     Command command{
         .id = fresh_id(), .client = {}, .verb = "fetch", .kind = {}, .config = name, .job = job, .overrides = {}};
     CommandResult r = ask(command);
@@ -153,12 +173,11 @@ std::size_t CommandClient::fetch(std::uint64_t job, const fs::path& folder,
     if (!r.accepted) throw io::InputError(r.message);
     bool over = r.message == "0 files";
     for (double heard_s = io::steady_seconds(); !over;) {
-      files_.take([&](const FileChunk& m, const dds_sample_info_t&) {
-        if (m.id != command.id) return;
+      for (take_pieces(command.id); !pieces_.empty(); pieces_.pop_front()) {
         heard_s = io::steady_seconds();
-        piece(m);
-        over = m.left == 0;
-      });
+        see_piece(pieces_.front());
+        over = pieces_.front().left == 0;
+      }
       if (over) break;
       if (io::steady_seconds() - heard_s > timeout_s_)
         throw io::InputError((name.empty() ? "the list of files" : name) + ": does not come within " +
@@ -168,7 +187,7 @@ std::size_t CommandClient::fetch(std::uint64_t job, const fs::path& folder,
   };
   std::vector<JobFile> files;
   std::optional<std::uint32_t> left;
-  ask_for("", [&](const FileChunk& m) {
+  ask_for("", [&](const Piece& m) {
     if (left && m.left + 1 != *left) throw io::InputError("the list of files: a part is missing");
     left = m.left;
     files.push_back({m.name, m.size});
@@ -179,10 +198,10 @@ std::size_t CommandClient::fetch(std::uint64_t job, const fs::path& folder,
     io::make_folder(path.parent_path());
     io::AtomicFile to(path);
     std::uint64_t got = 0, size = 0;
-    ask_for(file.name, [&](const FileChunk& m) {
+    ask_for(file.name, [&](const Piece& m) {
       if (m.offset != got) throw io::InputError(file.name + ": a piece is missing");
-      to.write({reinterpret_cast<const char*>(m.data._buffer), m.data._length});
-      got += m.data._length;
+      to.write(m.data);
+      got += m.data.size();
       size = m.size;
     });
     if (got != size) throw io::InputError(file.name + ": changed while it was fetched; accepted: the same once more");

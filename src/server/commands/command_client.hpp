@@ -1,7 +1,9 @@
 // Sends commands to flappy-server over DDS (command_server.hpp).
 #pragma once
 
+#include <deque>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,15 +27,26 @@ class CommandClient {
                     const std::function<void(const JobFile&)>& see);
 
  private:
+  /// A FileChunk that has been received.
+  struct Piece {
+    std::string name, data;
+    std::uint64_t size = 0, offset = 0;
+    std::uint32_t left = 0;
+  };
   CommandResult await(const std::string& id);
   void take_jobs();
+  /// Keeps the pieces that answer command `id`. Others, which another client has asked for, are dropped, for a reader that
+  /// is full holds up the server.
+  void take_pieces(const std::string& id);
 
   double timeout_s_;
   Participant participant_;
   Writer<CommandMessage> command_;
   Reader<CommandResultMessage> results_;
   Reader<JobStatusMessage> jobs_;
-  Reader<FileChunk> files_;
+  std::string files_topic_;
+  std::optional<Reader<FileChunk>> files_;  // from the first fetch on
+  std::deque<Piece> pieces_;
   WaitSet waiting_;
   std::vector<JobStatus> heard_;  // received, not yet passed on
 };

@@ -15,6 +15,7 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kQueueLook{100};  // between updates from the queue
 constexpr std::size_t kMaxTransfers = 16;
+constexpr double kPatience_s = 10;       // with a client that takes nothing
 constexpr double kMaxOfSpeed_m_s = 100;  // at a higher speed, the two poses belong to different flights
 
 template <std::size_t kSize>
@@ -114,7 +115,7 @@ CommandResult CommandServer::fetch(const Command& command) {
       throw io::InputError("file: \"" + shown(command.config) + "\" is none of job " + std::to_string(command.job));
     if (transfers_.size() >= kMaxTransfers)
       throw io::InputError("too many files at a time; accepted: the same one later");
-    transfers_.push_back({command.id, command.job, found->bytes, 0, found->name});
+    transfers_.push_back({command.id, command.job, found->bytes, 0, found->name, io::steady_seconds()});
     r.message = found->name + ": " + std::to_string(found->bytes) + " bytes";
   } catch (const io::InputError& e) {
     r.accepted = false;
@@ -145,8 +146,10 @@ void CommandServer::send_pieces() {
     const auto size = static_cast<std::uint32_t>(data.size());
     m.data = {size, size, reinterpret_cast<std::uint8_t*>(data.data()), false};
     const bool sent = files_.write(m);
-    if (sent) t.offset += data.size();
-    if (files_.readers() > 0 && (!sent || m.left > 0)) transfers_.push_back(std::move(t));
+    const double now_s = io::steady_seconds();
+    if (sent) t.offset += data.size(), t.moved_s = now_s;
+    const bool patient = now_s - t.moved_s < kPatience_s;
+    if (files_.readers() > 0 && patient && (!sent || m.left > 0)) transfers_.push_back(std::move(t));
   }
 }
 

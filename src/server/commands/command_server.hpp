@@ -34,6 +34,7 @@ class CommandServer {
     std::string id;
     std::uint64_t job, size, offset;
     std::string name;
+    double moved_s;  ///< when it was begun, or its last piece was taken
   };
 
   void run();

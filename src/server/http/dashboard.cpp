@@ -162,6 +162,8 @@ void Dashboard::Parts::route() {
       response.set_header("Allow", "GET, HEAD");
       return refuse(405, "nothing can be changed here");
     }
+    if (request.get_header_value("Range").find(',') != std::string::npos)  // else each would be a copy in memory
+      return refuse(416, "Range: has several ranges; accepted: one");
     return httplib::Server::HandlerResponse::Unhandled;
   });
   listener.set_error_handler([](const Request&, Response& response) {

@@ -118,7 +118,8 @@ std::vector<JobFile> files_of(const fs::path& folder) {
   for (; !error && each != fs::recursive_directory_iterator() && all.size() < kMaxFiles; each.increment(error)) {
     if (each->is_symlink(error) || !each->is_regular_file(error)) continue;
     const std::uintmax_t bytes = each->file_size(error);
-    if (!error) all.push_back({each->path().lexically_relative(folder).string(), bytes});
+    const std::string name = each->path().lexically_relative(folder).string();
+    if (!error && is_name(name)) all.push_back({name, bytes});
     error.clear();  // the file was removed meanwhile: skip it
   }
   std::ranges::sort(all, {}, &JobFile::name);

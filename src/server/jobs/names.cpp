@@ -18,7 +18,10 @@ constexpr const char* kAcceptedNames =
 
 bool is_plain(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
 
+}  // namespace
+
 bool is_name(std::string_view name) {
+  if (name.size() > kMaxOfConfig) return false;
   while (true) {
     const std::string_view part = name.substr(0, name.find('/'));
     if (part.empty() || !is_plain(part.front())) return false;
@@ -27,8 +30,6 @@ bool is_name(std::string_view name) {
     name.remove_prefix(part.size() + 1);
   }
 }
-
-}  // namespace
 
 fs::path below(const fs::path& folder, const std::string& name, const std::string& what) {
   if (name.size() > kMaxOfConfig)

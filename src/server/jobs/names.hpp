@@ -4,8 +4,12 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 namespace flappy::server {
+
+/// Whether below() may accept the name: of letters, digits, "_", "-", "." and "/", and not too long.
+bool is_name(std::string_view name);
 
 /// The absolute path of `name` without symbolic links. Throws io::InputError, which begins with `what`, where `name` is
 /// malformed or nothing of that name lies below the folder.

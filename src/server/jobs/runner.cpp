@@ -1,6 +1,7 @@
 #include "server/jobs/runner.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <system_error>
@@ -21,6 +22,12 @@ namespace fs = std::filesystem;
 constexpr std::chrono::milliseconds kStep{50};
 constexpr double kReportEvery_s = 1, kFirstDelay_s = 5, kLongestDelay_s = 600;
 constexpr int kUsersMistake = 2, kGoesOn = 75;  // exit codes of our programs
+
+/// Whether the message of a program is that a file could not be written for want of space.
+bool is_disk_full(const std::string& message) {
+  return message.ends_with(std::generic_category().message(ENOSPC)) ||
+         message.ends_with(std::generic_category().message(EDQUOT));
+}
 
 void note(const Job& job, const std::string& what) {
   io::log(io::LogLevel::info,
@@ -90,9 +97,14 @@ void Runner::look_after(const Job& job) {
     else ask_to_stop(queue_.job(job.id));
   }
   if (life != Life::gone) return;
-  const Ending ending = ending_of(job);
-  queue_.end(job.id, ending);
-  note(job, std::string(name_of(ending.state)) + (ending.message.empty() ? "" : ": ") + ending.message);
+  const std::optional<Exit> exit = exit_of(folder_of(job), job.attempts);
+  if (job.wanted == Wanted::run && exit && exit->code == kUsersMistake && is_disk_full(exit->message)) {
+    put_off(job, exit->message);
+  } else {
+    const Ending ending = ending_of(job);
+    queue_.end(job.id, ending);
+    note(job, std::string(name_of(ending.state)) + (ending.message.empty() ? "" : ": ") + ending.message);
+  }
   started_here_.erase(job.id);
   requests_.erase(job.id);
   reported_s_.erase(job.id);
@@ -135,10 +147,10 @@ Ending Runner::ending_of(const Job& job) const {
   const bool failed = exit && (exit->signal != 0 || exit->code != 0);
   const std::optional<int> code = exit && exit->signal == 0 ? std::optional(exit->code) : std::nullopt;
   if (!failed && is_complete(kind, folder, job.wanted != Wanted::run)) return {State::done, code, ""};
-  if (code == kUsersMistake) return {State::failed, code, exit->message};
   if (job.wanted == Wanted::cancel) return {State::cancelled, code, "cancelled"};
   if (job.wanted == Wanted::pause) return {State::paused, code, "paused"};
   if (job.wanted == Wanted::stop) return {State::queued, code, "stopped with the server"};
+  if (code == kUsersMistake) return {State::failed, code, exit->message};
   if (!exit) {
     const std::optional<Process> supervisor = began(folder, job.attempts);
     if (!supervisor && !started_here_.contains(job.id))

@@ -2,6 +2,7 @@
 
 #include <dds/ddsi/ddsi_serdata.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <optional>
@@ -10,6 +11,7 @@
 #include "flightlog/ros/mcap.hpp"
 #include "flightlog/ros/messages.hpp"
 #include "flightlog/ros/type_hash.hpp"
+#include "io/log.hpp"
 #include "io/progress.hpp"
 #include "server/dds/participant.hpp"
 
@@ -80,7 +82,12 @@ class Recording {
       const auto& w = *static_cast<const dds_builtintopic_endpoint_t*>(sample);
       const std::string topic = w.topic_name, type = w.type_name;
       if (!topic.starts_with("rt/") || wanted_.erase(topic.substr(2)) == 0) return;
-      add(topic.substr(2), type);
+      try {
+        add(topic.substr(2), type);
+      } catch (const io::InputError& e) {  // what is being recorded is worth more than what came late
+        if (std::ranges::all_of(recorded_.messages, [](const auto& m) { return m.second == 0; })) throw;
+        io::log(io::LogLevel::warning, std::string(e.what()) + "; it is left out");
+      }
     });
   }
 

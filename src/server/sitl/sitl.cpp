@@ -263,6 +263,10 @@ SitlResult fly_sitl(const rollout::FlyConfig& config, const SitlOptions& options
     throw io::InputError("task " + io::toml_string(task.name) +
                          " sets the motors' voltages, but an autopilot sends inputs of the wing beat; accepted: a task "
                          "whose action is of kind \"wing_beat\"");
+  if (config.excitation.acts())
+    throw io::InputError(
+        "[[excitation]] and [constant_input] would not be flown, because the autopilot sends the inputs; accepted: a "
+        "configuration without");
   return config.precision == "float" ? Flight<float>(config, options).fly() : Flight<double>(config, options).fly();
 }
 

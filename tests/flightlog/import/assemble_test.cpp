@@ -647,18 +647,31 @@ TEST(Import, ReportsInLines) {
 }
 
 /// One table of a robot that is known by its inputs, as its logger wrote it: it stands, flies from 0.10 s to 0.30 s, and stands.
-std::string table_of_inputs() {
+std::string table_of_inputs(int rows = 40) {
   std::string text =
       "timeTick, roll, pitch, yaw, accX, accY, accZ, m1, m2, m3, m4, thrust, vbat, otX0, otY0, otZ0, otRoll0, "
       "otPitch0, "
       "otYaw0\n";
-  for (int i = 0; i < 40; ++i) {
+  for (int i = 0; i < rows; ++i) {
     const bool flies = i >= 10 && i <= 30;
     const std::string lost = i == 20 ? "nan" : "0.5";
     text += std::to_string(5000 + 10 * i) + ", 0, 90, 0, 0, 0, 1, 65535, 0, 0, 6553.5, " + (flies ? "9" : "0") +
             ", 8, " + lost + ", " + std::to_string(i) + ", 1, 0, 0, 90\n";
   }
   return text;
+}
+
+TEST(Import, LeavesOutAnAngleOfFlippedBits) {
+  const io::TemporaryFolder folder;
+  std::string text = table_of_inputs(200);
+  text.replace(text.find("5200, 0, 90"), 11, "5200, 0, 1e9");
+  std::ofstream(folder / "flight.csv") << text;
+  const Mapping mapping = mapping_of("flapper_nimble.toml", {});
+  Channels channels(mapping.wanted());
+  Lines warnings;
+  read_source(folder / "flight.csv", channels, warnings);
+  const Imported out = assemble(channels, mapping);
+  EXPECT_EQ(out.log.attitude->t_s.size(), 20u);
 }
 
 TEST(Import, MakesALogOfInputs) {

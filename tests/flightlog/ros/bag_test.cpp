@@ -115,8 +115,9 @@ TEST(Bag, ReadsAFolderInTheOrderOfItsParts) {
     writer.finish();
   }
   std::ofstream(folder / "metadata.yaml") << "rosbag2_bagfile_information:\n";
-  EXPECT_EQ(read(folder.path()),
-            (Lines{"/a p/msg/A int8 x\n0 1", "/a p/msg/A int8 x\n2 1", "/a p/msg/A int8 x\n10 1"}));
+  std::ofstream(folder / "bag_11.mcap");  // of a recorder that was killed
+  EXPECT_EQ(read(folder.path()), (Lines{"/a p/msg/A int8 x\n0 1", "/a p/msg/A int8 x\n2 1", "/a p/msg/A int8 x\n10 1",
+                                        (folder / "bag_11.mcap").string() + ": is empty: left out"}));
 }
 
 TEST(Bag, KnowsTheLayoutByTheBagOrByItself) {

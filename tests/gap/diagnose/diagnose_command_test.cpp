@@ -70,6 +70,23 @@ TEST(RunDiagnose, ReadsNoTruth) {
   EXPECT_FALSE(std::filesystem::exists(folder / "out/vehicle_corrected.toml")) << "of a diagnosis that was stopped";
 }
 
+// A robot like its file, whose logs declare no ground: a tether would hang a kilometre down.
+TEST(RunDiagnose, HasNoTetherWithoutGround) {
+  const flight::Folder folder;
+  rollout::fly(rollout::read_fly_config(kConfigs + "fly/flapper_nimble.toml", {"flight.duration_s=8"}),
+               {.count = 2, .log_folder = folder / "flights"});
+  DiagnoseCommand command;
+  command.settings.vehicle = kConfigs + "vehicles/flapper_nimble.toml";
+  command.settings.flights = {folder / "flights/0000", folder / "flights/0001"};
+  command.out = folder / "out";
+  run_diagnose(command);
+  const Diagnosis written =
+      diagnosis_from(nlohmann::ordered_json::parse(io::read_text(folder / "out/diagnosis.json")), "diagnosis.json");
+  EXPECT_EQ(written.verdict.kind, VerdictKind::none);
+  EXPECT_EQ(std::ranges::count(written.untestable, "tether"), 1);
+  for (const RankedHypothesis& h : written.hypotheses) EXPECT_EQ(std::ranges::count(h.effects, "tether"), 0);
+}
+
 // Where `run_diagnose` complains before it reads a flight; of the vehicle with the place in its file.
 TEST(RunDiagnose, RefusesWhatItCannotAnswer) {
   const flight::Folder folder;

@@ -147,6 +147,7 @@ TEST_F(RunMcap, RatesAddUpToTheTurningOfBeats) {
 TEST_F(RunMcap, KnowsThatTheEffectCameAfterTheReference) {
   diagnosis_.reference = diagnosis_.flights;
   diagnosis_.flights.clear();
+  diagnosis_.verdict = {VerdictKind::effect, {"body_drag"}, false, 0.9};
   write();
   const nlohmann::ordered_json rms = run_mcap(command_)["rms"]["force_x"];
   EXPECT_EQ(rms["declared"], rms["corrected"]);

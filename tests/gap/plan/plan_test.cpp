@@ -127,6 +127,10 @@ TEST(Plan, RefusesWhatCannotBeFlown) {
             kTestConfigs +
                 "vehicles/flapper_nimble.toml: has no wings that motors drive; accepted: a vehicle with wings "
                 "and motors");
+  const std::string windy = testing::TempDir() + "windy.toml";
+  io::write_atomically(windy, io::read_text(kVehicle) + "[effects.wind]\nx_m_s = 1.0\n");
+  EXPECT_TRUE(
+      with_change([&](PlanSettings& o) { o.vehicle = windy; }).ends_with("accepted: a vehicle without effects"));
   EXPECT_TRUE(with_change([](PlanSettings& o) { o.manoeuvre = "tuor"; }).ends_with("; did you mean \"tour\"?"));
   EXPECT_TRUE(with_change([](PlanSettings& o) { o.magnitudes = {{"wnd", 1}}; }).ends_with("did you mean \"wind\"?"));
   for (const double times : {0.0, 17.0})

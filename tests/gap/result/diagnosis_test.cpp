@@ -127,6 +127,12 @@ TEST(DiagnosisJson, RefusesWhatIsNone) {
   json = to_json(whole());
   json["locations"][0]["regime"]["third"] = "upper";
   EXPECT_NE(refusal(json).find("unknown third \"upper\""), std::string::npos) << refusal(json);
+  json = to_json(whole());
+  json["validation"]["ladder"] = nlohmann::ordered_json::array();
+  EXPECT_NE(refusal(json).find("\"ladder\" of validation is empty"), std::string::npos) << refusal(json);
+  json = to_json(whole());
+  json["validation"]["agreements"][0]["value"] = nlohmann::ordered_json::array();
+  EXPECT_NE(refusal(json).find("\"value\" of an agreement is empty"), std::string::npos) << refusal(json);
 }
 
 TEST(Diagnosis, ListsTheLargestDiscoveries) {

@@ -95,6 +95,26 @@ TEST(CommandServer, HandsOverFiles) {
             std::string::npos);
 }
 
+// More than the server may have under way, so that a reader which takes nothing would hold it up.
+TEST(CommandServer, HandsOverLargeFilesToTwoBesideAnIdleClient) {
+  Served served;
+  CommandClient idle(served.dds, 5), client(served.dds, 5), other(served.dds, 5);
+  client.ask(Served::submit("a"));
+  const auto folder = served.place.folder(1);
+  std::filesystem::create_directories(folder);
+  const std::string large(100 * kMaxOfChunk, 'x');
+  io::write_atomically(folder / "large.bin", large);
+  io::write_atomically(folder / ".hidden", "x");
+  const auto fetch = [&](CommandClient& by, const char* to) {
+    EXPECT_EQ(refusal([&] { EXPECT_EQ(by.fetch(1, served.place.root / to, [](const JobFile&) {}), 1U); }), "accepted");
+  };
+  std::thread second([&] { fetch(other, "second"); });
+  fetch(client, "first");
+  second.join();
+  for (const char* to : {"first", "second"})
+    EXPECT_EQ(io::read_text(served.place.root / to / "large.bin"), large) << to;
+}
+
 TEST(CommandServer, RefusesAFloodPolitely) {
   io::DdsConfig dds = with_commands();
   Place place;

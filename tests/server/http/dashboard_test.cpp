@@ -140,6 +140,8 @@ TEST_F(Page, AnswersToItsOwnNamesAlone) {
                            "localhost:x", "[::1"})
     EXPECT_EQ(get("/api/jobs", host)->status, 421) << host;
   EXPECT_EQ(raw("GET / HTTP/1.1\r\n\r\n"), "HTTP/1.1 421 Misdirected Request");
+  EXPECT_EQ(raw("GET / HTTP/1.1\r\nHost: localhost\r\nRange: bytes=0-,0-\r\n\r\n"),
+            "HTTP/1.1 416 Range Not Satisfiable");
   EXPECT_EQ(raw("GET / HTTP/1.1\r\nHost: localhost\r\nHost: evil.example\r\n\r\n"), "HTTP/1.1 421 Misdirected Request");
 }
 
