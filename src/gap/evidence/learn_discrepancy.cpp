@@ -5,8 +5,10 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "io/files.hpp"
+#include "io/log.hpp"
 #include "io/progress.hpp"
 #include "io/statistics.hpp"
 #include "io/text.hpp"
@@ -323,7 +325,12 @@ SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim
     for (const auto& f : p.flights) f->forget();
   }
   heed();
+  const auto asked = std::ranges::count_if(pairs, [](const SessionPair& p) { return !p.effect.empty(); });
+  const std::string few = io::format("--pairs: %zu of %td pairs with an effect tell of its law; accepted: at least %zu",
+                                     errors.size(), asked, kMinLaws);
   if (errors.size() >= kMinLaws) take(errors, now.session);
+  else if (std::cmp_equal(asked, pairs.size())) throw io::InputError(few);
+  else if (asked > 0) io::log(io::LogLevel::warning, few + ", so law_error stays as it was");
   return now.session;
 }
 
