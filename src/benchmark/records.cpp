@@ -179,12 +179,8 @@ Label label_from(const Json& json) {
 Json to_json(const Prediction& p) {
   Json baselines = Json::object();
   for (const auto& [name, b] : p.baselines) baselines[name] = {{"named", b.named}, {"ranking", b.ranking}};
-  return {{"diagnosis", to_json(p.diagnosis)},
-          {"baselines", baselines},
-          {"features", p.features},
-          {"corrected", p.corrected},
-          {"with_residual", p.with_residual},
-          {"crashed", p.crashed}};
+  return {{"diagnosis", to_json(p.diagnosis)}, {"baselines", baselines},           {"features", p.features},
+          {"corrected", p.corrected},          {"with_residual", p.with_residual}, {"crashed", p.crashed}};
 }
 
 Prediction read_prediction(const std::filesystem::path& file) {
