@@ -57,7 +57,7 @@ DdsConfig read_dds_config(const Table& root) {
   c.pace = t.number_or("pace", c.pace, {0, 1000});
   c.commands = t.boolean_or("commands", false);
   c.insecure = t.boolean_or("insecure", false);
-  constexpr int kLastSecure = 230;  // of Cyclone DDS
+  constexpr int kLastSecure = 230;  // Cyclone DDS accepts no higher domain in a governance file
   if (t.has("keys")) c.keys = t.file("keys");
   if (!c.keys.empty() && c.domain > kLastSecure)
     t.fail("domain", std::to_string(c.domain) + " takes no keys", "with keys, a domain of at most 230");

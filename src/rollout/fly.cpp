@@ -141,7 +141,7 @@ FlyResult fly_all(const FlyConfig& config, const FlyOptions& options) {
       const auto log = flights.recorders().front().log();
       result.mcap = log.has_value();
       if (log) flightlog::ros::write_flight_mcap(options.mcap, *log);
-      else fs::remove(options.mcap);  // of an earlier flight
+      else fs::remove(options.mcap);  // the file is that of an earlier flight
     }
     all_scores.insert(all_scores.end(), scores.begin(), scores.end());
   }

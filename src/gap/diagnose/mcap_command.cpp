@@ -129,7 +129,7 @@ Json run_mcap(const McapCommand& command) {
   const flightlog::FlightLog log = flightlog::read_flight_log(command.flight);
   const auto flight = std::make_shared<const ResetPrediction>(Recording(command.flight, log, d.declared));
   VehicleHypothesis declared{d.declared, 0}, corrected{d.corrected, 0};
-  if (reference)  // what the verdict names came after it
+  if (reference)  // the verdict's effects appeared after the reference flights
     for (const std::string& effect : d.result.verdict.effects) corrected.vehicle.effects.erase(effect);
   add_sensors(d.result, corrected);
   const std::vector<VehicleTopics> vehicles = {

@@ -143,7 +143,8 @@ void CommandClient::watch(const std::function<bool(const JobStatus& job)>& see,
                           const std::function<bool()>& keep_going) {
   while (keep_going()) {
     waiting_.wait(kLook);
-    results_.take([](const CommandResultMessage&, const dds_sample_info_t&) {});  // of other clients
+    results_.take([](const CommandResultMessage&, const dds_sample_info_t&) {
+    });  // discards answers to other clients, which would fill the reader
     take_jobs();
     for (const JobStatus& job : std::exchange(heard_, {}))
       if (!see(job)) return;

@@ -84,7 +84,7 @@ class Recording {
       if (!topic.starts_with("rt/") || wanted_.erase(topic.substr(2)) == 0) return;
       try {
         add(topic.substr(2), type);
-      } catch (const io::InputError& e) {  // what is being recorded is worth more than what came late
+      } catch (const io::InputError& e) {  // a topic that appears late does not end the recording
         if (std::ranges::all_of(recorded_.messages, [](const auto& m) { return m.second == 0; })) throw;
         io::log(io::LogLevel::warning, std::string(e.what()) + "; it is left out");
       }

@@ -115,7 +115,7 @@ TEST(Bag, ReadsAFolderInTheOrderOfItsParts) {
     writer.finish();
   }
   std::ofstream(folder / "metadata.yaml") << "rosbag2_bagfile_information:\n";
-  std::ofstream(folder / "bag_11.mcap");  // of a recorder that was killed
+  std::ofstream(folder / "bag_11.mcap");  // a recorder that is killed leaves an empty part
   EXPECT_EQ(read(folder.path()), (Lines{"/a p/msg/A int8 x\n0 1", "/a p/msg/A int8 x\n2 1", "/a p/msg/A int8 x\n10 1",
                                         (folder / "bag_11.mcap").string() + ": is empty: left out"}));
 }
