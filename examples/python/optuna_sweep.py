@@ -80,7 +80,7 @@ class Job:
         command, until_s = ["flappy-job", *self.dds, "--json"], time.monotonic() + 60
         with tempfile.NamedTemporaryFile(suffix=".json") as answer:
             while subprocess.run([*command, answer.name, *words], stdout=subprocess.DEVNULL).returncode:
-                if words[0] == "submit" or time.monotonic() > until_s:
+                if words[0] != "list" or time.monotonic() > until_s:
                     raise RuntimeError(f"flappy-job {words[0]} fails")
                 time.sleep(1)  # the server may be starting anew
             return json.loads(Path(answer.name).read_text())
@@ -104,7 +104,8 @@ class Job:
         """Ends what still runs."""
         job = next(job for job in self.ask("list")["jobs"] if job["id"] == self.number)
         if job["state"] not in ("done", "failed", "cancelled"):
-            self.ask("cancel", str(self.number))
+            with contextlib.suppress(RuntimeError):  # it may just have ended
+                self.ask("cancel", str(self.number))
 
 
 def main() -> None:

@@ -192,7 +192,7 @@ Prediction read_prediction(const std::filesystem::path& file) {
       p.baselines[name] = {b.at("named").get<Names>(), b.at("ranking").get<Names>()};
     p.features = json.at("features").get<std::vector<double>>();
     p.corrected = json.at("corrected");
-    p.with_residual = json.value("with_residual", "");
+    p.with_residual = json.at("with_residual");
     p.crashed = json.at("crashed");
     return p;
   } catch (const Json::exception& e) {

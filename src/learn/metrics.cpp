@@ -75,6 +75,10 @@ std::array<std::uint64_t, 4> all_kept_bytes(const std::filesystem::path& run, co
 
 }  // namespace
 
+void Metrics::check(const std::filesystem::path& run, const MetricsColumns& columns, std::uint64_t records) {
+  all_kept_bytes(run, columns, records);
+}
+
 Metrics::Metrics(const std::filesystem::path& run, const MetricsColumns& columns, std::uint64_t records)
     : Metrics(run, columns, records, all_kept_bytes(run, columns, records)) {}
 

@@ -27,6 +27,9 @@ class Metrics {
   /// Throws io::InputError if a file holds fewer records or has other columns.
   Metrics(const std::filesystem::path& run, const MetricsColumns& columns, std::uint64_t records = 0);
 
+  /// Throws what the constructor would, and changes nothing.
+  static void check(const std::filesystem::path& run, const MetricsColumns& columns, std::uint64_t records);
+
   /// Appends a record, one value per column; NaN and infinity: not available (null, empty cell, no event). The
   /// operating system has it on return, so a killed program loses nothing.
   void record(std::span<const double> metrics, std::span<const double> timing);

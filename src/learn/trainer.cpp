@@ -47,9 +47,10 @@ class Trainer {
     const fs::path& folder = options_.folder;
     if (options_.from) resume(Checkpoint(*options_.from));
     else if (writes()) write_config();
-    if (writes()) {  // nothing is removed before all that is read has been accepted
+    if (writes()) {
+      Metrics::check(folder, kColumns, records_);  // what is refused removes nothing
+      if (options_.from) forget_after(updates());  // before records are cut that later checkpoints need
       metrics_.emplace(folder, kColumns, records_);
-      if (options_.from) forget_after(updates());
       fs::remove(folder / "summary.json");  // that of a stop: the run goes on
     }
     if (options_.init && !options_.from) {  // evaluate the initial policy, so that no worse one becomes the best

@@ -50,16 +50,18 @@ void prepare_log_folder(const fs::path& folder, std::size_t count, const std::st
   }
   if (error) throw io::InputError(folder.string() + ": cannot be read: " + error.message());
   if (!foreign.empty()) refuse("holds " + *foreign.begin());
-  // logs of an earlier run would stay beside those of one that is stopped, or too short
-  std::vector<fs::path> old = {folder};
-  if (count > 1) {
-    old.clear();
-    for (std::size_t i = 0; i < count; ++i) old.push_back(folder / log_name(i, count));
-  }
-  std::ranges::for_each(old, flightlog::require_replaceable);
-  for (const fs::path& log : old)
-    if (fs::exists(log / flightlog::log_file::kHeader)) fs::remove_all(log);
-  io::make_folder(folder);
+  if (count == 1) return flightlog::require_replaceable(folder);  // a log that is written replaces the one of before
+  for (std::size_t i = 0; i < count; ++i) flightlog::require_replaceable(folder / log_name(i, count));
+  for (std::size_t i = 0; i < count; ++i)
+    // else logs of an earlier run would stay beside those of one that is stopped
+    if (const fs::path old = folder / log_name(i, count); fs::exists(old / flightlog::log_file::kHeader))
+      fs::remove_all(old);
+}
+
+/// Removes an earlier log, but not its folder, which may be a link.
+void remove_log(const fs::path& folder) {
+  if (!fs::exists(folder / flightlog::log_file::kHeader)) return;
+  for (const auto& entry : fs::directory_iterator(folder)) fs::remove(entry.path());
 }
 
 /// Writes the logs of flights, numbered from `first`; returns the number of logs written.
@@ -70,7 +72,7 @@ std::size_t write_logs(const Rollout<T>& flights, std::size_t first, const FlyOp
   io::parallel_for(flights.recorders().size(), config.fleet.batch.threads, [&](std::size_t i) {
     const bool alone = options.count == 1;
     const fs::path folder = alone ? options.log_folder : options.log_folder / log_name(first + i, options.count);
-    if (!flights.recorders()[i].write(folder)) return;
+    if (!flights.recorders()[i].write(folder)) return remove_log(folder);
     flightlog::write_vehicle(folder, config.vehicle_file_name, config.vehicle_text);
     ++written;
   });

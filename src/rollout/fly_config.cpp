@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "flappy/vehicle_file.hpp"
+#include "flight/schedule.hpp"
 #include "io/sha256.hpp"
 #include "io/toml_writer.hpp"
 #include "model/beat_averaged.hpp"
@@ -344,10 +344,14 @@ void limit_delays(const flight::FleetOptions& fleet, model::Vehicle& v) {
     if (found == v.effects.end()) return;
     const auto e = static_cast<std::size_t>(model::effect_index(effect));
     double& delay_s = found->second[model::effects()[e].parameters[0].name];
-    delay_s = std::clamp(delay_s, low, high);
+    delay_s = std::max(low, std::min(delay_s, high));
   };
-  limit(model::MocapDelay::kInfo.id, -fleet.sensors.mocap.latency_s, std::numeric_limits<double>::infinity());
-  if (!v.beat_averaged) limit(model::CommandDelay::kInfo.id, 0, kKeptSteps * fleet.batch.step_s);
+  const double step_s = fleet.batch.step_s;
+  const int period_steps = static_cast<int>(std::lround(1 / (fleet.control_hz * step_s)));
+  const double remembered_s = (model::MocapDelay::kSlots - 1) * period_steps * step_s,
+               wait_s = flight::Schedule(fleet.sensors, step_s, period_steps).longest_wait_s();
+  limit(model::MocapDelay::kInfo.id, -fleet.sensors.mocap.latency_s, remembered_s - wait_s);
+  if (!v.beat_averaged) limit(model::CommandDelay::kInfo.id, 0, kKeptSteps * step_s);
 }
 
 }  // namespace

@@ -65,7 +65,8 @@ FlyConfig read_config(const Request& r) {
   }
   for (const std::string key : {"flight.seed", "flight.threads", "flight.first_flapper"})
     if (std::ranges::any_of(r.overrides, [&](const std::string& o) { return o.starts_with(key + "="); }))
-      throw io::InputError("--set " + key + ": is not used; accepted: --seed and --threads");
+      throw io::InputError("--set " + key + ": is not used; accepted: " +
+                           (key == "flight.first_flapper" ? "the vehicles of the test stream" : "--" + key.substr(7)));
   if (!r.vehicle.empty()) overrides.push_back(file_override("vehicle", r.vehicle));
   if (!r.task.empty()) overrides.push_back(file_override("task", r.task));
   overrides.insert(overrides.end(), r.overrides.begin(), r.overrides.end());

@@ -177,10 +177,6 @@ Diagnosed diagnose_flights(const DiagnosisRequest& request, const std::vector<st
     d.flights.push_back(prediction_of(request.vehicle, folders[f], std::move(logs[f]), request.channels));
   InferenceOptions options = request.options;
   options.progress = progress;
-  const bool ground =
-      std::ranges::any_of(headers, [](const auto& h) { return h.ambient.ground_z_m > sim::World{}.ground_z_m; });
-  const bool hangs_nowhere = !ground && std::ranges::count(options.withheld, model::Tether::kInfo.id) == 0;
-  if (hangs_nowhere) options.withheld.emplace_back(model::Tether::kInfo.id);
   if (references > 0 && !reference.fit) {
     if (progress) progress(0, "fitting the reference");
     reference.fit = std::make_unique<const ReferenceFit>(reference.flights, request.uncertain, options);
@@ -189,9 +185,10 @@ Diagnosed diagnose_flights(const DiagnosisRequest& request, const std::vector<st
   d.uncertain = request.uncertain;
   d.uncertain->set_minors(d.inference.minors);
   d.result = result_of(tests, d.flights, *d.uncertain, d.inference);
-  if (hangs_nowhere) d.result.untestable.emplace_back(model::Tether::kInfo.id);
   d.result.reference = request.settings.reference;
   if (references > 0) d.result.warnings = contrast_warnings(headers, d.flights);
+  if (options.residual && tests.size() < 2)
+    d.result.warnings.emplace_back("--residual: no load is given, because one flight leaves none to judge it by");
   if (d.inference.complete) d.corrected = corrected_vehicle(request.vehicle, d.inference, request.uncertain);
   return d;
 }
@@ -202,10 +199,13 @@ Diagnosed diagnose(const DiagnosisRequest& request,
                    const std::function<bool(double share, const std::string& what)>& progress) {
   Reference reference;
   Diagnosed d = diagnose_flights(request, request.settings.flights, reference, progress);
+  bool goes_on = d.result.complete;
   for (const NamedFlights& other : request.others) {
-    if (!d.result.complete) break;
-    d.result.sets.push_back({other.name, diagnose_flights(request, other.flights, reference, progress).result});
-    if (!d.result.sets.back().diagnosis.complete) break;
+    Diagnosis of_set;
+    of_set.complete = false;
+    if (goes_on) of_set = diagnose_flights(request, other.flights, reference, progress).result;
+    goes_on = of_set.complete;
+    d.result.sets.push_back({other.name, std::move(of_set)});
   }
   return d;
 }

@@ -15,7 +15,7 @@ Baselines weigh_baselines(const RobotFit& robot, const VerdictRule& rule);
 /// Effects of the catalogue by falling screened gain: the first options.max_finalists, and the others.
 struct ScreenedCatalogue {
   std::vector<ScreenedEffect> finalists, others;
-  std::vector<std::string> untestable;  ///< effects that cannot show in these logs; only if the policy validates
+  std::vector<std::string> untestable;  ///< effects that cannot show in these logs
 };
 ScreenedCatalogue screen_catalogue(const RobotFit& robot, const InferenceOptions& options);
 

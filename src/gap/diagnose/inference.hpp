@@ -79,7 +79,7 @@ struct Inference {
   std::vector<ScoredHypothesis> hypotheses;  ///< the most probable first
   Verdict verdict;
   std::size_t concluded = 0;            ///< index of the most probable hypothesis of the verdict
-  std::vector<std::string> untestable;  ///< effects that change no row; only for a beat-averaged vehicle
+  std::vector<std::string> untestable;  ///< effects that change no row
   Fit parameters;                       ///< the parameters fitted without effects
   CorrectedParameters corrected;
   std::vector<double> minors;          ///< variates for sim::Randomisation::set_minors, at which hypotheses are fitted

@@ -50,10 +50,10 @@ VectorXd open_place(const Hypothesis& h, const Fit& fit, const VectorXd& paramet
   return at;
 }
 
-std::vector<Rival> rivals_of(const Inference& d, const sim::Randomisation& uncertain, const NextOptions& options) {
+/// The rivals keep references to `uncertain` and `as_filed`, which has minor draws of 0.
+std::vector<Rival> rivals_of(const Inference& d, const sim::Randomisation& uncertain,
+                             const sim::Randomisation& as_filed, const NextOptions& options) {
   const bool contrast = !options.references.empty();
-  sim::Randomisation as_filed = uncertain;
-  as_filed.set_minors(std::vector<double>(uncertain.minors().size(), 0));
   std::vector<Rival> rivals;
   for (const ScoredHypothesis& a : d.hypotheses) {
     if (a.probability < options.least_probability) break;
@@ -317,7 +317,9 @@ std::vector<Manoeuvre> read_manoeuvres(const fs::path& folder, const std::vector
 
 std::vector<NextExperiment> rank_experiments(const Inference& inference, const sim::Randomisation& uncertain,
                                              const std::vector<Manoeuvre>& manoeuvres, const NextOptions& options) {
-  const std::vector<Rival> rivals = rivals_of(inference, uncertain, options);
+  sim::Randomisation as_filed = uncertain;
+  as_filed.set_minors(std::vector<double>(uncertain.minors().size(), 0));
+  const std::vector<Rival> rivals = rivals_of(inference, uncertain, as_filed, options);
   if (rivals.size() < 2) return {};
   std::vector<std::optional<NextExperiment>> found(manoeuvres.size());
   io::parallel_for(manoeuvres.size(), options.threads,

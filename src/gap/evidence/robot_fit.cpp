@@ -1,5 +1,6 @@
 #include "gap/evidence/robot_fit.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -36,13 +37,20 @@ bool of_sides(const model::CatalogueEffect& effect) {
          std::string_view(effect.parameters[1].name).starts_with("right_");
 }
 
+/// `withheld`, and tether unless each flight in which effects act has a ground: it would hang down to nowhere.
+std::vector<std::string> without_idle(std::vector<std::string> withheld, const Flights& flights) {
+  if (!std::ranges::all_of(tests_of(flights), [](const auto& flight) { return flight->has_ground(); }))
+    withheld.emplace_back(model::Tether::kInfo.id);
+  return withheld;
+}
+
 }  // namespace
 
 RobotFit::RobotFit(Stages stages, const Flights& flights, const sim::Randomisation& uncertain,
                    const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads)
     : flights_(flights),
       uncertain_(uncertain),
-      withheld_(std::move(withheld)),
+      withheld_(without_idle(std::move(withheld), flights)),
       threads_(io::thread_count(threads)),
       fitter_(flights, std::make_shared<const Evidence>(flights, discrepancy, threads_), threads_),
       no_effects_(uncertain_, {}) {
@@ -72,7 +80,7 @@ RobotFit RobotFit::planned(const Flights& flights, const sim::Randomisation& unc
 RobotFit::RobotFit(const RobotFit& reference, const Flights& flights)
     : flights_(flights),
       uncertain_(reference.uncertain_),
-      withheld_(reference.withheld_),
+      withheld_(without_idle(reference.withheld_, flights)),
       threads_(reference.threads_),
       fitter_(flights, std::make_shared<const Evidence>(flights, reference.evidence().discrepancy(), threads_),
               threads_),
@@ -126,6 +134,7 @@ void RobotFit::linearise_around(const Fit& parameters) {
   nominal_ = fitter_.linearise(no_effects_, no_effects_.start(), none);
   if (nominal_.residual.empty()) throw io::InputError(kDiverges);
   const Residuals residual = fitter_.linearise(no_effects_, parameters.at, none).residual;
+  if (residual.empty()) throw io::InputError(kDiverges);
   take_evidence(evidence().with_weights(residual));
   take_evidence(evidence().with_noise(residual));
   nominal_.statistics = evidence().statistics(nominal_.residual);

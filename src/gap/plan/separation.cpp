@@ -144,6 +144,7 @@ class Separator {
       if (gains[t]) factors[t] = 1, steps[t] = sure(t, *gains[t]) ? 0.5 : 2;
     for (int k = 0; k < kDoublings && std::ranges::any_of(factors, [](double f) { return f > 0; }); ++k) {
       for (std::size_t t = 0; t < n; ++t) {
+        if (factors[t] == 0) continue;
         const double before = std::exchange(factors[t], factors[t] * steps[t]);
         const double most = largest_factor(*asked_[t].effect) / asked_[t].times;
         if (factors[t] > most) factors[t] = before < most ? most : 0;

@@ -95,11 +95,9 @@ BeatAveragedPrediction::BeatAveragedPrediction(const std::filesystem::path& fold
         (channel >= kForceX || moments) &&
         (channels.empty() ? channel >= kForceX || b.compares_moments : std::ranges::count(channels, channel) > 0) &&
         (channel != kForceX || log_.header.mocap.source != flightlog::PoseSource::estimate_without_pitch);
-  for (const int channel : channels)
-    if (!shown_[static_cast<std::size_t>(channel)])
-      throw io::InputError("--channels " + std::string(channel_name(channel)) + ": is not compared in " +
-                           folder.string() + (channel == kForceX && moments ? ", whose pose has no pitch" : "") +
-                           "; accepted: a channel that vehicle and log have");
+  if (std::ranges::none_of(shown_, std::identity{}))
+    throw io::InputError("--channels: none of them is compared in " + folder.string() +
+                         "; accepted: one that vehicle and log have");
   for (const model::BeatAveraged::Input& i : b.inputs) {
     const auto at = std::ranges::find(log_.header.inputs, i.name);
     if (at == log_.header.inputs.end())

@@ -101,6 +101,7 @@ void Runner::look_after(const Job& job) {
   if (job.wanted == Wanted::run && exit && exit->code == kUsersMistake && is_disk_full(exit->message)) {
     put_off(job, exit->message);
   } else {
+    delays_.erase(job.id);
     const Ending ending = ending_of(job);
     queue_.end(job.id, ending);
     note(job, std::string(name_of(ending.state)) + (ending.message.empty() ? "" : ": ") + ending.message);
@@ -167,12 +168,13 @@ Ending Runner::ending_of(const Job& job) const {
           (exit->message.empty() ? "" : ": ") + exit->message);
 }
 
-/// Queues a job again that could not be started through no fault of its own; the delay doubles up to kLongestDelay_s.
+/// Queues a job again that could not be started, or found the disk full, through no fault of its own. The delay doubles up
+/// to kLongestDelay_s, until an attempt ends in another way.
 void Runner::put_off(const Job& job, const std::string& why) {
+  queue_.end(job.id, {State::queued, std::nullopt, why + "; is tried again", false});
   Delay& delay = delays_[job.id];
   delay.length_s = delay.length_s == 0 ? kFirstDelay_s : std::min(2 * delay.length_s, kLongestDelay_s);
   delay.until_s = io::steady_seconds() + delay.length_s;
-  queue_.end(job.id, {State::queued, std::nullopt, why + "; is tried again", false});
   note(job, why + "; is tried again in " + std::to_string(static_cast<int>(delay.length_s)) + " s");
 }
 
@@ -208,7 +210,6 @@ void Runner::start(const Job& queued) {
   try {
     backend_->start(queue_, job, folder, supervisor_command(options_.server.string(), folder, job.attempts, command),
                     *lock);
-    delays_.erase(job.id);
   } catch (const std::system_error& e) {
     queue_.end(job.id, crash(job, std::nullopt, std::string("cannot be started: ") + e.what()));
   } catch (const io::InputError& e) {
