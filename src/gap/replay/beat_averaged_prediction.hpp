@@ -15,6 +15,7 @@
 #include <tuple>
 
 #include "flightlog/beat_averaged_motion.hpp"
+#include "flightlog/world.hpp"
 #include "gap/replay/predicted_flight.hpp"
 #include "gap/replay/predicted_loads.hpp"
 #include "model/beat_averaged.hpp"
@@ -30,6 +31,7 @@ class BeatAveragedPrediction final : public PredictedFlight {
                          const std::vector<int>& channels = {});
 
   const std::string& name() const override { return name_; }
+  bool has_ground() const override { return flightlog::world_of(log_.header).has_ground(); }
   std::size_t beats() const override { return rows_.size(); }
   double beats_Hz() const override { return 1 / (motion_.step_s * static_cast<double>(stride_)); }
   bool covers(std::size_t beat, int channel) const override {

@@ -95,7 +95,7 @@ class PredictedFlight {
     if (memo_) memo_->clear();
   }
   virtual const std::string& name() const = 0;
-  virtual bool has_ground() const = 0;  ///< whether the log declares a ground
+  virtual bool has_ground() const = 0;    ///< whether the log declares a ground
   virtual std::size_t beats() const = 0;  ///< number of beats; of a beat-averaged vehicle, number of rows in time
   virtual double beats_Hz() const = 0;    ///< beats, or these rows, a second
   /// Whether a channel has data in a beat.

@@ -25,6 +25,7 @@ class ResetPrediction final : public PredictedFlight {
   explicit ResetPrediction(Recording recording);
 
   const std::string& name() const override { return recording_.name; }
+  bool has_ground() const override { return recording_.world.has_ground(); }
   std::size_t beats() const override { return recording_.beats; }
   double beats_Hz() const override { return recording_.log.header.flapping_Hz; }
   /// Force needs mocap in the beat and the IMU in two more on each side; path and turn need mocap, the others a log.

@@ -57,6 +57,7 @@ class SyntheticFlight final : public PredictedFlight {
   }
 
   const std::string& name() const override { return name_; }
+  bool has_ground() const override { return true; }
   std::size_t beats() const override { return beats_; }
   double beats_Hz() const override { return 34; }
   bool covers(std::size_t /*beat*/, int channel) const override { return has_rows(channel, 0); }
