@@ -1,5 +1,5 @@
-// A family of blind robots is one independent simulator and its robots. Families share this header and nothing else: no
-// physics, effect law, sensor model, convention or controller (tests/structure checks this).
+// A family of blind robots is one simulator, written apart, and its robots. Families share this header and no other code
+// (tests/structure checks this). docs/theory/diagnosis.md says which laws and numbers they share all the same.
 #pragma once
 
 #include <algorithm>

@@ -23,7 +23,7 @@ PATTERNS = [
     (r"\bk(?:Most|Least)(?:[A-Z_]\w*)?\b", "", "kMax..., kMin..."),
     (r"\b(?:class|struct) (?:Story|Belief|Ailments|Companion)\b|\btell_[a-z_]+\(", "", "what they are"),
     (r"\b(?:fly|tasks|train)/gap\.toml\b", "", "aperture.toml"),
-    (r"(?i)\banother making\b|\bother makings\b", "", "independent simulators A, B, C"),
+    (r"(?i)\banother making\b|\bother makings\b", "", "simulators A, B, C"),
 ]
 
 

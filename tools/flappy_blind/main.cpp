@@ -1,4 +1,4 @@
-// flappy-blind: flies robots of independent simulators, with or without effects, and writes their logs; makes and scores benchmarks.
+// flappy-blind: flies robots of simulators written apart, with or without effects, and writes their logs; makes and scores benchmarks.
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -165,7 +165,7 @@ void add_question_options(io::Command& c, benchmark::BenchQuestions& q) {
 
 int main(int argc, char** argv) {
   using namespace flappy;
-  io::Program program("flappy-blind", "Robots of independent simulators A, B and C: flies, diagnoses and scores them.",
+  io::Program program("flappy-blind", "Robots of simulators A, B and C, written apart: flies, diagnoses and scores them.",
                       {});
   io::Command list = program.app().command("effects", "lists the effects that a robot may have");
   blind::FamilyOptions of;

@@ -1,7 +1,7 @@
 // The blind robot: a second simulator of the vehicle that replaces the real robot in tests of a diagnosis: five rigid
-// bodies (torso; on each side leading edge and wing), ten degrees of freedom. Written from published parameters; it
-// shares no physics or effects with the simulator under test. Unknowns x of a step, in B: accelerations of torso and
-// joints:
+// bodies (torso; on each side leading edge and wing), ten degrees of freedom. Written from published parameters. The
+// simulator under test has the same force law of the wing (air.cpp). Unknowns x of a step, in B: accelerations of torso
+// and joints:
 //   sum of J^T (m, I) J  x = forces - J^T (forces that the bodies need at x = 0)      J: Jacobian of a body's motion
 // Wings are strips (planform.hpp). Semi-implicit Euler, 20 us; only the wings' stops are stiff at this step, and
 // implicit.
