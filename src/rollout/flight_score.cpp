@@ -69,6 +69,9 @@ FlightSummary summarise(std::span<const FlightScore> flights) {
     settled_ticks += f.settled_ticks;
     ticks += f.ticks;
     for (std::size_t k = 0; k < s.settled.size(); ++k) s.settled[k] += f.settled[k], s.takeoff[k] += f.whole[k];
+    if (f.settled_ticks == 0) continue;
+    Errors& rms = s.each.emplace_back(f.settled);
+    for (double& e : rms) e = std::sqrt(e / static_cast<double>(f.settled_ticks));
   }
   for (double& sum : s.settled) sum = std::sqrt(sum / static_cast<double>(settled_ticks));
   for (double& sum : s.takeoff) sum = std::sqrt(sum / static_cast<double>(ticks));

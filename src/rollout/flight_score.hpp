@@ -54,7 +54,8 @@ struct FlightSummary {
   std::size_t flights = 0, crashed = 0, failed = 0;
   Errors settled{},
       takeoff{};  ///< rms errors over all flights that did not crash: since settling, whole; NaN if all crashed
-  double within_share = 0;  ///< share of flights that stayed within kFarAway_m and did not crash
+  std::vector<Errors> each;  ///< rms errors since settling of each flight that did not crash and was settled
+  double within_share = 0;   ///< share of flights that stayed within kFarAway_m and did not crash
   std::array<FailureCount, kFlightFailures> failures;
 };
 /// Summarises flights in the given order, so that the result does not depend on threads.

@@ -81,6 +81,9 @@ TEST(Score, PoolsFlightsThatDidNotCrash) {
   EXPECT_NEAR(s.settled[3], std::sqrt((0.01 * 0.01 + 0.03 * 0.03) / 2), 1e-12);
   EXPECT_NEAR(s.takeoff[3], std::sqrt((10 * 1e-4 + 5 * 9e-4) / 20), 1e-12);
   EXPECT_NEAR(s.settled[4], 0.4 / std::sqrt(2), 1e-12);
+  ASSERT_EQ(s.each.size(), 2u);
+  EXPECT_NEAR(s.each[0][3], 0.01, 1e-12);
+  EXPECT_NEAR(s.each[1][3], 0.03, 1e-12);
   const rollout::FailureCount& away = s.failures[static_cast<std::size_t>(rollout::FlightFailure::drifted_away)];
   EXPECT_EQ(away.flights, 2u);
   EXPECT_EQ(away.first_flight, 1u);

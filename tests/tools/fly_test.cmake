@@ -11,7 +11,7 @@ expect_equal("stderr" "${err}" "")
 expect_equal("exit code" "${code}" 0)
 expect_match("stdout" "${out}" "^2 flights of 1 s, task hover, seed 1, double\n")
 foreach(row IN ITEMS "from 0.5 s on( +[0-9.]+)+\n" "with take-off( +[0-9.]+)+\n"
-    "paper, experiment +1.76 +3.95 +5.23 +34.9 +37.2 +24.4\n" "paper, simulation +1.60 +3.86 +4.79 +36.5 +38.7 +26.9\n"
+    "half of flights below( +[0-9.]+)+\n" "% below experiment( +[0-9.]+)+\n" "paper, experiment +1.76 +3.95 +5.23 +34.9 +37.2 +24.4\n" "paper, simulation +1.60 +3.86 +4.79 +36.5 +38.7 +26.9\n"
     "never farther than 0.3 m: 100.00 %; crashed: 0\n" "2 logs in " "hash [0-9a-f]+\n" "\nshown by: flappy-report ${WORK}/logs --out report.html\n$")
   expect_match("stdout" "${out}" "${row}")
 endforeach()
@@ -21,7 +21,7 @@ set(keys crashed=NUMBER within_0p3m_fraction=NUMBER flights=NUMBER duration_s=NU
   failures.drifted_away.flights=NUMBER failures.never_took_off.flights=NUMBER failures.frozen.first_s=NULL
   wall.total_s=NUMBER wall.steps_per_s=NUMBER)
 foreach(axis IN ITEMS roll_deg pitch_deg yaw_deg x_mm y_mm z_mm)
-  list(APPEND keys rms_${axis}=NUMBER rms_${axis}_takeoff=NUMBER)
+  list(APPEND keys rms_${axis}=NUMBER rms_${axis}_takeoff=NUMBER rms_${axis}_median=NUMBER rms_${axis}_p90=NUMBER)
 endforeach()
 expect_keys(${WORK}/hover.json ${keys})
 string(JSON hash GET "${json}" hash)
