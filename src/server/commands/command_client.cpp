@@ -61,7 +61,7 @@ CommandClient::CommandClient(const io::DdsConfig& config, double timeout_s)
       waiting_(participant_) {
   for (const Entity* reader : {&results_.entity(), &jobs_.entity()}) waiting_.add(*reader);
   const double until_s = io::steady_seconds() + timeout_s_;
-  while (command_.readers() == 0 || results_.writers() == 0 || jobs_.writers() == 0) {
+  while (command_.readers() == 0) {  // the server then waits for our readers
     if (io::steady_seconds() > until_s)
       throw io::InputError(jobs_.writers() > 0 ? "the server takes no commands; accepted: one with dds.commands = true"
                                                : "no server within " + io::shortest_digits(timeout_s_) +
@@ -156,10 +156,6 @@ std::size_t CommandClient::fetch(std::uint64_t job, const fs::path& folder,
   if (!files_) {
     files_.emplace(participant_, files_topic_, kPieces);
     waiting_.add(files_->entity());
-    for (const double until_s = io::steady_seconds() + timeout_s_; files_->writers() == 0;) {
-      if (io::steady_seconds() > until_s) throw io::InputError("the server sends no files");
-      io::sleep_until(io::steady_seconds() + 0.005);
-    }
   }
   const auto ask_for = [&](const std::string& name, const std::function<void(const Piece&)>& see_piece) {
     pieces_.clear();

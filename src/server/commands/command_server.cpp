@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "io/log.hpp"
 #include "io/progress.hpp"
@@ -14,8 +15,10 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kQueueLook{100};  // between updates from the queue
-constexpr std::size_t kMaxTransfers = 16;
-constexpr double kPatience_s = 10;       // with a client that takes nothing
+constexpr milliseconds kReaderLook{5};   // while a client's reader is not matched yet, or is full
+constexpr std::size_t kMaxTransfers = 16, kMaxAnswers = 1000;
+constexpr double kPatience_s = 10;  // with a client that takes nothing
+constexpr double kDiscovery_s = 3;  // for a client's readers to be matched; then the answer goes to whoever listens
 constexpr double kMaxOfSpeed_m_s = 100;  // at a higher speed, the two poses belong to different flights
 
 template <std::size_t kSize>
@@ -54,10 +57,12 @@ CommandServer::~CommandServer() {
 
 void CommandServer::run() {
   double looked_s = 0;
+  bool sent = false;
   while (!over_) try {
-      if (transfers_.empty()) waiting_.wait(kQueueLook);
+      if (!std::exchange(sent, false)) waiting_.wait(answers_.empty() && transfers_.empty() ? kQueueLook : kReaderLook);
       take_commands();
-      send_pieces();
+      send_answers();
+      sent = send_pieces();
       if (io::steady_seconds() - looked_s < std::chrono::duration<double>(kQueueLook).count()) continue;
       looked_s = io::steady_seconds();
       show_changes(false);
@@ -79,44 +84,54 @@ void CommandServer::take_commands() {
 
 void CommandServer::answer(const Command& command) {
   CommandResult r = commands_.execute(command);
-  if (r.accepted && command.verb == "list") {
-    show_changes(true);
-    r.job = shown_.size();
-  }
+  const bool lists = r.accepted && command.verb == "list";
   if (r.accepted && command.verb == "fetch") r = fetch(command);
-  CommandResultMessage m{};
-  put(m.id, r.id);
-  m.accepted = r.accepted;
-  m.job = r.job;
-  put(m.message, r.message);
-  results_.write(m);
+  answers_.push_back({command.client, std::move(r), lists, io::steady_seconds()});
+}
+
+/// Sends each answer as soon as the client's readers are matched, for what is written before that is lost.
+void CommandServer::send_answers() {
+  for (std::size_t k = answers_.size(); k > 0; --k) {
+    Answer a = std::move(answers_.front());
+    answers_.pop_front();
+    const bool reached = results_.reaches(a.client) && (!a.lists || jobs_.reaches(a.client));
+    if (!reached && io::steady_seconds() - a.asked_s < kDiscovery_s && answers_.size() < kMaxAnswers) {
+      answers_.push_back(std::move(a));
+      continue;
+    }
+    if (a.lists) {
+      show_changes(true);
+      a.result.job = shown_.size();
+    }
+    CommandResultMessage m{};
+    put(m.id, a.result.id);
+    m.accepted = a.result.accepted;
+    m.job = a.result.job;
+    put(m.message, a.result.message);
+    results_.write(m);
+  }
 }
 
 CommandResult CommandServer::fetch(const Command& command) {
   CommandResult r{command.id, true, command.job, ""};
   try {
-    const std::vector<JobFile> files = commands_.files(command.job);
+    std::vector<JobFile> files = commands_.files(command.job);
+    Transfer t{.id = command.id, .client = command.client, .job = command.job, .moved_s = io::steady_seconds()};
     if (command.config.empty()) {
-      auto left = static_cast<std::uint32_t>(files.size());
-      for (const JobFile& file : files) {
-        FileChunk m{};
-        put(m.id, command.id);
-        m.job = command.job;
-        put(m.name, file.name);
-        m.size = file.bytes;
-        m.left = --left;
-        files_.write(m);
-      }
       r.message = std::to_string(files.size()) + " files";
-      return r;
+      if (files.empty()) return r;
+      t.files = std::move(files);
+    } else {
+      const auto found = std::ranges::find(files, command.config, &JobFile::name);
+      if (found == files.end())
+        throw io::InputError("file: \"" + shown(command.config) + "\" is none of job " + std::to_string(command.job));
+      r.message = found->name + ": " + std::to_string(found->bytes) + " bytes";
+      t.name = found->name;
+      t.size = found->bytes;
     }
-    const auto found = std::ranges::find(files, command.config, &JobFile::name);
-    if (found == files.end())
-      throw io::InputError("file: \"" + shown(command.config) + "\" is none of job " + std::to_string(command.job));
     if (transfers_.size() >= kMaxTransfers)
-      throw io::InputError("too many files at a time; accepted: the same one later");
-    transfers_.push_back({command.id, command.job, found->bytes, 0, found->name, io::steady_seconds()});
-    r.message = found->name + ": " + std::to_string(found->bytes) + " bytes";
+      throw io::InputError(std::string(kTooMany) + "; accepted: the same one later");
+    transfers_.push_back(std::move(t));
   } catch (const io::InputError& e) {
     r.accepted = false;
     r.message = shown(e.what());
@@ -124,33 +139,59 @@ CommandResult CommandServer::fetch(const Command& command) {
   return r;
 }
 
-/// Sends one piece of each transfer in turn, so that no client waits for another's checkpoint.
-void CommandServer::send_pieces() {
+/// Sends one piece of each transfer in turn, so that no client waits for another's checkpoint. Returns whether any was sent.
+bool CommandServer::send_pieces() {
+  bool any = false;
   for (std::size_t k = transfers_.size(); k > 0; --k) {
-    Transfer t = transfers_.front();
+    Transfer t = std::move(transfers_.front());
     transfers_.pop_front();
-    std::string data;
-    try {
-      data = commands_.chunk(t.job, t.name, t.offset);
-    } catch (const io::InputError&) {  // the file is gone: its last piece comes too early, which the client notices
-    }
-    data.resize(std::min<std::uint64_t>(data.size(), t.size - t.offset));  // the file may grow meanwhile
-    FileChunk m{};
-    put(m.id, t.id);
-    m.job = t.job;
-    put(m.name, t.name);
-    m.size = t.size;
-    m.offset = t.offset;
-    const std::uint64_t after = t.size - t.offset - data.size();
-    m.left = data.empty() ? 0 : static_cast<std::uint32_t>((after + kMaxOfChunk - 1) / kMaxOfChunk);
-    const auto size = static_cast<std::uint32_t>(data.size());
-    m.data = {size, size, reinterpret_cast<std::uint8_t*>(data.data()), false};
-    const bool sent = files_.write(m);
+    const bool reached = files_.reaches(t.client);
+    if (!reached && t.begun) continue;  // the client is gone
+    const bool sent = reached && (t.files.empty() ? send_piece(t) : send_item(t));
     const double now_s = io::steady_seconds();
-    if (sent) t.offset += data.size(), t.moved_s = now_s;
-    const bool patient = now_s - t.moved_s < kPatience_s;
-    if (files_.readers() > 0 && patient && (!sent || m.left > 0)) transfers_.push_back(std::move(t));
+    if (sent) t.moved_s = now_s, t.begun = any = true;
+    if (!t.over && now_s - t.moved_s < kPatience_s) transfers_.push_back(std::move(t));
   }
+  return any;
+}
+
+/// Sends the next file of a list. False: the client's reader is full.
+bool CommandServer::send_item(Transfer& t) {
+  const JobFile& file = t.files[t.offset];
+  FileChunk m{};
+  put(m.id, t.id);
+  m.job = t.job;
+  put(m.name, file.name);
+  m.size = file.bytes;
+  m.left = static_cast<std::uint32_t>(t.files.size() - 1 - t.offset);
+  if (!files_.write(m)) return false;
+  ++t.offset;
+  t.over = m.left == 0;
+  return true;
+}
+
+/// Sends the next piece of a file. False: the client's reader is full.
+bool CommandServer::send_piece(Transfer& t) {
+  std::string data;
+  try {
+    data = commands_.chunk(t.job, t.name, t.offset);
+  } catch (const io::InputError&) {  // the file is gone: its last piece comes too early, which the client notices
+  }
+  data.resize(std::min<std::uint64_t>(data.size(), t.size - t.offset));  // the file may grow meanwhile
+  FileChunk m{};
+  put(m.id, t.id);
+  m.job = t.job;
+  put(m.name, t.name);
+  m.size = t.size;
+  m.offset = t.offset;
+  const std::uint64_t after = t.size - t.offset - data.size();
+  m.left = data.empty() ? 0 : static_cast<std::uint32_t>((after + kMaxOfChunk - 1) / kMaxOfChunk);
+  const auto size = static_cast<std::uint32_t>(data.size());
+  m.data = {size, size, reinterpret_cast<std::uint8_t*>(data.data()), false};
+  if (!files_.write(m)) return false;
+  t.offset += data.size();
+  t.over = m.left == 0;
+  return true;
 }
 
 void CommandServer::show_changes(bool all) {

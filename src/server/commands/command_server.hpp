@@ -8,6 +8,8 @@
 //                                            job, or for the list of its files if it is empty
 //   /flappy/command_result   CommandResult   answer to every command; for "list", `job` is the number of JobStatus sent
 //   /flappy/files            FileChunk       a piece of a fetched file, or without data for each file of the list
+//
+// Answers wait for the asking process's readers: up to 3 s on command_result (and jobs, for "list"), up to 10 s on files.
 #pragma once
 
 #include <atomic>
@@ -30,18 +32,32 @@ class CommandServer {
   ~CommandServer();
 
  private:
+  /// The list of a job's files, or one of them, on its way to a client.
   struct Transfer {
-    std::string id;
-    std::uint64_t job, size, offset;
-    std::string name;
-    double moved_s;  ///< when it was begun, or its last piece was taken
+    std::string id, client;
+    std::uint64_t job = 0;
+    std::vector<JobFile> files = {};  ///< of the list; empty for a file
+    std::string name = {};
+    std::uint64_t size = 0, offset = 0;  ///< bytes; of a list, `offset` files are sent
+    double moved_s = 0;                  ///< when it was asked for, or its last piece was taken
+    bool begun = false, over = false;    ///< whether the first piece, and the last, are taken
+  };
+  /// An answer that is not sent yet.
+  struct Answer {
+    std::string client;
+    CommandResult result;
+    bool lists;
+    double asked_s;
   };
 
   void run();
   void take_commands();
   void answer(const Command& command);
+  void send_answers();
   CommandResult fetch(const Command& command);
-  void send_pieces();
+  bool send_pieces();
+  bool send_item(Transfer& t);
+  bool send_piece(Transfer& t);
   void show_changes(bool all);
   void read_watched();
 
@@ -57,6 +73,7 @@ class CommandServer {
   Reader<BatteryState> battery_;
   WaitSet waiting_;
   std::map<std::uint64_t, JobStatus> shown_;
+  std::deque<Answer> answers_;
   std::deque<Transfer> transfers_;
   ShownState state_;
   std::atomic<bool> over_ = false;

@@ -1,5 +1,6 @@
 #include "server/dds/participant.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -97,6 +98,14 @@ std::shared_ptr<const Entity> domain_of(const io::DdsConfig& c) {
 /// The DDS name of a ROS 2 topic is "rt" and its name.
 Entity make_topic(const Participant& p, const dds_topic_descriptor_t& type, const std::string& name) {
   return {dds_create_topic(p.get(), &type, ("rt" + name).c_str(), nullptr, nullptr), name};
+}
+
+/// A participant's DDS key in hexadecimal.
+std::string digits_of(const dds_guid_t& key) {
+  constexpr char kDigits[] = "0123456789abcdef";
+  std::string text;
+  for (const unsigned char byte : key.v) text += {kDigits[byte >> 4], kDigits[byte & 15]};
+  return text;
 }
 
 /// User data of a reader or writer: the hash by which ROS 2, from Iron on, identifies the type.
@@ -208,6 +217,20 @@ std::size_t matched(const Entity& entity, bool writer) {
   return count > 0 ? static_cast<std::size_t>(count) : 0;
 }
 
+bool reaches(const Entity& writer, const std::string& participant) {
+  std::vector<dds_instance_handle_t> readers(matched(writer, true));
+  if (participant.empty()) return !readers.empty();
+  const dds_return_t count = dds_get_matched_subscriptions(writer.get(), readers.data(), readers.size());
+  readers.resize(std::min(readers.size(), static_cast<std::size_t>(std::max(count, 0))));
+  return std::ranges::any_of(readers, [&](dds_instance_handle_t handle) {
+    dds_builtintopic_endpoint_t* reader = dds_get_matched_subscription_data(writer.get(), handle);
+    if (reader == nullptr) return false;
+    const bool same = digits_of(reader->participant_key) == participant;
+    dds_builtintopic_free_endpoint(reader);
+    return same;
+  });
+}
+
 std::size_t take(const Entity& reader, const std::function<void(const void*, const dds_sample_info_t&)>& see) {
   constexpr std::size_t kAtOnce = 64;
   std::size_t seen = 0;
@@ -227,9 +250,7 @@ std::size_t take(const Entity& reader, const std::function<void(const void*, con
 std::string writer_of(const Entity& reader, const dds_sample_info_t& info) {
   dds_builtintopic_endpoint_t* writer = dds_get_matched_publication_data(reader.get(), info.publication_handle);
   if (writer == nullptr) return "";
-  constexpr char kDigits[] = "0123456789abcdef";
-  std::string text;
-  for (const unsigned char byte : writer->participant_key.v) text += {kDigits[byte >> 4], kDigits[byte & 15]};
+  const std::string text = digits_of(writer->participant_key);
   dds_builtintopic_free_endpoint(writer);
   return text;
 }

@@ -67,6 +67,7 @@ Entity make_writer(const Participant&, const dds_topic_descriptor_t&, const std:
 Entity make_reader(const Participant&, const dds_topic_descriptor_t&, const std::string& name, const Quality&);
 bool write(const Entity&, const void* message);
 std::size_t matched(const Entity&, bool writer);
+bool reaches(const Entity& writer, const std::string& participant);
 /// Takes all messages that have arrived, oldest first; returns their number.
 std::size_t take(const Entity&, const std::function<void(const void*, const dds_sample_info_t&)>& see);
 }  // namespace detail
@@ -82,6 +83,9 @@ class Writer {
   /// Copies the message and what it points to. Returns false where it could not be handed over within 0.1 s.
   bool write(const M& message) const { return detail::write(writer_, &message); }
   std::size_t readers() const { return detail::matched(writer_, true); }
+  /// Whether a reader of that participant (writer_of()) is matched, and so gets what is written from now on; of an unknown
+  /// one, whether any is. A command arrives as soon as its own writer is matched, which may be before that.
+  bool reaches(const std::string& participant) const { return detail::reaches(writer_, participant); }
   const Entity& entity() const { return writer_; }
 
  private:

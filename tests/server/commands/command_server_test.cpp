@@ -2,10 +2,13 @@
 #include "server/commands/command_server.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 
+#include <csignal>
 #include <fstream>
 #include <set>
 
+#include "full.hpp"
 #include "io/run_program.hpp"
 #include "refusal.hpp"
 #include "server/commands/command_client.hpp"
@@ -93,6 +96,131 @@ TEST(CommandServer, HandsOverFiles) {
   EXPECT_EQ(io::read_text(out / "empty.txt"), "");
   EXPECT_NE(refusal([&] { client.fetch(9, out, [](const JobFile&) {}); }).find("job 9: does not exist"),
             std::string::npos);
+}
+
+/// A client that writes commands, and makes its readers as the test asks.
+struct Raw {
+  explicit Raw(const io::DdsConfig& dds) : participant(dds), command(participant, "/flappy/command", kPieces) {
+    for (int i = 0; i < 1000 && command.readers() == 0; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  void ask(const char* verb) const {
+    CommandMessage m{};
+    std::snprintf(m.id, sizeof m.id, "raw");
+    std::snprintf(m.verb, sizeof m.verb, "%s", verb);
+    m.job = 1;
+    EXPECT_TRUE(command.write(m));
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));  // twice what a write may take
+  }
+  Participant participant;
+  Writer<CommandMessage> command;
+};
+
+bool soon(const std::function<bool()>& so) {
+  for (int i = 0; i < 1000 && !so(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  return so();
+}
+
+// As on a busy machine, where a command arrives before the server has matched the client's readers.
+TEST(CommandServer, WaitsForReadersThatAreMatchedLate) {
+  Served served;
+  CommandClient(served.dds, 5).ask(Served::submit("a"));
+  std::filesystem::create_directories(served.place.folder(1));
+  io::write_atomically(served.place.folder(1) / "a.txt", "a");
+  const Raw raw(served.dds);
+  const Participant other(served.dds);  // whose readers are no reason to answer
+  const Reader<CommandResultMessage> others(other, "/flappy/command_result", kAnswers);
+  for (const std::string verb : {"list", "fetch"}) {
+    raw.ask(verb.c_str());
+    const Reader<CommandResultMessage> results(raw.participant, "/flappy/command_result", kAnswers);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    const Reader<JobStatusMessage> jobs(raw.participant, "/flappy/jobs", kAnswers);
+    const Reader<FileChunk> files(raw.participant, "/flappy/files", kPieces);
+    std::size_t answers = 0, listed = 0, pieces = 0;
+    const auto all = [&] {
+      results.take([&](const CommandResultMessage& m, const dds_sample_info_t&) {
+        ++answers;
+        EXPECT_TRUE(m.accepted) << m.message;
+      });
+      jobs.take([&](const JobStatusMessage&, const dds_sample_info_t&) { ++listed; });
+      files.take([&](const FileChunk& m, const dds_sample_info_t&) {
+        ++pieces;
+        EXPECT_STREQ(m.name, "a.txt");
+      });
+      return answers == 1 && (verb == "list" ? listed : pieces) == 1;
+    };
+    EXPECT_TRUE(soon(all)) << verb << ": " << answers << " answers, " << listed << " jobs, " << pieces << " pieces";
+  }
+}
+
+TEST(CommandServer, AnswersAProcessThatOnlyWrites) {
+  if (!flappy::test::full()) GTEST_SKIP() << "only with --full: takes 3 s";
+  Served served;
+  const Raw raw(served.dds);
+  const Participant other(served.dds);
+  const Reader<CommandResultMessage> results(other, "/flappy/command_result", kAnswers);
+  raw.ask("list");
+  std::size_t answers = 0;
+  for (const double until_s = io::steady_seconds() + 8; answers == 0 && io::steady_seconds() < until_s;)
+    results.take([&](const CommandResultMessage&, const dds_sample_info_t&) { ++answers; });
+  EXPECT_EQ(answers, 1U);
+}
+
+// More than the server may have under way beside what a reader holds.
+TEST(CommandServer, ListsManyFilesToASlowReader) {
+  constexpr std::uint32_t kFiles = 300;
+  Served served;
+  CommandClient(served.dds, 5).ask(Served::submit("a"));
+  std::filesystem::create_directories(served.place.folder(1));
+  for (std::uint32_t i = 0; i < kFiles; ++i)
+    std::ofstream(served.place.folder(1) / (std::to_string(1000 + i) + ".txt"));
+  const Raw raw(served.dds);
+  const Reader<FileChunk> files(raw.participant, "/flappy/files", kPieces);
+  const Reader<CommandResultMessage> results(raw.participant, "/flappy/command_result", kAnswers);
+  raw.ask("fetch");
+  std::vector<std::string> names;
+  std::uint32_t left = kFiles;
+  soon([&] {
+    files.take([&](const FileChunk& m, const dds_sample_info_t&) {
+      names.emplace_back(m.name);
+      EXPECT_EQ(m.left, left - 1);
+      left = m.left;
+    });
+    return left == 0;
+  });
+  ASSERT_EQ(names.size(), kFiles);
+  EXPECT_EQ(names.front() + names.back(), "1000.txt1299.txt");
+}
+
+/// Keeps all processors busy while it lives.
+class BusyLoops {
+ public:
+  BusyLoops() {
+    const int streams[] = {0, 1, 2};
+    for (pid_t& loop : loops_) loop = io::start_program({"timeout", "600", "sh", "-c", "while :; do :; done"}, streams);
+  }
+  ~BusyLoops() {
+    for (const pid_t loop : loops_) kill(loop, SIGTERM), waitpid(loop, nullptr, 0);
+  }
+  BusyLoops(const BusyLoops&) = delete;
+
+ private:
+  pid_t loops_[3];
+};
+
+TEST(CommandServer, HandsOverFilesOnABusyMachine) {
+  const int fetches = flappy::test::full() ? 200 : 4;
+  Served served;
+  CommandClient(served.dds, 5).ask(Served::submit("a"));
+  std::filesystem::create_directories(served.place.folder(1));
+  io::write_atomically(served.place.folder(1) / "a.txt", "a");
+  const BusyLoops busy;
+  for (int i = 0; i < fetches; ++i) {
+    const std::string out = (served.place.root / ("got_" + std::to_string(i))).string();
+    const io::Finished fetched = io::run({FLAPPY_BUILD_DIR "/bin/flappy-job", "--timeout", "30", "--dds",
+                                          "domain=" + std::to_string(served.dds.domain), "fetch", "1", "--out", out});
+    EXPECT_EQ(fetched.exit_code, 0) << fetched.err;
+    EXPECT_TRUE(std::filesystem::exists(out + "/a.txt"));
+  }
 }
 
 // More than the server may have under way, so that a reader which takes nothing would hold it up.
