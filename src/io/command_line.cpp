@@ -55,6 +55,11 @@ bool Option::given() const { return option_->count() > 0; }
 template <class T>
 Option Command::option(const std::string& name, T& value, const std::string& help) const {
   CLI::Option* const option = app_->add_option(name, value, help);
+  constexpr bool is_text = std::is_same_v<T, std::string> || std::is_same_v<T, std::filesystem::path> ||
+                           std::is_same_v<T, std::vector<std::string>> ||
+                           std::is_same_v<T, std::vector<std::filesystem::path>>;
+  if constexpr (is_text)  // as of --out "$OUT" where OUT is not set, which must not stand for the default
+    option->check([](const std::string& text) { return text.empty() ? "is empty; accepted: a value" : ""; });
   if constexpr (std::is_unsigned_v<T>)  // CLI11 would accept -1
     option->check([](const std::string& text) {
       return text.find('-') == std::string::npos ? "" : "Value " + text + " is below 0";

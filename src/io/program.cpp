@@ -64,8 +64,8 @@ Program::Program(const std::string& name, const std::string& description, const 
   version += "\nCLI11 " CLI11_VERSION "\nnlohmann-json " + std::to_string(NLOHMANN_JSON_VERSION_MAJOR) + "." +
              std::to_string(NLOHMANN_JSON_VERSION_MINOR) + "." + std::to_string(NLOHMANN_JSON_VERSION_PATCH);
   app_->set_version_flag("--version", version);
-  app_->add_option("--json", json_path_, "write the results as JSON to this file");
-  app_->add_option("--progress", progress_path_, "tell in this file how far it is, as JSON, once a second");
+  app().option("--json", json_path_, "write the results as JSON to this file");
+  app().option("--progress", progress_path_, "tell in this file how far it is, as JSON, once a second");
   app_->add_option("--log-level", log_level_, "least level of what is noted on stderr")
       ->check(CLI::IsMember(std::vector<std::string>(kLevels.begin(), kLevels.end())))
       ->capture_default_str();

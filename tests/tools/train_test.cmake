@@ -99,6 +99,8 @@ expect_refused("flappy-train: --log-level: loud not in {debug,info,warning,error
 expect_refused("${WORK}/whole: holds a run; accepted: a new folder, or --resume ${WORK}/whole" ${escape} ${some} --out ${WORK}/whole)
 expect_refused("flappy-train: what to train is not clear; accepted: a configuration, or --resume RUN")
 expect_refused("${WORK}/none: is no run folder; accepted: a folder that flappy-train left" --resume ${WORK}/none)
+execute_process(COMMAND ${PROGRAM} ${escape} --seeds "" --out ${WORK}/refused ERROR_VARIABLE err RESULT_VARIABLE code)
+expect_equal("--seeds of nothing" "${code} ${err}" "2 flappy-train: --seeds: is empty; accepted: a value; see flappy-train --help\n")
 expect_refused("--seeds 4-2: is no range of seeds; accepted: 0-4" ${escape} --seeds 4-2)
 expect_refused("--set learn.speed=1: learn.speed: unknown key; accepted: actor_after, actor_rate, averaging, batch, critic_rate, device, engine, gradient_clip, huber, last_rate, policy_averaging, policy_delay, replay, schedule, target_noise, target_noise_clip, twin, updates, updates_per_step, warm_up, weight_decay"
   ${escape} --set learn.speed=1 --out ${WORK}/refused)
