@@ -25,6 +25,14 @@ constexpr std::size_t kSizeDigits = 20, kHashDigits = 64;
 constexpr std::size_t kTail = kSizeDigits + kHashDigits + kEnd.size();
 constexpr std::string_view kPrefix = "checkpoint_", kSuffix = ".flappy";
 
+constexpr std::pair<const char*, double RunTimes::*> kTimes[] = {{"wall_s", &RunTimes::wall_s},
+                                                                 {"threads_s", &RunTimes::threads_s},
+                                                                 {"simulation_s", &RunTimes::simulation_s},
+                                                                 {"learning_s", &RunTimes::learning_s},
+                                                                 {"evaluation_s", &RunTimes::evaluation_s},
+                                                                 {"exchange_s", &RunTimes::exchange_s},
+                                                                 {"exchanged_bytes", &RunTimes::exchanged_bytes}};
+
 std::string payload_hash(std::vector<CheckpointSection> sections) {
   std::ranges::sort(sections, {}, &CheckpointSection::name);
   io::Sha256 hash;
@@ -73,7 +81,7 @@ std::string CheckpointWriter::commit() {
   list["processor"] = header_.processor;
   list["instruction_set"] = header_.instruction_set;
   list["commit"] = header_.commit;
-  list["wall_s"] = header_.wall_s;
+  for (const auto& [name, time] : kTimes) list[name] = header_.times.*time;
   list["payload_sha256"] = payload_hash(sections_);
   list["sections"] = Json::array();
   for (const auto& s : sections_)
@@ -136,7 +144,7 @@ Checkpoint::Checkpoint(std::filesystem::path path) : path_(std::move(path)), fil
     list.at("processor").get_to(header_.processor);
     list.at("instruction_set").get_to(header_.instruction_set);
     list.at("commit").get_to(header_.commit);
-    header_.wall_s = list.value("wall_s", 0.0);
+    for (const auto& [name, time] : kTimes) header_.times.*time = list.value(name, 0.0);
     list.at("payload_sha256").get_to(payload_sha256_);
     for (const Json& s : list.at("sections")) sections_.push_back({s.at("name"), s.at("sha256"), 0, s.at("size")});
   } catch (const Json::exception& e) {

@@ -24,6 +24,15 @@
 
 namespace flappy::learn {
 
+/// What a run has taken so far, summed over all its processes.
+struct RunTimes {
+  double wall_s = 0;     ///< wall-clock time without evaluations
+  double threads_s = 0;  ///< the same of all threads, of which the next two are parts
+  double simulation_s = 0, learning_s = 0;
+  double evaluation_s = 0;
+  double exchange_s = 0, exchanged_bytes = 0;  ///< exchange of the first rank with others, waiting included
+};
+
 /// A run can be resumed only if config_sha256 is that of its configuration; the rest is information.
 struct CheckpointHeader {
   std::uint64_t update = 0;
@@ -31,7 +40,7 @@ struct CheckpointHeader {
   std::string processor;        ///< as in /proc/cpuinfo
   std::string instruction_set;  ///< of the kernels
   std::string commit;           ///< of the program
-  double wall_s = 0;            ///< wall-clock time of the training so far
+  RunTimes times;
 };
 
 /// Types without padding, whose bytes differ between runs. Store padding-free structs of floats by std::as_bytes.

@@ -20,6 +20,8 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
+constexpr char kSeedFolder[] = "seed_";
+
 const MetricsColumns kColumns = {
     {"update", "env_steps", "episodes", "return_mean", "captured_share", "handed_back_share", "terminated_share",
      "critic_loss", "mean_q", "actor_q", "replay", "success_rate", "capture_rate", "time_to_capture_median_s"},
@@ -172,13 +174,17 @@ class Trainer {
     }
   }
 
-  double wall_s() const { return wall_before_s_ + seconds_since(options_.started) - evaluation_s_; }
-
-  std::pair<double, double> shares() const {
-    const double all = static_cast<double>(config_.threads) * (wall_s() - wall_before_s_);
-    const double simulation = collector_.seconds();
-    return {simulation / all,
-            std::max(0.0, static_cast<double>(config_.threads) * (learning_s_ + warming_s_) - simulation) / all};
+  RunTimes times() const {
+    RunTimes t = before_;
+    const double threads = config_.threads, own_s = seconds_since(options_.started) - evaluation_s_;
+    const double simulation_s = collector_.seconds();
+    t.wall_s += own_s;
+    t.threads_s += threads * own_s;
+    t.simulation_s += simulation_s;
+    t.learning_s += std::max(0.0, threads * (learning_s_ + warming_s_) - simulation_s);
+    t.evaluation_s += evaluation_s_;
+    if (ranks_ != nullptr) t.exchange_s += ranks_->costs().seconds, t.exchanged_bytes += ranks_->costs().bytes;
+    return t;
   }
 
   /// Evaluates the present policy, and keeps it if it is the best so far.
@@ -198,8 +204,7 @@ class Trainer {
 
   void evaluate() {
     const auto from = Clock::now();
-    const double wall = wall_s();
-    const auto [simulation, learning] = shares();
+    const RunTimes t = times();
     const rollout::Summary flown = judge();
     publish();
 
@@ -225,8 +230,9 @@ class Trainer {
     losses_ = values_ = actor_values_ = 0, samples_ = actor_samples_ = 0;
     evaluation_s_ += seconds_since(from);
     const auto [updates_per_s, env_steps_per_s] = rates_since(last_);
-    const double times[] = {wall, evaluation_s_, updates_per_s, env_steps_per_s, simulation, learning};
-    if (metrics_) metrics_->record(figures, times);
+    const double timing[] = {t.wall_s,        before_.evaluation_s + evaluation_s_, updates_per_s,
+                             env_steps_per_s, t.simulation_s / t.threads_s,         t.learning_s / t.threads_s};
+    if (metrics_) metrics_->record(figures, timing);
     last_ = mark();
   }
 
@@ -275,7 +281,7 @@ class Trainer {
     records_ = metrics_->sync();
     CheckpointWriter to(
         options_.folder / checkpoint_name(updates()),
-        {updates(), config_.sha256, processor(), sim::best_instruction_set(), options_.commit, wall_s()});
+        {updates(), config_.sha256, processor(), sim::best_instruction_set(), options_.commit, times()});
     to.put("numbers", learner_.save());
     to.put_bytes("counters", std::as_bytes(std::span(&learner_.counters(), 1)));
     to.put("replay_size", static_cast<std::uint64_t>(replay_.size()));
@@ -298,7 +304,7 @@ class Trainer {
     if (from.header().config_sha256 != config_.sha256)
       throw io::InputError(from.path().string() + ": is of another configuration than " +
                            (options_.folder / "config").string() + "; accepted: a checkpoint of this run");
-    wall_before_s_ = from.header().wall_s;
+    before_ = from.header().times;
     try {
       load_learner(from);
     } catch (const std::invalid_argument& e) {
@@ -350,15 +356,13 @@ class Trainer {
     s.seed = config_.seed;
     s.updates = updates(), s.env_steps = collector_.env_steps(), s.episodes = collector_.episodes();
     s.stopped = updates() < config_.updates;
-    s.wall_s = wall_s();
-    s.evaluation_s = evaluation_s_;
-    std::tie(s.share_simulation, s.share_learning) = shares();
+    const RunTimes t = times();
+    s.wall_s = t.wall_s, s.evaluation_s = t.evaluation_s;
+    s.share_simulation = t.simulation_s / t.threads_s, s.share_learning = t.learning_s / t.threads_s;
     if (best_success_ >= 0) s.best_success = best_success_;
     s.best_update = best_update_;
-    if (ranks_ != nullptr) {
-      s.ranks = ranks_->size();
-      s.exchange_s = ranks_->costs().seconds, s.exchanged_bytes = ranks_->costs().bytes;
-    }
+    if (ranks_ != nullptr) s.ranks = ranks_->size();
+    s.exchange_s = t.exchange_s, s.exchanged_bytes = t.exchanged_bytes;
     s.payload_sha256 = payload_sha256_;
     if (records_ == 0) return s;
     const std::vector<double> success = read_metrics(options_.folder / "metrics.jsonl").column("success_rate");
@@ -394,7 +398,8 @@ class Trainer {
   std::string payload_sha256_;
 
   Mark start_{}, last_{};  // at the start of this process, and at the last evaluation
-  double wall_before_s_ = 0, evaluation_s_ = 0, learning_s_ = 0, warming_s_ = 0;
+  RunTimes before_;        // of the processes before this one
+  double evaluation_s_ = 0, learning_s_ = 0, warming_s_ = 0;
 };
 
 }  // namespace
@@ -432,12 +437,26 @@ nlohmann::ordered_json json_of(const TrainSummary& s) {
           {"policy_sha256", s.policy_sha256}};
 }
 
+fs::path seed_folder(const fs::path& folder, std::uint64_t seed) {
+  return folder / (kSeedFolder + std::to_string(seed));
+}
+
 void refuse_run_in(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) return;
   const auto left = checkpoints_in(folder);
   if (fs::exists(folder / "run.json", error) || (!left.empty() && left.front().filename() != checkpoint_name(0)))
     throw io::InputError(folder.string() + ": holds a run; accepted: a new folder, or --resume " + folder.string());
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
+    if (entry.path().filename().string().starts_with(kSeedFolder) && fs::exists(entry.path() / "run.json", error))
+      throw io::InputError(folder.string() + ": holds runs of several seeds; accepted: a new folder, or --seeds");
+}
+
+void refuse_run_beside_seeds(const fs::path& folder) {
+  std::error_code error;
+  if (fs::exists(folder / "run.json", error))
+    throw io::InputError(folder.string() +
+                         ": holds a run of its own; accepted with --seeds: a new folder, or one of --seeds");
 }
 
 std::shared_ptr<const TrainInit> read_train_init(const fs::path& path) {
@@ -459,13 +478,17 @@ void refuse_other_run_in(const fs::path& folder, const TrainConfig& config, cons
                          ": holds a run of another configuration; accepted: a new folder, or the same options");
 }
 
+nlohmann::ordered_json finished_run_in(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::exists(folder / "run.json", error) || !fs::exists(folder / "summary.json", error)) return nullptr;
+  auto summary = nlohmann::ordered_json::parse(io::read_text(folder / "summary.json"), nullptr, false);
+  const bool finished = summary.is_object() && !summary.value("stopped", true);
+  return finished ? summary : nlohmann::ordered_json(nullptr);
+}
+
 std::optional<fs::path> unfinished_run_in(const fs::path& folder) {
   std::error_code error;
-  if (!fs::exists(folder / "run.json", error)) return std::nullopt;
-  if (fs::exists(folder / "summary.json")) {
-    const auto summary = nlohmann::json::parse(io::read_text(folder / "summary.json"), nullptr, false);
-    if (summary.is_object() && !summary.value("stopped", true)) return std::nullopt;
-  }
+  if (!fs::exists(folder / "run.json", error) || !finished_run_in(folder).is_null()) return std::nullopt;
   return newest_checkpoint(folder).path();
 }
 

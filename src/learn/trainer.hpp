@@ -77,10 +77,16 @@ struct TrainCosts {
   std::size_t memory_bytes = 0, disk_bytes = 0;
 };
 
-/// Throws io::InputError if the folder holds a run already.
+/// Folder of the run of one seed in a folder of runs (flappy-train --seeds).
+std::filesystem::path seed_folder(const std::filesystem::path& folder, std::uint64_t seed);
+/// Throws io::InputError if the folder holds a run already, or runs of seeds.
 void refuse_run_in(const std::filesystem::path& folder);
+/// Throws io::InputError if a folder for runs of seeds holds a run of its own.
+void refuse_run_beside_seeds(const std::filesystem::path& folder);
 /// Throws io::InputError if the folder holds a run of another configuration or with other initial networks.
 void refuse_other_run_in(const std::filesystem::path& folder, const TrainConfig& config, const TrainInit* init);
+/// The summary of a finished run; null if there is none.
+nlohmann::ordered_json finished_run_in(const std::filesystem::path& folder);
 /// The newest checkpoint of a run that is not finished; empty if there is none.
 std::optional<std::filesystem::path> unfinished_run_in(const std::filesystem::path& folder);
 /// Throws io::InputError for another run in the folder, an unfit checkpoint, a full disk, or diverged learning.

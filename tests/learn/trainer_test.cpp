@@ -10,6 +10,7 @@
 #include "learn/checkpoint.hpp"
 #include "learn/metrics.hpp"
 #include "learn/training.hpp"
+#include "refusal.hpp"
 #include "rollout/rollout.hpp"
 
 namespace flappy::learn {
@@ -112,6 +113,39 @@ TEST(Trainer, GoesOnFromAnyStopAsIfNothingHadBeen) {
   }
   EXPECT_GT(stops, 15);
   EXPECT_TRUE(left_in(stopped) == expected);
+}
+
+TEST(Trainer, SumsWhatItsPartsTook) {
+  const fs::path folder = fresh("parts");
+  const TrainConfig c = small_training();
+  const TrainSummary first = train_in(folder, c, [](const TrainProgress& p) { return p.update < 16; });
+  EXPECT_TRUE(finished_run_in(folder).is_null());
+  const TrainSummary both = train_in(folder, c, {}, unfinished_run_in(folder));
+  EXPECT_GT(both.wall_s, first.wall_s);
+  EXPECT_GT(both.evaluation_s, first.evaluation_s);
+  EXPECT_GT(both.share_simulation * both.wall_s, first.share_simulation * first.wall_s);
+  const std::vector<double> evaluation_s = read_metrics(folder / "timing.jsonl").column("evaluation_s");
+  EXPECT_TRUE(std::ranges::is_sorted(evaluation_s));
+  EXPECT_EQ(finished_run_in(folder), json_of(both));
+  EXPECT_FALSE(unfinished_run_in(folder));
+  // of one that was killed after its last checkpoint, nothing is left to do
+  const TrainSummary again = train_in(folder, c, {}, newest_checkpoint(folder).path());
+  EXPECT_EQ(again.evaluation_s, both.evaluation_s);
+  const double simulation_s = both.share_simulation * both.wall_s;  // four roundings
+  EXPECT_NEAR(again.share_simulation * again.wall_s, simulation_s, 1e-14 * simulation_s);
+  EXPECT_GE(again.share_learning * again.wall_s, (1 - 1e-14) * both.share_learning * both.wall_s);
+}
+
+TEST(Trainer, KeepsOneKindOfRunsInAFolder) {
+  const TrainConfig c = small_training({"learn.updates=8"});
+  const fs::path alone = fresh("alone"), seeds = fresh("seeds");
+  train_in(alone, c);
+  train_in(seed_folder(seeds, 3), c);
+  EXPECT_EQ(test::refusal([&] { train_in(seeds, c); }),
+            seeds.string() + ": holds runs of several seeds; accepted: a new folder, or --seeds");
+  EXPECT_EQ(test::refusal([&] { refuse_run_beside_seeds(alone); }),
+            alone.string() + ": holds a run of its own; accepted with --seeds: a new folder, or one of --seeds");
+  EXPECT_EQ(test::refusal([&] { refuse_run_beside_seeds(seeds); }), "accepted");
 }
 
 /// A killed process leaves metrics behind its checkpoint, which the run that goes on cuts off.

@@ -44,6 +44,17 @@ function(digest folder result)
 endfunction()
 digest(${WORK}/whole expected)
 
+# ---- a finished run stays as it is
+
+file(SHA256 ${WORK}/whole/summary.json before)
+run(--resume ${WORK}/whole --json ${WORK}/finished.json)
+expect_equal("exit code: ${err}" "${code}" 0)
+expect_equal("stdout" "${out}" "${WORK}/whole: is finished: seed 0, 60000 updates; nothing is left to do\nshown by: flappy-report ${WORK}/whole --out report.html\n")
+file(SHA256 ${WORK}/whole/summary.json after)
+expect_equal("summary.json of a finished run" "${after}" "${before}")
+file(SHA256 ${WORK}/finished.json after)
+expect_equal("--json of a finished run" "${after}" "${before}")
+
 # ---- killed ten times at random moments: the same bytes in the end
 
 string(RANDOM LENGTH 10 ALPHABET 0123456789 moments)
@@ -99,6 +110,8 @@ expect_refused("flappy-train: --log-level: loud not in {debug,info,warning,error
 expect_refused("${WORK}/whole: holds a run; accepted: a new folder, or --resume ${WORK}/whole" ${escape} ${some} --out ${WORK}/whole)
 expect_refused("flappy-train: what to train is not clear; accepted: a configuration, or --resume RUN")
 expect_refused("${WORK}/none: is no run folder; accepted: a folder that flappy-train left" --resume ${WORK}/none)
+expect_refused("${WORK}/seeds: holds runs of several seeds; accepted: a new folder, or --seeds" ${escape} ${small} --out ${WORK}/seeds)
+expect_refused("${WORK}/whole: holds a run of its own; accepted with --seeds: a new folder, or one of --seeds" ${escape} ${some} --seeds 0-1 --out ${WORK}/whole)
 execute_process(COMMAND ${PROGRAM} ${escape} --seeds "" --out ${WORK}/refused ERROR_VARIABLE err RESULT_VARIABLE code)
 expect_equal("--seeds of nothing" "${code} ${err}" "2 flappy-train: --seeds: is empty; accepted: a value; see flappy-train --help\n")
 expect_refused("--seeds 4-2: is no range of seeds; accepted: 0-4" ${escape} --seeds 4-2)
@@ -108,12 +121,13 @@ expect_refused("${WORK}/none.json: cannot be read: No such file or directory" ${
 file(TOUCH ${WORK}/file)
 expect_refused("${WORK}/file: cannot be written: Not a directory" ${escape} --out ${WORK}/file)
 
-# a damaged checkpoint is named, and the one before is offered
+# of a run that was killed before its end, a damaged checkpoint is named, and the one before is offered
 file(GLOB checkpoints ${WORK}/whole/checkpoint_*.flappy)
 list(SORT checkpoints)
 list(GET checkpoints -1 newest)
 list(GET checkpoints -2 before)
 get_filename_component(before_name ${before} NAME)
+file(REMOVE ${WORK}/whole/summary.json)
 execute_process(COMMAND sh -c "head -c -5 ${newest} > ${newest}.cut && mv ${newest}.cut ${newest}")
 run(--resume ${WORK}/whole)
 expect_equal("exit code" "${code}" 2)

@@ -120,7 +120,8 @@ TrainSummary train_one(TrainConfig config, TrainOptions options) {
 /// Trains runs of several seeds, dealt out to the ranks; resumes unfinished runs and skips finished ones. Then writes their learning curve.
 void train_seeds(io::Program& program, const std::vector<std::uint64_t>& seeds, const fs::path& folder,
                  TrainOptions options, const std::function<TrainConfig(std::uint64_t)>& config_of) {
-  const auto folder_of = [&](std::uint64_t seed) { return folder / ("seed_" + std::to_string(seed)); };
+  const auto folder_of = [&](std::uint64_t seed) { return seed_folder(folder, seed); };
+  refuse_run_beside_seeds(folder);
   std::string agreed;
   for (const std::uint64_t seed : seeds) {
     const TrainConfig config = config_of(seed);
@@ -132,7 +133,7 @@ void train_seeds(io::Program& program, const std::vector<std::uint64_t>& seeds, 
     if (!io::is_own(ranks, i)) continue;
     options.folder = folder_of(seeds[i]);
     options.from = unfinished_run_in(options.folder);
-    if (fs::exists(options.folder / "summary.json") && !options.from) continue;
+    if (!finished_run_in(options.folder).is_null()) continue;
     train_one(config_of(seeds[i]), options);
     options.started = std::chrono::steady_clock::now();
   }
@@ -207,8 +208,15 @@ int main(int argc, char** argv) {
       return list;
     };
     if (!resume.empty()) {
+      const fs::path config_file = train::config_of(resume);
+      if (const auto summary = learn::finished_run_in(resume); from.empty() && !summary.is_null()) {
+        std::printf("%s: is finished: seed %s, %s updates; nothing is left to do\n%s\n", resume.c_str(),
+                    summary.value("seed", train::Json()).dump().c_str(),
+                    summary.value("updates", train::Json()).dump().c_str(), io::shown_by(resume).c_str());
+        return program.write_json(summary);
+      }
       const learn::TrainConfig config =
-          io::read_of_run(resume, [&] { return learn::read_train_config(train::config_of(resume), with_threads({})); });
+          io::read_of_run(resume, [&] { return learn::read_train_config(config_file, with_threads({})); });
       options.folder = resume;
       options.from = from.empty() ? learn::newest_checkpoint(resume).path() : fs::path(resume) / from;
       return train_it(config);
