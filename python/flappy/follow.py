@@ -177,6 +177,13 @@ class MlflowServer:
         """Nothing is left open."""
 
 
+def _has_wandb_key(wandb: Any) -> bool:
+    try:
+        return bool(wandb.login(prompt=False, verify=False))
+    except TypeError:  # before 0.31, whose login() would ask
+        return bool(wandb.api.api_key)
+
+
 class WandbProject:
     """A project of Weights & Biases."""
 
@@ -187,7 +194,7 @@ class WandbProject:
             import wandb
         except ImportError as error:
             raise InputError("--wandb: needs the package wandb: pip install wandb") from error
-        if not offline and not wandb.api.api_key:
+        if not offline and not _has_wandb_key(wandb):
             raise InputError("--wandb: no API key; accepted: one of `wandb login`, or --offline")
         self._wandb, self._project, self._offline = wandb, project, offline
         self._runs: dict[str, Any] = {}

@@ -254,6 +254,16 @@ def test_mistakes_get_one_line(arguments: list[str], line: str, capsys: pytest.C
     assert capsys.readouterr().err == line + "\n"
 
 
+def test_wandb_needs_a_key_or_offline(tmp_path: Path) -> None:
+    stranger = {name: value for name, value in os.environ.items() if not name.startswith("WANDB_")} | {"HOME": str(tmp_path)}
+    refused = subprocess.run(command(tmp_path, "--wandb", "robots"), env=stranger, capture_output=True, text=True, check=False)
+    assert refused.returncode == 2
+    assert refused.stderr == "error: --wandb: no API key; accepted: one of `wandb login`, or --offline\n"
+    found = "import wandb; from flappy import follow; print(follow._has_wandb_key(wandb))"
+    key = {"WANDB_API_KEY": "0123456789" * 4}
+    assert subprocess.run([sys.executable, "-c", found], env=stranger | key, capture_output=True, text=True, check=True).stdout == "True\n"
+
+
 def test_another_server_is_refused(growing: Growing, capsys: pytest.CaptureFixture[str]) -> None:
     (growing.folder / "follow_mlflow.json").write_text('{"where": "http://other", "to": "1"}')
     assert follow.main([str(growing.folder), "--mlflow", "http://127.0.0.1:1"]) == 2
