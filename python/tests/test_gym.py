@@ -121,6 +121,41 @@ def test_wrappers_count_as_we_do():
     assert (info["episode"]["l"] == info["final_info"]["length"]).all()
 
 
+@pytest.mark.parametrize("mode", AutoresetMode)
+def test_wrappers_count_as_we_do_in_every_mode(mode):
+    if mode == AutoresetMode.SAME_STEP and gymnasium.__version__.startswith(("1.1.", "1.2.", "1.3.")):
+        pytest.skip("before 1.4, the wrapper leaves out the first step of later episodes in this mode")
+    env = RecordEpisodeStatistics(gymnasium.make_vec("flappy/Hover-v0", num_envs=2, overrides=BRIEF, autoreset_mode=mode))
+    env.reset(seed=1)
+    if mode == AutoresetMode.DISABLED:  # so that they do not end together
+        for _ in range(2):
+            env.step(np.zeros((2, 4), np.float32))
+        env.reset(options={"reset_mask": np.array([True, False])})
+        assert env.episode_lengths.tolist() == [0, 2]
+    ends = 0
+    for _ in range(14):
+        *_, terminated, truncated, info = env.step(np.zeros((2, 4), np.float32))
+        done = terminated | truncated
+        if not done.any():
+            continue
+        ends += done.sum()
+        ours = info.get("final_info", info)
+        assert (info["_episode"] == done).all()
+        assert (info["episode"]["l"][done] == ours["length"][done]).all()
+        assert np.allclose(info["episode"]["r"][done], ours["return"][done], rtol=1e-6)
+        if mode == AutoresetMode.DISABLED:
+            env.reset(options={"reset_mask": done})
+    assert ends == (5 if mode == AutoresetMode.DISABLED else 4)
+
+
+def test_options_of_a_reset_are_left_alone():
+    env = gymnasium.make_vec("flappy/Hover-v0", num_envs=2, overrides=BRIEF, autoreset_mode=AutoresetMode.DISABLED)
+    env.reset(seed=1)
+    options = {"reset_mask": np.array([True, False]), "own": 1}
+    env.reset(options=options)
+    assert list(options) == ["reset_mask", "own"]
+
+
 def test_actions_in_their_units():
     env = gymnasium.make("flappy/Hover-v0").unwrapped
     assert env.to_action([10, 0, 0, 0]) == pytest.approx([0, 0, 0, 0])
