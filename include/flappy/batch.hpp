@@ -74,6 +74,9 @@ class Batch {
   /// Throws std::invalid_argument if an option is out of range or the driver's hold is not a whole number of steps.
   Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOptions& options = {});
   ~Batch();
+  /// A copy flies on from the same state, to the same bytes.
+  Batch(const Batch&);
+  Batch& operator=(const Batch&);
   Batch(Batch&&) noexcept;
   Batch& operator=(Batch&&) noexcept;
 

@@ -41,4 +41,7 @@ Vehicle read_vehicle_for_steps(const std::filesystem::path& path, double step_s)
 /// Text of a vehicle file that reads back as the same vehicle.
 std::string vehicle_text(const Vehicle& vehicle);
 
+/// Reads such a text. `name`: of the file, for what is refused.
+Vehicle parse_vehicle(const std::string& text, const std::string& name);
+
 }  // namespace flappy::model

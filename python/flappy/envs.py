@@ -9,9 +9,10 @@ names in `env.unwrapped.observation_names`.
 import json
 import operator
 from collections.abc import Sequence
+from copy import deepcopy
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import gymnasium
 import numpy as np
@@ -70,10 +71,32 @@ def _spaces(core: _core.Environments) -> tuple[Any, Any]:
     return Box(-high, high), Box(-ones, ones)
 
 
+def _made_again(of: type, options: dict[str, Any], spec: Any) -> Any:
+    env = of(**options)
+    env.spec = spec
+    return env
+
+
 class _Named:
-    """What one environment and many have in common: names and ranges."""
+    """What one environment and many have in common: names, ranges, and how they are pickled and copied."""
 
     _core: _core.Environments
+    _options: dict[str, Any]  # what made it
+    spec: Any
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled is what makes the environment, not where it flies."""
+        return _made_again, (type(self), self._options, self.spec)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """A copy flies on from the same state, to the same bytes."""
+        twin = object.__new__(type(self))
+        memo[id(self)] = twin
+        twin.__dict__.update(deepcopy(self.__dict__, memo))
+        return twin
+
+    def __copy__(self) -> Self:
+        return deepcopy(self)
 
     @property
     def observation_names(self) -> list[str]:
@@ -140,6 +163,7 @@ class FlappyEnv(_Named, gymnasium.Env[Floats, Floats]):
             raise ValueError(f"render_mode: is {render_mode!r}; accepted: None, 'rgb_array'")
         self.render_mode = render_mode
         self.config, self.overrides = config, [*overrides]
+        self._options = {"config": config, "overrides": self.overrides, "first": first, "render_mode": render_mode}
         self._core = _core_of(config, overrides, 1, AutoresetMode.DISABLED, True, first, 1)
         self.metadata = {**self.metadata, "render_fps": round(1 / self._core.step_s)}
         self.observation_space, self.action_space = _spaces(self._core)
@@ -222,6 +246,17 @@ class FlappyVectorEnv(_Named, gymnasium.vector.VectorEnv[Floats, Floats, Any]):
         self.autoreset_mode = mode  # as Gymnasium's own have it: TorchRL reads it
         self.render_mode = render_mode
         self.config, self.overrides = config, [*overrides]
+        self._options = {
+            "num_envs": num_envs,
+            "config": config,
+            "overrides": self.overrides,
+            "first": first,
+            "autoreset_mode": mode,
+            "copy": copy,
+            "threads": threads,
+            "max_episode_steps": max_episode_steps,
+            "render_mode": render_mode,
+        }
         self._core = _core_of(config, overrides, num_envs, mode, copy, first, threads)
         if max_episode_steps is not None:
             steps = _whole("max_episode_steps", max_episode_steps, "a whole number from 1, or None")

@@ -23,7 +23,7 @@ class Policy:
     """
 
     def __init__(self, path: str | Path) -> None:
-        path = Path(path)
+        self._path = path = Path(path)
         self._script: Any = None
         self._session: Any = None
         if path.suffix == ".onnx":
@@ -45,6 +45,10 @@ class Policy:
                     raise _core.InputError(f"{path}: FLAPPY_POLICY_{name} is missing; accepted: a header of flappy-export")
                 sizes[name] = int(found[1])
         self._own = _core.Policy(path, sizes["OBS"], sizes["ACT"])
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Read again from its file."""
+        return type(self), (self._path,)
 
     def __call__(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """Acts."""

@@ -72,6 +72,16 @@ class Interruptible {
 /// Finds a file: `file` itself, or else a configuration of the package, such as "fly/hover.toml".
 std::filesystem::path found(const std::filesystem::path& file);
 
+/// For a class that can be copied: copy.copy(x) and copy.deepcopy(x) are copies of the state.
+template <class T>
+void bind_copies(nb::class_<T>& type) {
+  type.def(
+      "__copy__", [](const T& x) { return std::make_unique<T>(x); }, "A copy of the state.");
+  type.def(
+      "__deepcopy__", [](const T& x, const nb::dict&) { return std::make_unique<T>(x); }, "memo"_a,
+      "A copy of the state.");
+}
+
 /// Checks an index, which counts from the end where it is negative. Throws IndexError.
 std::size_t checked_index(std::int64_t i, std::size_t count);
 

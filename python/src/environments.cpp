@@ -55,6 +55,13 @@ class PyEnvironments {
     all_ = rollout::make_environments(rollout::read_fly_config(found(config), overrides), options);
   }
 
+  /// A copy that flies on from the same state. It has memory of its own.
+  PyEnvironments(const PyEnvironments& other) : pool_(std::make_shared<Pool>()), copy_(other.copy_) {
+    const Turn turn(other.busy_, "the environment");
+    if (other.all_) all_ = other.all_->copy();
+    last_ = other.last_;
+  }
+
   rollout::Environments& all() const {
     if (!all_) throw std::runtime_error("the environment is closed; accepted: calls before close()");
     return *all_;
@@ -209,7 +216,7 @@ class PyEnvironments {
   std::size_t turn_ = 0;
   Shown shown_;
   std::vector<float> last_;
-  std::atomic_flag busy_ = ATOMIC_FLAG_INIT;
+  mutable std::atomic_flag busy_ = ATOMIC_FLAG_INIT;
 };
 
 nb::list signals(const std::vector<flight::Signal>& list) {
@@ -225,10 +232,11 @@ nb::list signals(const std::vector<flight::Signal>& list) {
 }  // namespace
 
 void bind_environments(nb::module_& m) {
-  nb::class_<PyEnvironments>(
+  nb::class_<PyEnvironments> type(
       m, "Environments",
-      "Many environments of one configuration, stepped together; flappy.envs shows them to Gymnasium.")
-      .def(nb::init<const std::filesystem::path&, const std::vector<std::string>&, std::int64_t, const std::string&,
+      "Many environments of one configuration, stepped together; flappy.envs shows them to Gymnasium.");
+  bind_copies(type);
+  type.def(nb::init<const std::filesystem::path&, const std::vector<std::string>&, std::int64_t, const std::string&,
                     bool>(),
            "config"_a, "overrides"_a, "count"_a, "autoreset"_a, "copy"_a)
       .def("reset", &PyEnvironments::reset, nb::sig("def reset(self, seed: int | None) -> NDArray[numpy.float32]"),

@@ -20,14 +20,22 @@ using flightlog::FlightLog;
 class PyFleet {
  public:
   PyFleet(const std::filesystem::path& config, const std::vector<std::string>& overrides, std::size_t count)
-      : config_(rollout::read_fly_config(found(config), overrides)) {
+      : path_(config), overrides_(overrides) {
     const nb::gil_scoped_release free;
-    if (config_.precision == "float") flights_ = std::make_unique<rollout::Rollout<float>>(config_, count);
-    else flights_ = std::make_unique<rollout::Rollout<double>>(config_, count);
+    const rollout::FlyConfig read = rollout::read_fly_config(found(config), overrides);
+    if (read.precision == "float") flights_ = std::make_unique<rollout::Rollout<float>>(read, count);
+    else flights_ = std::make_unique<rollout::Rollout<double>>(read, count);
   }
   auto with(const auto& call) const {
     return std::visit([&](auto& flights) { return call(*flights); }, flights_);
   }
+  /// A copy that flies on from the same state.
+  PyFleet(const PyFleet& other) : path_(other.path_), overrides_(other.overrides_) {
+    const Turn turn(other.busy_, "the fleet");
+    other.with([&]<class T>(rollout::Rollout<T>& f) { flights_ = std::make_unique<rollout::Rollout<T>>(f); });
+  }
+  /// What makes a fleet like this one at its start.
+  nb::tuple made_of() const { return nb::make_tuple(path_, size(), overrides_); }
   std::size_t size() const {
     return with([](auto& f) { return f.fleet().size(); });
   }
@@ -46,7 +54,8 @@ class PyFleet {
   }
 
  private:
-  rollout::FlyConfig config_;
+  std::filesystem::path path_;
+  std::vector<std::string> overrides_;
   std::variant<std::unique_ptr<rollout::Rollout<double>>, std::unique_ptr<rollout::Rollout<float>>> flights_;
   mutable std::atomic_flag busy_ = ATOMIC_FLAG_INIT;
 };
@@ -64,10 +73,12 @@ nb::dict motion(const PyFleet& fleet, const auto& of) {
 }
 
 void bind_fleet(nb::module_& m) {
-  nb::class_<PyFleet>(m, "Fleet",
-                      "Many flights of a configuration of flappy-fly, in closed loop with its sensors, estimator and "
-                      "controller, and its actor "
-                      "where it has one. A row for each flapper, SI units.")
+  nb::class_<PyFleet> type(m, "Fleet",
+                           "Many flights of a configuration of flappy-fly, in closed loop with its sensors, estimator "
+                           "and controller, and its actor "
+                           "where it has one. A row for each flapper, SI units.");
+  bind_copies(type);
+  type.def("__reduce__", [](const PyFleet& f) { return nb::make_tuple(nb::type<PyFleet>(), f.made_of()); })
       .def(
           "__init__",
           [](PyFleet* self, const std::filesystem::path& config, std::int64_t count,

@@ -30,8 +30,8 @@ class PyBatch {
  public:
   PyBatch(std::size_t count, const Vehicle& vehicle, double step_s, int threads, const sim::World& world,
           const std::string& instruction_set, bool meters_energy, bool single)
-      : count_(count), meters_energy_(meters_energy) {
-    const sim::BatchOptions options{step_s, threads, world, instruction_set, meters_energy};
+      : vehicle_(vehicle), options_{step_s, threads, world, instruction_set, meters_energy}, count_(count) {
+    const sim::BatchOptions& options = options_;
     if (single) batch_ = std::make_unique<sim::Batch<float>>(count, vehicle, options);
     else batch_ = std::make_unique<sim::Batch<double>>(count, vehicle, options);
   }
@@ -39,14 +39,27 @@ class PyBatch {
   auto with(const auto& call) const {
     return std::visit([&](auto& batch) { return call(*batch); }, batch_);
   }
+  /// A copy that flies on from the same state.
+  PyBatch(const PyBatch& other) : vehicle_(other.vehicle_), options_(other.options_), count_(other.count_) {
+    const Turn turn(other.busy_, "the batch");
+    other.with([&]<class T>(sim::Batch<T>& batch) { batch_ = std::make_unique<sim::Batch<T>>(batch); });
+  }
+  /// What makes a batch like this one when it was new.
+  nb::tuple made_of() const {
+    const bool single = std::holds_alternative<std::unique_ptr<sim::Batch<float>>>(batch_);
+    return nb::make_tuple(count_, vehicle_, options_.step_s, options_.threads, options_.world, options_.instruction_set,
+                          options_.meters_energy, single ? "float" : "double");
+  }
+
   std::size_t size() const { return count_; }
-  bool meters_energy() const { return meters_energy_; }
+  bool meters_energy() const { return options_.meters_energy; }
   std::size_t at(std::int64_t i) const { return checked_index(i, count_); }
   std::atomic_flag& busy() const { return busy_; }
 
  private:
+  Vehicle vehicle_;
+  sim::BatchOptions options_;
   std::size_t count_;
-  bool meters_energy_;
   std::variant<std::unique_ptr<sim::Batch<double>>, std::unique_ptr<sim::Batch<float>>> batch_;
   mutable std::atomic_flag busy_ = ATOMIC_FLAG_INIT;
 };
@@ -129,18 +142,27 @@ void bind_batch(nb::module_& m) {
               throw nb::value_error("normal: its length is not 1; accepted: normal_x and normal_y of a unit vector");
             new (w) sim::Wall{x, y, nx, ny};
           },
-          "x_m"_a, "y_m"_a, "normal_x"_a, "normal_y"_a);
+          "x_m"_a, "y_m"_a, "normal_x"_a, "normal_y"_a)
+      .def("__reduce__", [](const sim::Wall& w) {
+        return nb::make_tuple(nb::type<sim::Wall>(), nb::make_tuple(w.x_m, w.y_m, w.normal_x, w.normal_y));
+      });
   nb::class_<sim::World>(m, "World", "What surrounds the flappers. The defaults stand for none: far away.")
       .def(
           "__init__",
           [](sim::World* w, double gravity, double ground, double ceiling, const std::vector<sim::Wall>& walls) {
             new (w) sim::World{gravity, ground, ceiling, walls};
           },
-          "gravity_m_s2"_a = 9.81, "ground_z_m"_a = -1e3, "ceiling_z_m"_a = 1e3, "walls"_a = std::vector<sim::Wall>{});
+          "gravity_m_s2"_a = 9.81, "ground_z_m"_a = -1e3, "ceiling_z_m"_a = 1e3, "walls"_a = std::vector<sim::Wall>{})
+      .def("__reduce__", [](const sim::World& w) {
+        return nb::make_tuple(nb::type<sim::World>(),
+                              nb::make_tuple(w.gravity_m_s2, w.ground_z_m, w.ceiling_z_m, w.walls));
+      });
 
-  nb::class_<PyBatch>(m, "Batch",
-                      "Many flappers in open loop (flappy::sim::Batch): their bytes depend neither on threads nor on "
-                      "batch or processor.")
+  nb::class_<PyBatch> type(m, "Batch",
+                           "Many flappers in open loop (flappy::sim::Batch): their bytes depend neither on threads nor "
+                           "on batch or processor.");
+  bind_copies(type);
+  type.def("__reduce__", [](const PyBatch& b) { return nb::make_tuple(nb::type<PyBatch>(), b.made_of()); })
       .def(
           "__init__",
           [](PyBatch* self, std::int64_t count, const Vehicle& vehicle, double step_s, int threads,
@@ -284,9 +306,13 @@ void bind_batch(nb::module_& m) {
 }  // namespace
 
 void bind_vehicle(nb::module_& m) {
-  nb::class_<Vehicle>(m, "Vehicle",
-                      "A vehicle as its file states it; `vehicle[\"left.motor.resistance_ohm\"]` is one of its "
-                      "parameters, in its unit.")
+  nb::class_<Vehicle> type(m, "Vehicle",
+                           "A vehicle as its file states it; `vehicle[\"left.motor.resistance_ohm\"]` is one of its "
+                           "parameters, in its unit.");
+  bind_copies(type);
+  type.def("__getstate__", [](const Vehicle& v) { return model::vehicle_text(v); })
+      .def("__setstate__",
+           [](Vehicle& v, const std::string& text) { new (&v) Vehicle(model::parse_vehicle(text, "the vehicle")); })
       .def(
           "__init__",
           [](Vehicle* self, const std::filesystem::path& path, const std::vector<std::string>& overrides) {

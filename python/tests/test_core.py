@@ -1,6 +1,8 @@
 """What the module itself does: batches, fleets, environments, flights, policies, and what it says of bad inputs."""
 
+import copy
 import multiprocessing
+import pickle
 import subprocess
 import sys
 import threading
@@ -118,6 +120,34 @@ def test_a_fleet_flies_as_flappy_fly(tmp_path):
     assert np.abs(truth["position_m"] - fleet.estimate()["position_m"]).max() < 0.01
     assert fleet.observations().dtype == np.float32
     assert fleet.rewards().shape == fleet.ended().shape == (2,)
+
+
+def test_vehicles_batches_and_fleets_are_pickled_and_copied():
+    vehicle = flappy.Vehicle("vehicles/hummingbird_nominal.toml")
+    vehicle["left.motor.resistance_ohm"] = 4.25
+    world = flappy.World(ground_z_m=-0.5, walls=[flappy.Wall(1, 0, -1, 0)])
+    for twin in (pickle.loads(pickle.dumps(vehicle)), copy.copy(vehicle), copy.deepcopy(vehicle)):
+        assert twin.text == vehicle.text
+        twin["left.motor.resistance_ohm"] = 4.5
+        assert vehicle["left.motor.resistance_ohm"] == 4.25
+
+    def step(flown):
+        if isinstance(flown, flappy.Batch):
+            flown.set_inputs([9.8, 0.1, 0, 0])
+        flown.step(40)
+        return flown.hash()
+
+    for make in (
+        lambda: flappy.Batch(3, vehicle, world=world, meters_energy=True, precision="float"),
+        lambda: flappy.Batch(3, vehicle),
+        lambda: flappy.Fleet("fly/hover.toml", 2, ["flight.seed=7"]),
+    ):
+        original = make()
+        made_again = pickle.loads(pickle.dumps(original))
+        assert step(made_again) == step(original)
+        twin, other = copy.deepcopy(original), copy.copy(original)
+        other.step(1)
+        assert step(original) == step(twin) != other.hash()
 
 
 def test_environments_that_add_nothing_fly_as_flappy_fly():
@@ -269,6 +299,7 @@ def test_a_header_acts(tmp_path):
     policy = flappy.Policy(tmp_path / "p.h")
     assert policy(np.array([1, 2, 3], np.float32)).tolist() == [3, 3]
     assert policy(np.array([[1, 2, 3], [0, 0, 1]])).tolist() == [[3, 3], [0, 1]]
+    assert pickle.loads(pickle.dumps(policy))(np.array([1, 2, 3], np.float32)).tolist() == [3, 3]
     with pytest.raises(ValueError, match=r"accepted: float32 of shape \(1, 3\)"):
         policy(np.zeros(4))
 

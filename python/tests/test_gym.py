@@ -1,5 +1,8 @@
 """The environments as Gymnasium has them."""
 
+import copy
+import multiprocessing
+import pickle
 import subprocess
 import sys
 import warnings
@@ -154,6 +157,61 @@ def test_options_of_a_reset_are_left_alone():
     options = {"reset_mask": np.array([True, False]), "own": 1}
     env.reset(options=options)
     assert list(options) == ["reset_mask", "own"]
+
+
+def some_steps(env, first: int = 0, last: int = 8) -> list[bytes]:
+    """What an environment, or many, show in these steps."""
+    shape, seen = env.action_space.shape, []
+    for step in range(first, last):
+        *shown, _ = env.step(np.full(shape, 0.03 * step, np.float32))
+        seen.append(b"".join(np.asarray(each).tobytes() for each in shown))
+    return seen
+
+
+def from_its_start(env) -> list[bytes]:
+    return [env.reset(seed=3)[0].tobytes(), *some_steps(env)]
+
+
+def both(**options):
+    """One environment, and many."""
+    return [
+        gymnasium.make("flappy/Hover-v0", overrides=BRIEF, first=2),
+        gymnasium.make_vec("flappy/Hover-v0", num_envs=3, overrides=BRIEF, first=2, max_episode_steps=4, **options),
+    ]
+
+
+def test_environments_are_pickled_by_what_makes_them():
+    envs = both(autoreset_mode="NextStep", threads=1, copy=False)
+    envs[0].reset(seed=8)
+    assert pickle.loads(pickle.dumps(envs[0])).spec == envs[0].spec
+    expected = [from_its_start(env) for env in envs]
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.map(from_its_start, envs) == expected
+    again = pickle.loads(pickle.dumps(envs[1].unwrapped))
+    assert again.autoreset_mode == AutoresetMode.NEXT_STEP
+    assert again.observation_space == envs[1].observation_space
+
+
+@pytest.mark.parametrize("mode", AutoresetMode)
+def test_copies_fly_on_from_where_they_are(mode):
+    for make in (0, 1):
+        whole, env = (both(autoreset_mode=mode, copy=make == 0)[make] for _ in range(2))
+        for each in (whole, env):
+            each.reset(seed=3)
+            some_steps(each, 0, 3)
+        twin, other, shallow = copy.deepcopy(env), copy.deepcopy(env), copy.copy(env.unwrapped)
+        assert twin.unwrapped is not env.unwrapped
+        assert twin.action_space.sample().tobytes() == env.action_space.sample().tobytes()
+        other.step(np.ones(env.action_space.shape, np.float32))
+        expected = some_steps(whole, 3, 5)
+        assert some_steps(env, 3, 5) == expected  # beside one that flew elsewhere
+        env.close()
+        assert some_steps(twin, 3, 5) == expected
+        assert some_steps(shallow, 3, 5) == expected
+        assert twin.unwrapped.hash() == whole.unwrapped.hash() != other.unwrapped.hash()
+        if make == 1 and mode == AutoresetMode.DISABLED:
+            mask = {"reset_mask": np.array([True, False, True])}
+            assert twin.reset(options=mask)[0].tobytes() == whole.reset(options=mask)[0].tobytes()
 
 
 def test_actions_in_their_units():

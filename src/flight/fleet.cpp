@@ -46,6 +46,14 @@ Fleet<T>::Fleet(std::size_t count, const model::Vehicle& vehicle, const FleetOpt
 template <class T>
 Fleet<T>::~Fleet() = default;
 template <class T>
+Fleet<T>::Fleet(const Fleet& other) : storage_(std::make_unique<Storage>(*other.storage_)) {
+  Storage& s = *storage_;  // its plan still points into the other's
+  s.plan.path.segments = s.path.data();
+  s.point_to_actor();
+  s.plan.cycles = nullptr;
+  s.plans.clear();
+}
+template <class T>
 Fleet<T>::Fleet(Fleet&&) noexcept = default;
 template <class T>
 Fleet<T>& Fleet<T>::operator=(Fleet&&) noexcept = default;
@@ -111,13 +119,11 @@ void Fleet<T>::set_actor(const std::shared_ptr<const policy::Actor>& actor) {
       throw std::invalid_argument("the actor's observation or action is not that of the task");
   }
   s.actor = actor;
-  s.plan.actor = {};
-  if (!actor) return;
   s.actor_numbers.clear();
-  for (const std::vector<double>* list : {&actor->weights, &actor->mean, &actor->scale})
-    for (const double x : *list) s.actor_numbers.push_back(static_cast<T>(x));
-  const T *weights = s.actor_numbers.data(), *mean = weights + actor->weights.size();
-  s.plan.actor = policy::view_of(*actor, weights, mean, mean + actor->mean.size());
+  if (actor)
+    for (const std::vector<double>* list : {&actor->weights, &actor->mean, &actor->scale})
+      for (const double x : *list) s.actor_numbers.push_back(static_cast<T>(x));
+  s.point_to_actor();
 }
 
 template <class T>

@@ -73,6 +73,8 @@ class Fleet {
   /// has no path, or if its actions are motor voltages and there is a controller.
   Fleet(std::size_t count, const model::Vehicle& vehicle, const FleetOptions& options);
   ~Fleet();
+  /// A copy flies on from the same state, to the same bytes. Copy it between steps.
+  Fleet(const Fleet&);
   Fleet(Fleet&&) noexcept;
   Fleet& operator=(Fleet&&) noexcept;
 

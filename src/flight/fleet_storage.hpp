@@ -112,6 +112,13 @@ struct Fleet<T>::Storage {
                                   " control periods remember; accepted: less, a lower mocap.latency_s or control rate");
   }
 
+  void point_to_actor() {
+    plan.actor = {};
+    if (!actor) return;
+    const T *weights = actor_numbers.data(), *mean = weights + actor->weights.size();
+    plan.actor = policy::view_of(*actor, weights, mean, mean + actor->mean.size());
+  }
+
   struct Place {
     FlightBlock<T>& block;
     int lane;

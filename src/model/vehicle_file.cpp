@@ -55,10 +55,8 @@ void read_contact(const io::Table& table, Vehicle& vehicle) {
 const std::string kMultibody = "multibody", kBeatAveraged = "beat_averaged", kPredicted = "predicted",
                   kJointed = "jointed";
 
-}  // namespace
-
-Vehicle read_any_vehicle(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
-  const io::Table root = io::Config::load(path, overrides).root();
+Vehicle vehicle_of(const io::Config& config) {
+  const io::Table root = config.root();
   root.schema(1);
   Vehicle vehicle;
   std::vector<std::string> keys = {"schema", "name", "model", "effects", "posterior", "contact"};
@@ -92,6 +90,16 @@ Vehicle read_any_vehicle(const std::filesystem::path& path, const std::vector<st
   if (const std::optional<PhysicalFault> fault = physical_fault(vehicle))
     root.fail(fault->path, fault->what, fault->accepted);
   return vehicle;
+}
+
+}  // namespace
+
+Vehicle read_any_vehicle(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
+  return vehicle_of(io::Config::load(path, overrides));
+}
+
+Vehicle parse_vehicle(const std::string& text, const std::string& name) {
+  return vehicle_of(io::Config::parse(text, name));
 }
 
 Vehicle read_flyable_vehicle(const std::filesystem::path& path, const std::vector<std::string>& overrides) {

@@ -41,6 +41,17 @@ Environments::Environments(const FlyConfig& config, const EnvironmentOptions& op
   }
 }
 
+Environments::Environments(const Environments& other)
+    : options_(other.options_),
+      observed_(other.observed_),
+      actions_(other.actions_),
+      step_s_(other.step_s_),
+      ended_(std::make_unique<bool[]>(other.count())),
+      episodes_(other.episodes_),
+      final_observation_(other.final_observation_) {
+  std::ranges::copy(other.ended(), ended_.get());
+}
+
 namespace {
 
 template <class T>
@@ -54,6 +65,12 @@ class EnvironmentsOf final : public Environments {
         lives_(options.count) {
     for (const flight::Signal& s : observed_) bounds_.push_back(static_cast<T>(s.high));
     prepare();
+  }
+
+  std::unique_ptr<Environments> copy() const override {
+    auto twin = std::make_unique<EnvironmentsOf>(*this);
+    twin->config_.watch = nullptr;
+    return twin;
   }
 
   const FlyConfig& config() const override { return config_; }
@@ -118,6 +135,9 @@ class EnvironmentsOf final : public Environments {
   }
 
  private:
+  struct Hovers {
+    std::vector<flight::Snapshot<T>> own, others;
+  };
   struct Life {
     std::uint32_t episode = 0, steps = 0;
     double episode_return = 0;
@@ -133,9 +153,11 @@ class EnvironmentsOf final : public Environments {
     fleet_.emplace(count(), config_.vehicle, o);
     if (config_.fleet.task.start.settled) {
       const auto vehicle = [&](std::uint32_t flapper) { return config_.vehicle_of(flapper); };
-      own_ = settle<T>(o, count(), kHover_s, vehicle);
+      Hovers hovers;
+      hovers.own = settle<T>(o, count(), kHover_s, vehicle);
       o.first_flapper = 0;
-      others_ = settle<T>(o, kSettledVehicles, kHover_s, vehicle);
+      hovers.others = settle<T>(o, kSettledVehicles, kHover_s, vehicle);
+      hovers_ = std::make_shared<const Hovers>(std::move(hovers));
     }
     for (std::size_t i = 0; i < count(); ++i) {
       lives_[i].episode = 0;
@@ -143,16 +165,16 @@ class EnvironmentsOf final : public Environments {
     }
   }
 
-  /// Episode 0 starts as in flappy-fly; if the task starts settled, later ones start from a random hover of others_.
+  /// Episode 0 starts as in flappy-fly; if the task starts settled, later ones start from a random one of Hovers::others.
   void start(std::size_t i) {
     Life& life = lives_[i];
     const flight::Snapshot<T>* hover = nullptr;
-    if (!own_.empty()) {
+    if (hovers_) {
       const sim::RandomKey key{config_.fleet.seed, config_.fleet.first_flapper + static_cast<std::uint32_t>(i),
                                life.episode, sim::Stream::snapshot};
       const auto place =
-          static_cast<std::size_t>(sim::uniform_pair(key, 0).first * static_cast<double>(others_.size()));
-      hover = life.episode == 0 ? &own_[i] : &others_[place];
+          static_cast<std::size_t>(sim::uniform_pair(key, 0).first * static_cast<double>(hovers_->others.size()));
+      hover = life.episode == 0 ? &hovers_->own[i] : &hovers_->others[place];
     }
     Rollout<T>::start(*fleet_, config_, i, life.episode, hover);
     if (config_.excitation.acts()) fleet_->set_added(i, config_.excitation.at(0));
@@ -210,7 +232,7 @@ class EnvironmentsOf final : public Environments {
   FlyConfig config_;
   std::uint32_t paid_ticks_;
   std::optional<flight::Fleet<T>> fleet_;
-  std::vector<flight::Snapshot<T>> own_, others_;
+  std::shared_ptr<const Hovers> hovers_;  // null where episodes do not start settled; shared with copies
   std::vector<T> bounds_;
   std::vector<Life> lives_;
 };

@@ -38,6 +38,8 @@ struct EndedEpisode {
 class Environments {
  public:
   virtual ~Environments() = default;
+  /// A copy flies on from the same state, to the same bytes; nobody watches it.
+  virtual std::unique_ptr<Environments> copy() const = 0;
 
   virtual const FlyConfig& config() const = 0;
   std::size_t count() const { return options_.count; }
@@ -74,6 +76,7 @@ class Environments {
 
  protected:
   Environments(const FlyConfig& config, const EnvironmentOptions& options);
+  Environments(const Environments& other);
 
   EnvironmentOptions options_;
   std::vector<flight::Signal> observed_, actions_;

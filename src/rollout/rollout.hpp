@@ -19,7 +19,9 @@ class Rollout {
   /// neither, the controller alone. If the task starts settled, flights start from `hover`, which is filled first if
   /// empty.
   Rollout(FlyConfig config, std::size_t count, const policy::Policy* policy = nullptr, Hover* hover = nullptr);
-  Rollout(const Rollout&) = delete;
+  /// A copy flies on from the same state, to the same bytes; it records nothing.
+  Rollout(const Rollout& other)
+      : config_(other.config_), fleet_(other.fleet_), policy_(other.policy_), tick_(other.tick_) {}
 
   /// Starts an episode of flapper `i` from the snapshot `hover`, or if null from the task's start with its vehicle.
   static void start(flight::Fleet<T>& fleet, const FlyConfig& config, std::size_t i, std::uint32_t episode,

@@ -268,6 +268,12 @@ Batch<T>::Batch(std::size_t count, const model::Vehicle& vehicle, const BatchOpt
 template <class T>
 Batch<T>::~Batch() = default;
 template <class T>
+Batch<T>::Batch(const Batch& other) : storage_(std::make_unique<Storage>(*other.storage_)) {}
+template <class T>
+Batch<T>& Batch<T>::operator=(const Batch& other) {
+  return *this = Batch(other);
+}
+template <class T>
 Batch<T>::Batch(Batch&&) noexcept = default;
 template <class T>
 Batch<T>& Batch<T>::operator=(Batch&&) noexcept = default;

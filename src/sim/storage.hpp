@@ -39,6 +39,14 @@ std::uint64_t bits_of(T value) {
   else return std::bit_cast<std::uint64_t>(value);
 }
 
+/// A unique_ptr whose copy points to a copy.
+template <class X>
+struct CopiedPointer : std::unique_ptr<X> {
+  using std::unique_ptr<X>::unique_ptr;
+  using std::unique_ptr<X>::operator=;
+  CopiedPointer(const CopiedPointer& other) : std::unique_ptr<X>(other ? std::make_unique<X>(*other) : nullptr) {}
+};
+
 template <class T>
 struct BeatAveragedStorage {
   BeatAveragedProgram program;
@@ -95,6 +103,12 @@ struct JointedVehicles {
   struct alignas(64) Row {
     T lanes[kLanes<T>];
   };
+  JointedVehicles() = default;
+  JointedVehicles(const JointedVehicles& other)
+      : program(other.program), rows(other.rows), memory(other.memory), work_J(other.work_J) {
+    point(other.blocks.size());
+  }
+
   JointedProgram program;
   std::vector<Row> rows, memory;  // [block][row]
   std::vector<double> work_J;     // [block][positive, all][lane]
@@ -125,14 +139,14 @@ struct Batch<T>::Storage {
   std::int64_t steps = 0;
   StepBlock<T> kernel = nullptr;
   std::vector<Block<T>> blocks;
-  std::vector<std::uint64_t> lane_effects;                // bits of each lane; empty while no flapper has an effect
-  std::vector<std::uint64_t> block_effects;               // their union
-  std::vector<T> effect_rows;                             // [block][row][lane]
-  std::uint64_t effects_kept = 0;                         // effects with memory, because some vehicle has named them
-  std::vector<T> effect_states;                           // [block][row][lane]
-  std::vector<MotorRows<T>> motors;                       // [block], if energy is metered
-  std::unique_ptr<BeatAveragedStorage<T>> beat_averaged;  // of beat-averaged robots
-  std::unique_ptr<JointedVehicles<T>> jointed;            // of articulated wings
+  std::vector<std::uint64_t> lane_effects;              // bits of each lane; empty while no flapper has an effect
+  std::vector<std::uint64_t> block_effects;             // their union
+  std::vector<T> effect_rows;                           // [block][row][lane]
+  std::uint64_t effects_kept = 0;                       // effects with memory, because some vehicle has named them
+  std::vector<T> effect_states;                         // [block][row][lane]
+  std::vector<MotorRows<T>> motors;                     // [block], if energy is metered
+  CopiedPointer<BeatAveragedStorage<T>> beat_averaged;  // of beat-averaged robots
+  CopiedPointer<JointedVehicles<T>> jointed;            // of articulated wings
   std::vector<model::ContactPoint> points;  // points of contact; names and bodies are the same for the whole batch
   std::vector<model::ContactPoint::Body> points_on;
   std::vector<T> contact_rows, contact_memory;  // [block][point][row][lane]

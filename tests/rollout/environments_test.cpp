@@ -28,6 +28,12 @@ struct Bench {
         reward(options.count),
         terminated(new bool[options.count]()),
         truncated(new bool[options.count]()) {}
+  Bench(const Bench& of)
+      : all(of.all->copy()),
+        observation(of.observation),
+        reward(of.reward),
+        terminated(new bool[reward.size()]()),
+        truncated(new bool[reward.size()]()) {}
   void reset(std::optional<std::uint64_t> seed) {
     all->reset(seed, observation.data());
     std::ranges::fill(reward, 0.0F);
@@ -98,6 +104,40 @@ TEST(Environments, FlyAsFlappyFlyDoes) {
     };
     if (config.precision == "float") compare(0.0F);
     else compare(0.0);
+  }
+}
+
+/// For every kind of vehicle and memory; an episode ends before the copy is made, and one after it.
+TEST(Environments, CopiesFlyOnToTheSameBytes) {
+  const std::vector<std::string> ends = {"task.end.time_s=0.06"};
+  const std::vector<std::string> sees_more = {"task.end.time_s=0.06", "task.history=2", "precision=\"double\""};
+  for (const auto& [config, overrides] : {std::pair{kHover, ends},
+                                          {kEscape, sees_more},
+                                          {test::source_path("configs/fly/quadrotor.toml"), ends},
+                                          {test::source_path("configs/fly/hummingbird_driven.toml"), ends},
+                                          {test::source_path("configs/fly/perching.toml"), ends}}) {
+    constexpr std::size_t kCount = 2;
+    Bench whole(config, overrides, {kCount, Autoreset::same_step}), bench(config, overrides, {kCount});
+    const auto flown = [](Bench& b, int from, int to, float sign = 1) {
+      std::uint64_t hash = 0;
+      for (int step = from; step < to; ++step) {
+        std::vector<float> action = some_actions(kCount, b.actions(), step);
+        for (float& a : action) a *= sign;
+        b.step(action);
+        for (std::size_t i = 0; i < kCount; ++i) hash = course(b, i, hash);
+      }
+      return sim::mixed(hash, b.all->hash(0, kCount));
+    };
+    const int before = static_cast<int>(std::lround(0.08 / whole.all->step_s())), after = 2 * before;
+    for (Bench* b : {&whole, &bench}) b->reset(3), flown(*b, 0, before);
+    const std::uint64_t expected = flown(whole, before, after);
+    EXPECT_GT(whole.all->episode(0), bench.all->episode(0)) << config;
+    Bench twin(bench), other(bench);
+    EXPECT_NE(flown(other, before, after, -1), expected) << config;
+    EXPECT_EQ(flown(bench, before, after), expected) << config << ": the original, beside a copy that flew elsewhere";
+    bench.all.reset();
+    EXPECT_EQ(flown(twin, before, after), expected) << config;
+    EXPECT_EQ(twin.all->episodes()[1].length, whole.all->episodes()[1].length);
   }
 }
 
