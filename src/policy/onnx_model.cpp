@@ -140,13 +140,12 @@ std::string write(const PolicyNetwork& n, const OnnxMetadata& metadata) {
           static_cast<float>(kLayerNormEpsilon));
       x = "norm" + number;
     }
-    if (last && n.linear) {
-      graph.node("Clip", {x, graph.constant("minus_one", {}, {-1}), graph.constant("one", {}, {1})}, "end");
-      x = "end";
-    } else {
-      x = activated(graph, last ? Activation::tanh : n.hidden, x, last ? "end" : "layer" + number);
-    }
+    if (!last) x = activated(graph, n.hidden, x, "layer" + number);
+    else if (!n.linear) x = activated(graph, Activation::tanh, x, "squashed");
   }
+  // after tanh too: that of a runtime may be larger than 1 (onnxruntime 1.32: 1.0000002)
+  graph.node("Clip", {x, graph.constant("minus_one", {}, {-1}), graph.constant("one", {}, {1})}, "end");
+  x = "end";
   graph.node("Mul", {x, graph.constant("half", {n.outputs()}, n.half)}, "offset");
   graph.node("Add", {"offset", graph.constant("middle", {n.outputs()}, n.middle)}, "answer");
   graph.node("IsNaN", {"observation"}, "nan");

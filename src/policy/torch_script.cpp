@@ -80,10 +80,10 @@ std::string write(const PolicyNetwork& n, const std::string& contract) {
       forward << "    x = torch.layer_norm(x, [" << outputs << "], self.gain" << number << ", self.shift" << number
               << ", " << kLayerNormEpsilon << ")\n";
     }
-    if (last && n.linear) forward << "    x = torch.clamp(x, -1.0, 1.0)\n";
-    else forward << "    x = torch." << (last ? "tanh" : name_of(n.hidden)) << "(x)\n";
+    if (!last || !n.linear) forward << "    x = torch." << (last ? "tanh" : name_of(n.hidden)) << "(x)\n";
   }
-  forward << "    action = self.middle + self.half * x\n"
+  forward << "    x = torch.clamp(x, -1.0, 1.0)\n"  // after tanh too: that of a runtime may be larger than 1
+          << "    action = self.middle + self.half * x\n"
           << "    refused = torch.isnan(observation).any(1, True)\n"
           << "    return torch.where(refused, torch.zeros_like(action), action)\n";
   module.define(forward.str());

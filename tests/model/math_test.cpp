@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -105,6 +107,19 @@ TYPED_TEST(Elementary, Exponential) {
     EXPECT_EQ(value(exp(TypeParam(x))), value(exp(TypeParam(high))));
   EXPECT_TRUE(std::isfinite(value(exp(TypeParam(high)))));
   EXPECT_TRUE(std::isnan(value(exp(TypeParam(this->kNan)))));
+}
+
+// Every float around where exp(-2 |x|) vanishes beside 1.
+TEST(Math, HyperbolicTangentStaysWithinOne) {
+  constexpr std::uint32_t kAtOnce = 16;
+  float largest = 0;
+  for (auto bits = std::bit_cast<std::uint32_t>(7.5F); bits < std::bit_cast<std::uint32_t>(10.0F); bits += kAtOnce) {
+    float x[kAtOnce];
+    for (std::uint32_t k = 0; k < kAtOnce; ++k) x[k] = std::bit_cast<float>(bits + k);
+    const auto y = tanh(Lanes<float, kAtOnce>::load(x));
+    for (std::uint32_t k = 0; k < kAtOnce; ++k) largest = std::max(largest, y.raw[k]);
+  }
+  EXPECT_EQ(largest, 1);
 }
 
 // Worst where 2 |x| = 0.35, with exp(-2 |x|) - 1 = q / 2 - 1 / 2 = -0.3: from q 0.5 h and from the sum 0.5 h, 3.3 h in

@@ -53,6 +53,23 @@ TEST(Onnx, ActsOnRows) {
   EXPECT_EQ(model.metadata_props(0).key() + " " + model.metadata_props(0).value(), "task a task");
 }
 
+/// Also from 8.2 to 9, where the runtime's own tanh is larger than 1.
+TEST(Onnx, StaysWithinTheRangeOfActions) {
+  const Folder folder;
+  PolicyNetwork n;
+  n.widths = {1, 1};
+  n.clip = 100;
+  n.mean = {0}, n.scale = {1}, n.weights = {0, 1}, n.middle = {0.5F}, n.half = {3};
+  const auto policy = load_policy(folder.write("p.onnx", onnx_model(n, {})), 1, 1);
+  std::vector<float> seen;
+  for (float x = 8; x < 9.5F; x += 1e-4F) seen.insert(seen.end(), {x, -x});
+  for (float x = 9.5F; x < 200; x *= 1.01F) seen.insert(seen.end(), {x, -x});
+  float low = 0, high = 0;
+  for (const float a : acts(*policy, seen)) low = std::min(low, a), high = std::max(high, a);
+  EXPECT_EQ(high, 3.5F);
+  EXPECT_EQ(low, -2.5F);
+}
+
 /// Layer norm, and each activation, against their definitions in double precision.
 TEST(Onnx, HasEveryActivationAndLayerNorm) {
   const Folder folder;

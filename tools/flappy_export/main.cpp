@@ -110,6 +110,7 @@ void write_for_runtimes(Export& e, const Request& request, const learn::Finished
   const auto observation = run.fly.fleet.task.observation(), action = run.fly.fleet.task.action();
   policy::PolicyVectors vectors;
   if (request.prove) vectors = deploy::some_of(deploy::roll_out(run.fly, 0, kComparedFlights), kComparedVectors);
+  const PolicyVectors far_out = deploy::saturating(network, e.flown);
   std::vector<deploy::Agreement> rows;
   const auto try_out = [&](const std::string& name, const std::string& runtime, const char* key) {
     io::write_atomically(work / name, e.files[name]);
@@ -121,8 +122,14 @@ void write_for_runtimes(Export& e, const Request& request, const learn::Finished
     json[key] = json_of(error);
     if (*std::ranges::max_element(error.largest) > kMaxError)
       throw std::runtime_error(runtime + " does not act as the actor does");
+    deploy::Agreement asked;
+    deploy::ask_far_out(asked, *policy, network, far_out);
+    if (asked.beyond_range > 0) throw std::runtime_error(name + " leaves the range of actions in " + runtime);
     if (!request.prove) return;
     deploy::Agreement& row = rows.emplace_back(deploy::compare(name, runtime, *policy, network.half, vectors));
+    row.saturated = asked.saturated;
+    std::printf("%s: %zu of %zu outputs far out saturate, and none leaves its range\n", name.c_str(), row.saturated,
+                far_out.action.size());
     const deploy::BesideActor flown = deploy::fly_beside(run.fly, *policy, kProofFlights);
     row.flights = kProofFlights;
     row.ended_alike = flown.ended_alike;

@@ -136,6 +136,20 @@ void append(policy::PolicyVectors& to, const policy::PolicyVectors& more) {
   to.action.insert(to.action.end(), more.action.begin(), more.action.end());
 }
 
+policy::PolicyVectors saturating(const policy::PolicyNetwork& network, const policy::PolicyVectors& flown) {
+  constexpr std::size_t kRows = 64;
+  constexpr float kStep = 1.03F;  // three from 8.2 to 9, where onnxruntime's tanh is larger than 1
+  const policy::PolicyVectors some = some_of(flown, kRows);
+  policy::PolicyVectors v{network.inputs(), network.outputs(), {}, {}};
+  for (float far = 1; far < 1000; far *= kStep)
+    for (std::size_t k = 0; k < some.observation.size(); ++k) {
+      const float middle = network.mean[k % network.mean.size()];
+      v.observation.push_back(middle + far * (some.observation[k] - middle));
+    }
+  v.action = evaluate(network, v.observation);
+  return v;
+}
+
 policy::PolicyVectors corners(const policy::PolicyNetwork& network, const std::vector<flight::Signal>& observation) {
   policy::PolicyVectors v{network.inputs(), network.outputs(), {}, {}};
   for (const float reach : {0.0F, 1.0F, 1000.0F, 1e30F})  // distance from the middle, in units of half the range

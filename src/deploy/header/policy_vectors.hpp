@@ -32,6 +32,10 @@ BesideActor fly_beside(const rollout::FlyConfig& given, const policy::Policy& po
 policy::PolicyVectors some_of(const policy::PolicyVectors& all, std::size_t count);
 void append(policy::PolicyVectors& to, const policy::PolicyVectors& more);
 
+/// Flown observations at 1 to 1000 times their distance from the middle of the normalisation, so that one output after
+/// the other saturates.
+policy::PolicyVectors saturating(const policy::PolicyNetwork& network, const policy::PolicyVectors& flown);
+
 /// Observations at and beyond the limits of their ranges, where inputs are clipped and outputs saturate.
 policy::PolicyVectors corners(const policy::PolicyNetwork& network, const std::vector<flight::Signal>& observation);
 

@@ -46,4 +46,16 @@ Agreement compare(const std::string& file, const std::string& runtime, const pol
   return row;
 }
 
+void ask_far_out(Agreement& row, const policy::Policy& policy, const policy::PolicyNetwork& network,
+                 const policy::PolicyVectors& vectors) {
+  std::vector<float> action(vectors.action.size());
+  policy.act(vectors.rows(), vectors.observation.data(), action.data());
+  for (std::size_t i = 0; i < action.size(); ++i) {
+    const std::size_t k = i % network.half.size();
+    const float low = network.middle[k] - network.half[k], high = network.middle[k] + network.half[k];
+    row.saturated += vectors.action[i] <= low || vectors.action[i] >= high;
+    row.beyond_range += !(action[i] >= low && action[i] <= high);
+  }
+}
+
 }  // namespace flappy::deploy

@@ -17,6 +17,8 @@ struct Agreement {
   /// half the output's range, which do not grow where an output crosses 0.
   std::size_t outputs = 0, differing = 0;
   double median_ulp = 0, percentile_99_ulp = 0, largest_ulp = 0, largest_ulp_of_range = 0;
+  /// Of saturating(): outputs at an end of their range as the actor has them, and those of the file beyond it.
+  std::size_t saturated = 0, beyond_range = 0;
   std::size_t flights = 0, ended_alike = 0;  ///< as fly_beside() (policy_vectors.hpp) finds them
   double largest_distance_m = 0;
 };
@@ -24,6 +26,10 @@ struct Agreement {
 /// Compares outputs alone. `half`: of each output's range; `vectors`: with the actor's actions.
 Agreement compare(const std::string& file, const std::string& runtime, const policy::Policy& policy,
                   const std::vector<float>& half, const policy::PolicyVectors& vectors);
+
+/// Fills in `saturated` and `beyond_range` of a row.
+void ask_far_out(Agreement& row, const policy::Policy& policy, const policy::PolicyNetwork& network,
+                 const policy::PolicyVectors& vectors);
 
 /// Number of floats from `a` to `b`; infinite where one is NaN.
 double ulp_between(float a, float b);

@@ -113,6 +113,8 @@ nlohmann::ordered_json json_of(const std::vector<Agreement>& rows) {
                    {"percentile_99_ulp", row.percentile_99_ulp},
                    {"largest_ulp", row.largest_ulp},
                    {"largest_ulp_of_range", row.largest_ulp_of_range},
+                   {"saturated", row.saturated},
+                   {"beyond_range", row.beyond_range},
                    {"flights", row.flights},
                    {"ended_alike", row.ended_alike},
                    {"largest_distance_m", row.largest_distance_m}});

@@ -336,6 +336,22 @@ TEST(FileProof, ComparesOutputsAndFlights) {
   EXPECT_GT(fly_beside(config, OfNetwork(off), 8).largest_distance_m, 1e-4);
 }
 
+TEST(FileProof, FindsWhatLeavesTheRange) {
+  const rollout::FlyConfig config = escape({8}, Activation::relu);
+  const policy::PolicyNetwork network = network_of(config);
+  const policy::PolicyVectors far_out = saturating(network, roll_out(config, 0, 8));
+  Agreement same, beyond;
+  ask_far_out(same, OfNetwork(network), network, far_out);
+  EXPECT_GT(same.saturated, 100u);
+  EXPECT_EQ(same.beyond_range, 0u);
+  policy::PolicyNetwork wider = network;  // by a millionth, at one output
+  wider.half[0] *= 1 + 0x1p-20F;
+  ask_far_out(beyond, OfNetwork(wider), network, far_out);
+  EXPECT_EQ(beyond.saturated, same.saturated);
+  EXPECT_GT(beyond.beyond_range, 10u);
+  EXPECT_LT(beyond.beyond_range, same.saturated);
+}
+
 /// Two outputs that are voltages: in 32 bits to the bit, in 8 bits near, in TorchScript within rounding.
 TEST(PolicyHeader, SetsVoltagesAsTheLanesDo) {
   const Folder folder;
