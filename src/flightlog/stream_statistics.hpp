@@ -1,3 +1,12 @@
+// What the times of a stream say of it: its rate, its gaps, its jitter.
+//
+// The period T is the most frequent interval. Each interval beyond 1.5 T counts as the samples that are missing in it;
+// a sample that is only late makes a short interval besides, which is taken off.
+//
+// Rows that come in bunches of n, as two at a time and then a pause, are told by their sequence: n intervals in a row
+// add up to n T, and exactly one of them is long. A stream of which each third sample is missing has the sequence of
+// pairs, and is taken for pairs. Of bunches of three and more the short interval is below half of the mean: where
+// every fourth sample is missing it is not.
 #pragma once
 
 #include <optional>
@@ -15,8 +24,7 @@ struct StreamStatistics {
   std::optional<double> declared_hz;
 };
 
-/// `t_s`: at least two increasing times. The usual interval is half the median span of two, so samples that arrive in
-/// pairs are regular; missing samples are counted by it.
+/// `t_s`: at least two increasing times.
 StreamStatistics stream_statistics(const std::string& name, const Column& t_s, std::optional<double> declared_hz);
 
 }  // namespace flappy::flightlog
