@@ -221,6 +221,7 @@ struct Stream {
   const StreamMapping& mapping;
   std::vector<std::int64_t> t_ns;
   Columns columns;
+  std::vector<const ColumnMapping*> not_measured;  ///< of each row, the first column that it says is not measured
   StreamReport report;
 
   void turn() {
@@ -320,7 +321,8 @@ Column seconds(const std::vector<std::int64_t>& t_ns, std::int64_t start_ns) {
 }
 
 bool has_none(const Stream& s, std::size_t i) {
-  return std::ranges::all_of(s.columns, [&](const auto& column) { return std::isnan(column.second[i]); });
+  return !s.not_measured[i] &&
+         std::ranges::all_of(s.columns, [&](const auto& column) { return std::isnan(column.second[i]); });
 }
 
 const std::string kBeyond = " is out of range";
@@ -342,6 +344,7 @@ void require_range(const Stream& s) {
 std::string fault_of(const Stream& s, std::size_t i, const Span& span) {
   if (s.t_ns[i] == kNoTime) return "no time";
   if (!span.recorded.contains(s.t_ns[i])) return "apart from the rest of the recording";
+  if (const ColumnMapping* c = s.not_measured[i]) return c->field + " is not measured, as the message says";
   for (const auto& [name, column] : s.columns) {
     if (std::isnan(column[i])) return "lacks " + name;
     if (!std::isfinite(column[i])) return name + " is no finite number";
@@ -469,7 +472,7 @@ Stream read_stream(const Channels& channels, const StreamMapping& mapping, const
                        mapping.time == TimeOf::stamp ? "\"received\", or \"field\" with time_field"
                                                      : "\"stamp\", or \"field\" with time_field");
   const Timed own = timed(channel, mapping, clocks);
-  Stream s{mapping, own.t_ns, {}, {}};
+  Stream s{mapping, own.t_ns, {}, std::vector<const ColumnMapping*>(own.t_ns.size()), {}};
   s.report.stream = mapping.name;
   s.report.channel = mapping.channel;
   for (const ColumnMapping& c : mapping.columns) {
@@ -483,7 +486,10 @@ Stream read_stream(const Channels& channels, const StreamMapping& mapping, const
       for (const std::size_t row : last_rows(own.t_ns, timed(other, mapping, clocks).t_ns))
         column.push_back(row < values.size() ? values[row] : std::numeric_limits<double>::quiet_NaN());
     }
-    for (double& value : column) value = c.scale * value + c.offset;
+    for (std::size_t i = 0; i < column.size(); ++i) {
+      if (is_not_measured(column[i]) && !s.not_measured[i]) s.not_measured[i] = &c;
+      column[i] = c.scale * column[i] + c.offset;
+    }
     s.columns[c.column] = std::move(column);
   }
   if (mapping.time != TimeOf::received) count_delays(s, channel, clocks.quickest(mapping));

@@ -1,6 +1,7 @@
 // A recording in any format: named channels of rows with named numbers, time of receipt and, if any, stamp.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <limits>
 #include <map>
@@ -16,6 +17,12 @@ inline constexpr double kLatest_ns = 4e18;
 
 /// Marks a row without a time. All other times are nanoseconds of some clock.
 inline constexpr std::int64_t kNoTime = std::numeric_limits<std::int64_t>::min();
+
+/// What a message holds in place of a number that it says is not measured: a NaN with bits of its own.
+inline constexpr double kNotMeasured = std::bit_cast<double>(std::uint64_t{0x7ff8'0000'0000'f1a9});
+inline bool is_not_measured(double value) {
+  return std::bit_cast<std::uint64_t>(value) == std::bit_cast<std::uint64_t>(kNotMeasured);
+}
 
 struct Item {
   std::string name;

@@ -51,6 +51,7 @@ const Row& MessageRows::read(std::string_view bytes) {
     row_[count++].value = number;
   });
   row_.resize(count);
+  not_measured_.mark(row_);
   rename();
   return row_;
 }

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "flightlog/import/bytes.hpp"
+#include "flightlog/import/not_measured.hpp"
 #include "io/files.hpp"
 #include "io/text.hpp"
 
@@ -101,6 +102,7 @@ class UlogReader {
     std::string channel;
     const Layout* layout;  ///< null where the format cannot be read
     bool wanted;
+    NotMeasured not_measured;
   };
 
   struct Message {
@@ -329,7 +331,7 @@ class UlogReader {
       layout = layouts_.emplace(type, std::move(made)).first;
     }
     const std::string channel = type + "[" + std::to_string(instance) + "]";
-    topics_[id] = {channel, &layout->second, channels_.wants(channel)};
+    topics_.insert_or_assign(id, Topic{channel, &layout->second, channels_.wants(channel), NotMeasured(type)});
     sizes_[id] = {2 + layout->second.least_size(), 2 + layout->second.size};
     channels_.add(channel);
   }
@@ -356,6 +358,7 @@ class UlogReader {
       if (place.name == "timestamp") timestamp_ns = static_cast<std::int64_t>(t_us) * kMicrosecond_ns;
       if (place.name == "timestamp_sample" && t_us > 0) sample_ns = static_cast<std::int64_t>(t_us) * kMicrosecond_ns;
     }
+    topic->second.not_measured.mark(row_);
     channels_.add(topic->second.channel, timestamp_ns, sample_ns == kNoTime ? timestamp_ns : sample_ns, row_);
   }
 

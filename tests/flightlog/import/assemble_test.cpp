@@ -298,6 +298,41 @@ TEST(Import, CountsWhatCameTwiceLateOutOfOrderOrNever) {
   EXPECT_EQ(imu.lost, 1u);
 }
 
+const Lines kAttitudeOfImu = {"attitude.channel=/imu",
+                              "attitude.clock=robot",
+                              "attitude.latency_s=0.0",
+                              "attitude.noise_rad=0.01",
+                              "attitude.columns.qw=orientation.w",
+                              "attitude.columns.qx=orientation.x",
+                              "attitude.columns.qy=orientation.y",
+                              "attitude.columns.qz=orientation.z"};
+
+TEST(Import, DoesWithoutAnAttitudeThatIsNotMeasured) {
+  const Imported back = there_and_back(test::some_log(), kAttitudeOfImu);
+  EXPECT_FALSE(back.log.attitude || back.log.header.attitude);
+  EXPECT_EQ(back.report.warnings,
+            (Lines{"attitude: /imu has 0 usable samples, 200 that are not (200 orientation.w is not measured, as the "
+                   "message says), and 0 at the time of another: done without"}));
+  EXPECT_EQ(back.log.imu.t_s.size(), 200u);  // the rate and the force of the same messages
+}
+
+TEST(Import, LeavesOutWhatMessagesSayIsNotMeasured) {
+  Robot robot;
+  for (int i = 0; i < 200; ++i) robot.command(i), robot.pose(i), robot.imu(i, i % 4 == 1 ? kNotMeasured : 1);
+  const Imported some = assemble(robot.channels, mapping_of("ros2.toml"));
+  EXPECT_EQ(some.report.streams[2].why_unusable,
+            (std::map<std::string, std::size_t>{{"angular_velocity.x is not measured, as the message says", 50}}));
+  EXPECT_EQ(some.log.imu.t_s.size(), 150u);
+  Robot other;
+  for (int i = 0; i < 200; ++i) other.command(i), other.pose(i), other.imu(i, kNotMeasured);
+  const std::string line = test::refusal([&] { assemble(other.channels, mapping_of("ros2.toml")); });
+  EXPECT_TRUE(
+      line.ends_with("imu.channel: \"/imu\" has 0 usable samples, 200 that are not (200 angular_velocity.x is "
+                     "not measured, as the message says), and 0 at the time of another; accepted: at least 2 "
+                     "usable ones"))
+      << line;
+}
+
 TEST(Import, PutsTheTimesOfAllStreamsInOrder) {
   Robot robot;
   for (int i = 199; i >= 0; --i) robot.command(i), robot.pose(i, i), robot.imu(i, i);

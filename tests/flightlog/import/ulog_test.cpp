@@ -202,5 +202,18 @@ TEST(Ulog, RefusesWhatIsNone) {
             "f.ulg: is a ULog of a kind that is newer than this reader; accepted: appended data alone");
 }
 
+TEST(Ulog, MarksWhatIsNotMeasured) {
+  test::UlogText log;
+  log.format("battery_status:uint64_t timestamp;float voltage_v;float current_a;").topic(0, 1, "battery_status");
+  for (const float current : {-1.0f, 2.0f})
+    log.data(1, test::UlogText::bytes(std::uint64_t{1}) + test::UlogText::bytes(7.5f) + test::UlogText::bytes(current));
+  Channels channels;
+  std::vector<std::string> warnings;
+  read_ulog(log.text, "log", channels, warnings);
+  const auto& current = *channels.find("battery_status")->column("current_a");
+  EXPECT_TRUE(is_not_measured(current[0]));
+  EXPECT_EQ(current[1], 2);
+}
+
 }  // namespace
 }  // namespace flappy::flightlog::ulog_test
