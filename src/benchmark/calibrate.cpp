@@ -226,7 +226,7 @@ std::string rounded(double x) { return io::format("%.4g", x); }
 }  // namespace
 
 Json calibrate(const CalibrateCommand& command) {
-  io::check_output(command.out, {command.verdict});
+  io::check_output(command.out);
   const Calibration calibration(command);
   VerdictRule before = calibration.start(), after = calibration.best();
   after.prior.none = std::stod(rounded(after.prior.none));

@@ -192,7 +192,7 @@ double detectable_magnitude(const Changed& changed, double most) {
 Json run_detectability(const DetectabilityCommand& command) {
   const blind::Family& family = family_named(command.family);
   const std::vector<blind::FamilyEffect>& effects = family.effects();
-  io::check_output(command.out, {command.vehicle});
+  io::check_output(command.out);
   struct Robot {
     blind::Assignment rich, hover;
     std::vector<flightlog::FlightLog> logs;

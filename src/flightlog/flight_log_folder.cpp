@@ -7,6 +7,7 @@
 #include "io/config.hpp"
 #include "io/csv.hpp"
 #include "io/log.hpp"
+#include "io/read_files.hpp"
 
 namespace flappy::flightlog {
 namespace {
@@ -119,6 +120,7 @@ void write_flight_log(const fs::path& folder, const FlightLog& log) {
   const LogFiles files = flight_log_files(log);
   parse_flight_log(files, folder);
   require_replaceable(folder);
+  io::require_unread_folder(folder);
   try {
     const fs::path named = folder.has_filename() ? folder : folder.parent_path();
     const fs::path target = fs::weakly_canonical(named);  // else a link would be replaced, not its folder

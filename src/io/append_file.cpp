@@ -10,15 +10,29 @@
 #include <utility>
 
 #include "io/files.hpp"
+#include "io/read_files.hpp"
 
 namespace flappy::io {
 
+namespace {
+
+/// The path, unless the file is to be emptied although it is read.
+std::filesystem::path replaceable(std::filesystem::path path, std::uint64_t keep) {
+  if (keep == 0) require_unread(path);
+  return path;
+}
+
+}  // namespace
+
 AppendFile::AppendFile(std::filesystem::path path, std::uint64_t keep)
-    : path_(std::move(path)),
+    : path_(replaceable(std::move(path), keep)),
       descriptor_(open(path_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | (keep == 0 ? O_TRUNC : 0), 0666)),
       size_(keep) {
   if (descriptor_ < 0) refuse(errno);
-  if (keep == 0 || ftruncate(descriptor_, static_cast<off_t>(keep)) == 0) return;
+  if (keep == 0 || ftruncate(descriptor_, static_cast<off_t>(keep)) == 0) {
+    note_written(path_);
+    return;
+  }
   const int error = errno;
   close(descriptor_);
   refuse(error);
@@ -61,6 +75,7 @@ FolderLock::FolderLock(const std::filesystem::path& folder)
     // other errors mean a file system without locks: go on without one
     if (errno == EWOULDBLOCK) refuse("another process is at work here; accepted: wait for it, or another folder");
   }
+  note_own_folder(folder);
   static const std::regex temporary(R"(.+\.tmp\d+-\d+)");
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {

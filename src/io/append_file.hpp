@@ -28,7 +28,7 @@ class AppendFile {
   std::uint64_t size_;
 };
 
-/// Locks a folder until the object or the process ends, and removes temporary files of a killed process (AtomicFile).
+/// Locks a folder, which is the command's own then (read_files.hpp), until the object or the process ends, and removes temporary files of a killed process (AtomicFile).
 /// Throws InputError where another process has locked the folder. Has no effect on file systems without locks.
 class FolderLock {
  public:

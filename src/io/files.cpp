@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "io/installation.hpp"
+#include "io/read_files.hpp"
 #include "io/text.hpp"
 
 namespace flappy::io {
@@ -125,6 +126,7 @@ std::string shortest_digits(double value) {
 std::string read_text(const std::filesystem::path& path) {
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(shipped(path).c_str(), "rbe"), std::fclose);
   if (!file) refuse_file(path, "cannot be read", errno);
+  note_read(shipped(path));
   std::string text;
   std::array<char, 1 << 16> buffer;
   while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), file.get())) {
@@ -135,6 +137,7 @@ std::string read_text(const std::filesystem::path& path) {
 }
 
 AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)), temporary_(name_beside(path_)) {
+  require_unread(path_);
   // Renaming onto a device such as /dev/null would destroy it.
   std::error_code ignored;
   const auto status = std::filesystem::status(path_, ignored);
@@ -160,6 +163,7 @@ void AtomicFile::commit() {
   if (std::fflush(file_) != 0 || fsync(fileno(file_)) != 0) refuse(errno);
   if (std::rename(temporary_.c_str(), path_.c_str()) != 0) refuse(errno);
   std::fclose(std::exchange(file_, nullptr));
+  note_written(path_);
 }
 
 void AtomicFile::refuse(int error) const { refuse_file(path_, "cannot be written", error); }
@@ -182,10 +186,8 @@ void sync_folder(const std::filesystem::path& folder) {
   close(descriptor);
 }
 
-void check_output(const std::filesystem::path& path, const std::vector<std::filesystem::path>& inputs) {
-  for (const std::filesystem::path& input : inputs)
-    if (std::error_code none; std::filesystem::equivalent(path, input, none))
-      throw InputError(path.string() + ": is read by the same command; accepted: another file");
+void check_output(const std::filesystem::path& path) {
+  announce_output(path);
   const AtomicFile opened(path);
 }
 

@@ -64,8 +64,9 @@ void make_folder(const std::filesystem::path& folder);
 /// Flushes a folder to the disk, so that the names of its files survive a power failure.
 void sync_folder(const std::filesystem::path& folder);
 
-/// Call it before long work: throws InputError where `path` cannot be written, or is one of `inputs` under any name.
-void check_output(const std::filesystem::path& path, const std::vector<std::filesystem::path>& inputs = {});
+/// Call it before long work: throws InputError where `path` cannot be written or was read (read_files.hpp). To read it
+/// from now on is refused.
+void check_output(const std::filesystem::path& path);
 
 void write_atomically(const std::filesystem::path& path, std::string_view text);
 

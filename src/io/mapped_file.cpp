@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "io/files.hpp"
+#include "io/read_files.hpp"
 
 namespace flappy::io {
 
@@ -29,6 +30,7 @@ MappedFile::MappedFile(const std::filesystem::path& path) {
   }
   close(descriptor);
   if (error != 0) refuse(error);
+  note_read(path);
 }
 
 MappedFile::~MappedFile() {

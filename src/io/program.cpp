@@ -12,6 +12,7 @@
 #include "io/log.hpp"
 #include "io/parallel.hpp"
 #include "io/progress.hpp"
+#include "io/read_files.hpp"
 #include "io/version.hpp"  // made by the build
 
 namespace flappy::io {
@@ -75,6 +76,7 @@ Program::Program(const std::string& name, const std::string& description, const 
 Program::~Program() = default;
 
 int Program::run(int argc, char** argv, const std::function<void()>& job) {
+  const NotedCommand command;
   try {
     app_->parse(argc, argv);
     const auto level = std::ranges::find(kLevels, log_level_) - kLevels.begin();
@@ -130,7 +132,9 @@ void Program::write_shown_json(const nlohmann::ordered_json& result) const {
 }
 
 void Program::write_json(const nlohmann::ordered_json& result) const {
-  if (!json_path_.empty() && writes()) write_atomically(json_path_, result.dump(2) + "\n");
+  if (json_path_.empty() || !writes()) return;
+  announce_output(json_path_);
+  write_atomically(json_path_, result.dump(2) + "\n");
 }
 
 std::string shown_by(const std::string& path) { return "shown by: flappy-report " + path + " --out report.html"; }

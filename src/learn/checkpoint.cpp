@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "io/read_files.hpp"
 #include "io/schema.hpp"
 #include "io/sha256.hpp"
 
@@ -106,6 +107,7 @@ Checkpoint::Checkpoint(std::filesystem::path path) : path_(std::move(path)), fil
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) refuse("is not a regular file");
   file_.reset(std::fopen(path_.c_str(), "rbe"));
   if (!file_) refuse_system(errno);
+  io::note_read(path_);
   const auto read_at = [&](std::uint64_t offset, std::span<char> into) {
     if (fseeko(file_.get(), static_cast<off_t>(offset), SEEK_SET) != 0) refuse_system(errno);
     if (std::fread(into.data(), 1, into.size(), file_.get()) == into.size()) return;

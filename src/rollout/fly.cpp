@@ -7,6 +7,7 @@
 
 #include "flightlog/ros/flight_mcap.hpp"
 #include "io/parallel.hpp"
+#include "io/read_files.hpp"
 #include "model/jointed.hpp"
 #include "rollout/outcome.hpp"
 #include "rollout/rollout.hpp"
@@ -50,6 +51,7 @@ void prepare_log_folder(const fs::path& folder, std::size_t count, const std::st
   }
   if (error) throw io::InputError(folder.string() + ": cannot be read: " + error.message());
   if (!foreign.empty()) refuse("holds " + *foreign.begin());
+  io::require_unread_folder(folder);
   if (count == 1) return flightlog::require_replaceable(folder);  // a log that is written replaces the one of before
   for (std::size_t i = 0; i < count; ++i) flightlog::require_replaceable(folder / log_name(i, count));
   for (std::size_t i = 0; i < count; ++i)

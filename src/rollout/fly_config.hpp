@@ -39,8 +39,9 @@ struct LogOptions {
 
 struct FlyConfig {
   std::string vehicle_file_name;  ///< without folder
-  std::string vehicle_sha256;     ///< SHA-256 of that file; empty if overrides or randomisation change the vehicle
-  std::string vehicle_text;       ///< text of that file; with overrides, the resolved text
+  std::filesystem::path controller_file;
+  std::string vehicle_sha256;  ///< SHA-256 of that file; empty if overrides or randomisation change the vehicle
+  std::string vehicle_text;    ///< text of that file; with overrides, the resolved text
   model::Vehicle vehicle;
   std::optional<sim::Randomisation> randomisation;
   /// Effects that are added to every vehicle, randomised or not; same form as model::Vehicle::effects.

@@ -5,6 +5,7 @@
 #include "design/study.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
+#include "io/read_files.hpp"
 #include "io/sha256.hpp"
 #include "io/text.hpp"
 #include "training.hpp"
@@ -86,6 +87,7 @@ int main(int argc, char** argv) {
     io::stop_on_interrupt();
     if (program.writes()) {
       io::make_folder(folder);
+      io::note_own_folder(folder);
       io::write_atomically(folder / "config.toml", config.resolved);
     }
     const double start_s = io::steady_seconds();

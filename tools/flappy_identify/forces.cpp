@@ -212,7 +212,7 @@ Json run(const ForceSettings& s) {
     check_scales(held);
     check_held_out(measured, held);
   }
-  io::check_output(s.out, {s.measured, s.held_out, s.source.vehicle, s.fit.config});
+  io::check_output(s.out);
 
   FitOptions options = s.fit.options(s.source.options(vehicle));
   io::stop_on_interrupt();

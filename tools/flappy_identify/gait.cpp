@@ -26,7 +26,7 @@ Json run(const GaitSettings& s) {
     if (!(s.frequency_Hz > 0)) throw io::InputError("--frequency-Hz: is not above 0; accepted: beats per second");
     options.frequency_Hz = s.frequency_Hz;
   }
-  if (!s.out.empty()) io::check_output(s.out, {s.measured});
+  if (!s.out.empty()) io::check_output(s.out);
   const std::vector<FittedAngle> angles = fit_gait(s.measured, options);
   const std::string text = gait_text(angles);
   if (s.out.empty()) std::printf("%s", text.c_str());

@@ -31,7 +31,7 @@ Json run(const KinematicsSettings& s) {
   const model::Vehicle vehicle = s.source.read_vehicle();
   if (!(s.from_s < s.to_s)) throw io::InputError("--from-s: is not before --to-s; accepted: a time before it");
   for (const std::string& out : {s.csv, s.svg})
-    if (!out.empty()) io::check_output(out, {s.measured, s.source.vehicle});
+    if (!out.empty()) io::check_output(out);
   WingSamples samples = read_wing_samples(s.measured);
   cut(samples, s.from_s, s.to_s);
   if (s.amplitude.given() == false && !samples.input)

@@ -25,7 +25,7 @@ Command add_simulate_forces(const io::Command& program) {
             const model::Vehicle vehicle = s->source.read_vehicle();
             const std::vector<sim::Input> inputs =
                 s->inputs.empty() ? default_inputs(vehicle.driver) : read_inputs(s->inputs, vehicle.driver);
-            io::check_output(s->out, {s->inputs, s->source.vehicle});
+            io::check_output(s->out);
             ForceSensor sensor;
             if (s->noise == "none") sensor.noise_steps = 0;
             const MeasuredMap map = simulate_forces(vehicle, inputs, sensor, s->seed, s->source.options(vehicle));

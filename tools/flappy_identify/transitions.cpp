@@ -86,7 +86,7 @@ Json by_state(const StateVector& values, const char* unit) {
 
 Json run(const Request& request) {
   const auto begin = std::chrono::steady_clock::now();
-  if (!request.csv.empty()) io::check_output(request.csv, {request.vehicle});
+  if (!request.csv.empty()) io::check_output(request.csv);
   Transitions transitions(request.options);
   flightlog::check_each_once(request.flights);
   for (const fs::path folder : request.flights) {

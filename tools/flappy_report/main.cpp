@@ -49,7 +49,7 @@ Json report(Request request) {
   if (!request.goal_m.empty() && request.goal_m.size() != 3)
     throw io::InputError("--goal: has " + std::to_string(request.goal_m.size()) + " numbers; accepted: X,Y,Z in m");
   if (!request.goal_m.empty()) request.flights.goal_m = {request.goal_m[0], request.goal_m[1], request.goal_m[2]};
-  io::check_output(request.out, request.paths);
+  io::check_output(request.out);
   Packing packing;
   const std::vector<Section> sections = composed(request.paths, request.flights, packing);
   const std::string title = request.title.empty() ? sections.front().title() : request.title;

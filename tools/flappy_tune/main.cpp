@@ -6,6 +6,7 @@
 #include "io/config.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
+#include "io/read_files.hpp"
 #include "io/sha256.hpp"
 #include "rollout/tune.hpp"
 
@@ -20,7 +21,10 @@ int main(int argc, char** argv) {
   program.takes_ranks();
   return program.run(argc, argv, [&] {
     rollout::TuneConfig config = rollout::read_tune_config(config_name, overrides);
-    if (program.writes()) io::check_output(out, {config_name});
+    if (program.writes()) {
+      io::allow_update(config.trials[0].fly.controller_file);
+      io::check_output(out);
+    }
     std::string agreed = "tuning: " + io::sha256(io::Config::load(config_name, overrides).resolved()) + "\n";
     for (const rollout::Trial& t : config.trials)
       for (const auto& [name, text] : t.fly.resolved) agreed += name + ": " + io::sha256(text) + "\n";

@@ -1,5 +1,6 @@
 #include "gap/diagnose/diagnose_command.hpp"
 
+#include <array>
 #include <cstdio>
 #include <utility>
 
@@ -47,9 +48,11 @@ void look_ahead(const DiagnosisRequest& request, Diagnosed& d) {
   propose_experiment(request, d);
 }
 
+constexpr std::array kWritten = {kDiagnosisFile, kVehicleFile, kResidualsFile, kHypothesesFile};
+
 /// Removes the files of an earlier diagnosis first.
 void write_files(const std::filesystem::path& out, const Diagnosed& d) {
-  for (const char* name : {kDiagnosisFile, kVehicleFile, kResidualsFile, kHypothesesFile})
+  for (const char* name : kWritten)
     if (std::error_code error; true) std::filesystem::remove(out / name, error);
   if (d.corrected)
     io::write_atomically(
@@ -68,7 +71,7 @@ nlohmann::ordered_json run_diagnose(const DiagnoseCommand& command) {
   const std::filesystem::path out = command.out;
   if (!out.empty()) {
     io::make_folder(out);
-    io::check_output(out / kDiagnosisFile);
+    for (const char* name : kWritten) io::check_output(out / name);
     io::log_into(out);
   }
   io::stop_on_interrupt();

@@ -55,7 +55,7 @@ nlohmann::ordered_json run_plan(const PlanCommand& command) {
   const std::filesystem::path out = command.out;
   if (!out.empty()) {
     io::make_folder(out);
-    io::check_output(out / kPlanFile);
+    for (const char* name : {kPlanFile, kMatrixFile}) io::check_output(out / name);
   }
   io::stop_on_interrupt();
   const Plan plan = make_plan(settings);
