@@ -167,7 +167,8 @@ BeatAveragedMotion beat_averaged_motion(const FlightLog& log, double bandwidth_H
   std::vector<Vector3d> rate(n);
   if (!log.imu.gyro_x_rad_s.empty()) {
     const Column& t_s = log.imu.t_s;
-    const double late_s = log.header.imu.latency_s;
+    const double filter_s = 1 / (2 * std::numbers::pi * log.header.imu.bandwidth_hz);
+    const double late_s = log.header.imu.latency_s + filter_s;
     skip(m.begin_s, t_s.front() - late_s);
     skip(t_s.back() - late_s, poses.back().t_s);
     for (std::size_t i = 1; i < t_s.size(); ++i) skip(t_s[i - 1] - late_s, t_s[i] - late_s);

@@ -3,7 +3,8 @@
 //   x' = F x    F = |H|^2, H of order 4, Butterworth: |H|^2 = 1 / (1 + (f / bandwidth)^8), forward and backward [1]
 //   R' = F applied to the quaternions, normalised again
 //   velocity v = R'^T F dp/dt,  specific force f = R'^T (F d2p/dt2 + g),  rate w = F gyro, or from R',  a = dw/dt
-// Derivatives are central differences on a regular grid. Inputs compared with this motion must be filtered with F, too.
+// The gyro is late by its latency and by its filter, which delays motion far below its bandwidth by
+// 1 / (2 pi bandwidth_hz). Derivatives are central differences on a regular grid. Inputs compared with this motion must be filtered with F, too.
 // [1] Gustafsson, IEEE Trans. Signal Processing 44(4), 1996, on initial states. Here odd reflections continue the
 //     signal, and samples near the ends are unseen.
 #pragma once

@@ -127,6 +127,7 @@ TEST(BeatAveragedMotion, LeavesOutWhatWasNotSeen) {
 
 TEST(BeatAveragedMotion, LeavesOutWhatTheGyroMissed) {
   FlightLog log = flight(20);
+  log.header.imu.bandwidth_hz = 1e6;  // no delay to speak of
   ImuStream& u = log.imu;
   for (int i = 400; i < 1700; ++i) {  // 4 s to 17 s, nothing from 9 s to 10 s
     if (i >= 900 && i < 1000) continue;
@@ -141,6 +142,23 @@ TEST(BeatAveragedMotion, LeavesOutWhatTheGyroMissed) {
     if (const double t = m.t_s(i); t < 4 || (t > 8.99 && t < 10) || t > 17) EXPECT_EQ(m.seen[i], 0) << t;
   // 4 + 1 + 3 s, and four times 2.5 periods of the bandwidth beside them
   EXPECT_NEAR(static_cast<double>(unseen) * m.step_s, 8 + 4 * 2.5 / kBandwidth_Hz, 0.1);
+}
+
+// A low-pass of 20 Hz is late by T = 8 ms. Of the fastest motion, w = 2 pi 0.8 rad/s and 1.1 rad/s, it leaves an error of
+// (w T)^2 / 2, 1e-3 rad/s; a gyro that is not moved has one of w T, 0.04 rad/s.
+TEST(BeatAveragedMotion, MovesTheGyroByTheDelayOfItsFilter) {
+  FlightLog log = flight(20);
+  log.header.imu = {.rate_hz = 1000, .latency_s = 0.01, .bandwidth_hz = 20};
+  const double kept = std::exp(-kTurn * log.header.imu.bandwidth_hz / 1000);
+  ImuStream& u = log.imu;
+  Vector3d low = truth(0).rate;
+  for (int i = 0; i < 20000; ++i) {
+    low = kept * low + (1 - kept) * truth((i + 0.5) / 1000.0).rate;
+    u.t_s.push_back((i + 1) / 1000.0 + 0.01);
+    u.gyro_x_rad_s.push_back(low.x()), u.gyro_y_rad_s.push_back(low.y()), u.gyro_z_rad_s.push_back(low.z());
+    for (Column* c : {&u.accel_x_m_s2, &u.accel_y_m_s2, &u.accel_z_m_s2}) c->push_back(0);
+  }
+  expect_true(beat_averaged_motion(log, kBandwidth_Hz, "flight"), 0);
 }
 
 TEST(BeatAveragedMotion, RefusesWhatIsTooShortOrTooSlow) {

@@ -122,6 +122,7 @@ std::string sensor_line(const Estimate& s) {
   };
   const std::string axis = s.name.substr(s.name.rfind('.') + 1, 1), way = more ? "+" : "-";
   if (s.name == "imu.latency_s") return told("the IMU's samples are", 1e3, "ms", more ? "older" : "younger");
+  if (s.name == "command.delay_s") return told("the inputs act", 1e3, "ms", more ? "later" : "earlier");
   if (s.name == "power_delay.delay_s") return told("those of currents are", 1e3, "ms", more ? "older" : "younger");
   if (const std::size_t clock = s.name.find("_clock"); clock != std::string::npos)
     return told("the clock of " + s.name.substr(0, clock) + ".csv is", 1e6, "ppm", more ? "fast" : "slow");

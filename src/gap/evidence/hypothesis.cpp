@@ -7,8 +7,9 @@
 namespace flappy::gap {
 namespace {
 
-/// Prior of the IMU's lag: a header does not say whether a sample is instantaneous, averaged, or held.
-constexpr double kImuLagSd_s = 5e-4;
+/// Prior of the lag of the sensors against the inputs: a header does not say whether a sample is instantaneous,
+/// averaged, or held.
+constexpr double kLagSd_s = 5e-4;
 /// Largest deviation of a parameter, in standard deviations.
 constexpr double kMaxDeviation = 4;
 
@@ -37,8 +38,10 @@ Hypothesis::Hypothesis(const sim::Randomisation& uncertain, std::vector<std::str
   for (std::size_t d = 0; d < uncertain.majors(); ++d)
     unknowns_.push_back({"", uncertain.name(d), 0, 1, uncertain.is_uniform(d) ? -1.0 : -kMaxDeviation,
                          uncertain.is_uniform(d) ? 1.0 : kMaxDeviation, false});
-  unknowns_.push_back(
-      {"", "imu.latency_s", 0, kImuLagSd_s, -kMaxDeviation * kImuLagSd_s, kMaxDeviation * kImuLagSd_s, false});
+  // The motion of a beat-averaged vehicle is that of motion capture, whose samples are no older for it: its inputs act
+  // later.
+  unknowns_.push_back({"", uncertain.nominal().beat_averaged ? "command.delay_s" : "imu.latency_s", 0, kLagSd_s,
+                       -kMaxDeviation * kLagSd_s, kMaxDeviation * kLagSd_s, false});
   for (const std::string& e : effects_)
     for (Unknown& u : unknowns_of(*model::find_effect(uncertain.nominal(), e))) {
       u.in_log = u.in_log && !uncertain.nominal().beat_averaged;  // beat-averaged vehicles predict effects of sensors

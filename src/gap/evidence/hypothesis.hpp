@@ -1,5 +1,5 @@
 // The unknowns of a hypothesis as coordinates, standard normal a priori: the vehicle's uncertain parameters, the lag of
-// the IMU, the magnitudes and shape parameters of its effects.
+// the sensors, the magnitudes and shape parameters of its effects.
 #pragma once
 
 #include <Eigen/Dense>
@@ -41,7 +41,7 @@ class Hypothesis {
   const std::vector<std::string>& effects() const { return effects_; }
   const std::vector<Unknown>& unknowns() const { return unknowns_; }
   Eigen::Index size() const { return static_cast<Eigen::Index>(unknowns_.size()); }
-  /// Unknowns: the vehicle's parameters, the same for every hypothesis; the IMU's lag; those of the effects.
+  /// Unknowns: the vehicle's parameters, the same for every hypothesis; the lag of the sensors; those of the effects.
   Eigen::Index parameters() const { return static_cast<Eigen::Index>(uncertain_->majors()); }
   Eigen::Index lag() const { return parameters(); }
   Eigen::Index shared() const { return parameters() + 1; }

@@ -7,7 +7,8 @@
 namespace flappy::gap {
 
 struct SensorFinding {
-  std::string name;  ///< for example "imu_mounting.x_rad", "imu.latency_s"
+  std::string
+      name;  ///< for example "imu_mounting.x_rad", "imu.latency_s", of a beat-averaged vehicle "command.delay_s"
   double value, sd;
   double prior_sd;
 };
@@ -58,7 +59,7 @@ class RobotFit {
   double beyond_background(const std::string& effect, const Eigen::VectorXd& magnitudes, const Scales& scales) const;
   /// Minor draws of the vehicle given a joint fit of all flights.
   std::vector<double> minors_given(const Fitter::JointFit& joint) const { return minors_moved_by(joint.means); }
-  /// The IMU's lag, then each error of declared sensors on which the flights have information, given a fit.
+  /// The lag of the sensors, then each error of declared sensors on which the flights have information, given a fit.
   /// `fitter`: with the scales of the fit.
   std::vector<SensorFinding> sensors(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit) const;
 

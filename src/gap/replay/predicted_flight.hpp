@@ -46,7 +46,7 @@ inline constexpr std::size_t kRowsPerBeat = static_cast<std::size_t>(kChannels) 
 /// A vehicle that may have flown a recording, and the errors of its sensors.
 struct VehicleHypothesis {
   model::Vehicle vehicle;
-  double lag_s = 0;      ///< delay of the sensors relative to the voltages, beyond the latency in the header
+  double lag_s = 0;      ///< delay of the sensors relative to the inputs, beyond the latency in the header
   EffectValues sensors;  ///< errors of sensors that the headers do not declare (gap/replay/sensor_correction.hpp)
   std::vector<double> variates;  ///< draws of the vehicle's parameters: two that are equal differ only in effects
   EffectValues file_effects;     ///< the effects of the vehicle file, which reference flights keep

@@ -69,6 +69,8 @@ TEST(Summary, SaysWhatToDoInThirtyLines) {
       << text;
   r.sensors = {{"imu_clock.rate", -4e-5, -5e-5, -3e-5, ""}};
   EXPECT_NE(all().find("\n  the clock of imu.csv is 40 ppm slow (30 to 50)\n"), std::string::npos);
+  r.sensors = {{"command.delay_s", -2e-3, -3e-3, -1e-3, "s"}};  // of a beat-averaged vehicle
+  EXPECT_NE(all().find("\n  the inputs act 2 ms earlier (1 to 3)\n"), std::string::npos);
   r.verdict = {VerdictKind::effect, {"wind"}, false, 0.3};
   EXPECT_NE(all().find("(probability 0.30, no more than a guess)"), std::string::npos);
   EXPECT_NE(all().find("--set vehicle=/out/vehicle_corrected.toml"), std::string::npos);
