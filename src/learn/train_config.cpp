@@ -38,6 +38,12 @@ std::vector<int> widths(const io::Table& t, const char* key) {
   return list;
 }
 
+std::string text_of(const std::vector<int>& widths) {
+  std::vector<std::string> words;
+  for (const int width : widths) words.push_back(std::to_string(width));
+  return "[" + io::joined(words) + "]";
+}
+
 class Reader {
  public:
   Reader(const std::filesystem::path& path, const Overrides& own, const Overrides& flown)
@@ -204,6 +210,22 @@ policy::Actor TrainConfig::blank_actor() const {
   for (const flight::Signal& s : fly.fleet.task.observation()) a.observation.push_back(s.name);
   for (const flight::Signal& s : fly.fleet.task.action()) a.action.push_back(s.name);
   return a;
+}
+
+NetworkKeys network_keys(const io::Table& root) {
+  const io::Table networks = root.table("networks"), learn = root.table("learn");
+  return {{"networks.actor", text_of(widths(networks, "actor"))},
+          {"networks.critic", text_of(widths(networks, "critic"))},
+          {"networks.activation", networks.string("activation")},
+          {"networks.layer_norm", networks.boolean_or("layer_norm", false) ? "true" : "false"},
+          {"learn.twin", learn.boolean("twin") ? "true" : "false"},
+          {"learn.engine", learn.string_or("engine", "lanes")}};
+}
+
+NetworkKeys network_keys(const policy::Actor& actor) {
+  return {{"networks.actor", text_of({actor.widths.begin() + 1, actor.widths.end() - 1})},
+          {"networks.activation", policy::name_of(actor.hidden)},
+          {"networks.layer_norm", actor.layer_norm ? "true" : "false"}};
 }
 
 TrainConfig read_train_config(const std::filesystem::path& path, const std::vector<std::string>& overrides) {

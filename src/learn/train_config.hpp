@@ -59,6 +59,12 @@ struct TrainConfig {
   policy::Actor blank_actor() const;
 };
 
+/// What decides how many numbers the networks have, as text by key, "networks.critic" and "[64, 64]": of a resolved
+/// train.toml, and of an actor, which knows no critics.
+using NetworkKeys = std::vector<std::pair<std::string, std::string>>;
+NetworkKeys network_keys(const io::Table& root);
+NetworkKeys network_keys(const policy::Actor& actor);
+
 /// Throws io::InputError for anything that is missing, unknown, out of range or inconsistent.
 TrainConfig read_train_config(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
 

@@ -460,13 +460,36 @@ void refuse_run_beside_seeds(const fs::path& folder) {
 }
 
 std::shared_ptr<const TrainInit> read_train_init(const fs::path& path) {
-  if (!fs::is_directory(path))
-    return std::make_shared<TrainInit>(
-        TrainInit{policy::read_actor(path), std::nullopt, io::sha256(io::read_text(path))});
+  if (!fs::is_directory(path)) {
+    const std::string text = io::read_text(path), ending = path.extension().string();
+    if (text.substr(0, text.find_first_not_of(" \t\r\n") + 1).find('{') == std::string::npos)
+      throw io::InputError(path.string() + ": is " +
+                           (ending == ".flappy" ? "a checkpoint"
+                            : ending == ".onnx" ? "an ONNX model"
+                            : ending == ".pt"   ? "a TorchScript file"
+                                                : "no actor") +
+                           "; accepted: a run folder (its best actor and its critics), or an actor, as best.json of a "
+                           "run");
+    policy::Actor actor = policy::read_actor(path);
+    const NetworkKeys keys = network_keys(actor);
+    return std::make_shared<TrainInit>(TrainInit{std::move(actor), std::nullopt, io::sha256(text), keys});
+  }
   const Checkpoint newest = newest_checkpoint(path);
-  const fs::path best = path / "best.json";
+  const fs::path best = path / "best.json", config = path / "config" / "train.toml";
+  policy::Actor actor = policy::read_actor(best);
+  const NetworkKeys keys = fs::exists(config) ? network_keys(io::Config::load(config).root()) : network_keys(actor);
   return std::make_shared<TrainInit>(
-      TrainInit{policy::read_actor(best), newest.path(), io::sha256(io::read_text(best) + newest.payload_sha256())});
+      TrainInit{std::move(actor), newest.path(), io::sha256(io::read_text(best) + newest.payload_sha256()), keys});
+}
+
+void refuse_other_networks(const TrainConfig& config, const TrainInit& init) {
+  const NetworkKeys own = network_keys(io::Config::parse(config.resolved.at("train.toml"), "train.toml").root());
+  for (const auto& [key, there] : init.networks)
+    if (const auto here = std::ranges::find(own, key, &NetworkKeys::value_type::first);
+        here != own.end() && here->second != there)
+      throw io::InputError("--init: " + key + " is " + there + " there, " + here->second +
+                           " in this configuration; accepted: the same networks, as by --set '" + key + "=" + there +
+                           "'");
 }
 
 void refuse_other_run_in(const fs::path& folder, const TrainConfig& config, const TrainInit* init) {
@@ -493,6 +516,7 @@ std::optional<fs::path> unfinished_run_in(const fs::path& folder) {
 }
 
 TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
+  if (options.init && !options.from) refuse_other_networks(config, *options.init);
   io::make_folder(options.folder);
   const bool writes = io::writes(options.ranks);
   std::optional<io::FolderLock> lock;

@@ -37,10 +37,11 @@ struct TrainInit {
   /// Checkpoint for the critics and Adam's moments of all weights; empty: critics and moments start fresh.
   std::optional<std::filesystem::path> checkpoint;
   std::string sha256;  ///< SHA-256 over all of it
+  NetworkKeys networks = {};
 };
 
 /// Reads from a file the actor, from a run its best actor with critics and moments of its newest checkpoint. Throws
-/// io::InputError if one cannot be read.
+/// io::InputError if one cannot be read, and for files of other kinds, as a checkpoint or an exported policy.
 std::shared_ptr<const TrainInit> read_train_init(const std::filesystem::path& path);
 
 struct TrainOptions {
@@ -83,6 +84,8 @@ std::filesystem::path seed_folder(const std::filesystem::path& folder, std::uint
 void refuse_run_in(const std::filesystem::path& folder);
 /// Throws io::InputError if a folder for runs of seeds holds a run of its own.
 void refuse_run_beside_seeds(const std::filesystem::path& folder);
+/// Throws io::InputError, with the key that differs, for an `init` of other networks.
+void refuse_other_networks(const TrainConfig& config, const TrainInit& init);
 /// Throws io::InputError if the folder holds a run of another configuration or with other initial networks.
 void refuse_other_run_in(const std::filesystem::path& folder, const TrainConfig& config, const TrainInit* init);
 /// The summary of a finished run; null if there is none.

@@ -247,7 +247,7 @@ TEST(Trainer, StartsFromATrainedActor) {
 
   const auto refused = [&](const policy::Actor& init, const char* why) {
     o.folder = fresh("refused");
-    o.init = std::make_shared<TrainInit>(TrainInit{init, std::nullopt, ""});
+    o.init = std::make_shared<TrainInit>(TrainInit{init, std::nullopt, "", network_keys(init)});
     try {
       train(c, o);
       ADD_FAILURE() << why;
@@ -263,7 +263,21 @@ TEST(Trainer, StartsFromATrainedActor) {
   const TrainConfig wide = small_training({"networks.actor=[8]"});
   const fs::path third = fresh("third");
   train_in(third, wide, [](const TrainProgress&) { return false; });
-  refused(policy::read_actor(third / "last.json"), "of the same networks");
+  refused(policy::read_actor(third / "last.json"),
+          "--init: networks.actor is [8] there, [16] in this configuration; accepted: the same networks, as by --set "
+          "'networks.actor=[8]'");
+  EXPECT_FALSE(fs::exists(o.folder));
+  const auto kind = [&](const fs::path& file) {
+    const std::string line = test::refusal([&] { read_train_init(file); });
+    return line.substr(file.string().size());
+  };
+  const std::string accepted =
+      "; accepted: a run folder (its best actor and its critics), or an actor, as best.json of a run";
+  EXPECT_EQ(kind(newest_checkpoint(first).path()), ": is a checkpoint" + accepted);
+  std::ofstream(first / "policy.onnx") << "\x08\x08\x12\x06";
+  EXPECT_EQ(kind(first / "policy.onnx"), ": is an ONNX model" + accepted);
+  std::ofstream(first / "empty.json");
+  EXPECT_EQ(kind(first / "empty.json"), ": is no actor" + accepted);
 }
 
 TEST(Trainer, StartsFromARunWithItsCritics) {
@@ -299,7 +313,8 @@ TEST(Trainer, StartsFromARunWithItsCritics) {
     train(small_training({"networks.critic=[8]"}), o);
     ADD_FAILURE() << "other critics";
   } catch (const io::InputError& e) {
-    EXPECT_NE(std::string(e.what()).find("numbers"), std::string::npos) << e.what();
+    EXPECT_NE(std::string(e.what()).find("--init: networks.critic is "), std::string::npos) << e.what();
+    EXPECT_NE(std::string(e.what()).find(" there, [8] in this configuration; "), std::string::npos) << e.what();
   }
 }
 
