@@ -60,14 +60,16 @@ void check_phases(const io::CsvTable& table, const std::vector<double>& beats, c
 
 std::vector<double> radians(const io::CsvTable& table, const std::string& column, bool degrees) {
   std::vector<double> list = table.column(column);
-  for (double& x : list) {
-    if (degrees) x *= std::numbers::pi / 180;
-    if (std::abs(x) <= model::kLargestAngle_rad) continue;
-    const bool odd = !degrees && std::abs(x) > kTurn;
-    fail(table, column, digits(x) + " rad is beyond what a wing's angle may be" + (odd ? "; are these degrees?" : ""),
-         "at most " + digits(model::kLargestAngle_rad) + " rad either way" + (odd ? ", or a column ..._deg" : ""));
-  }
-  return list;
+  if (degrees)
+    for (double& x : list) x *= std::numbers::pi / 180;
+  const auto most = std::ranges::max_element(list, {}, [](double x) { return std::abs(x); });
+  if (most == list.end() || std::abs(*most) <= model::kLargestAngle_rad) return list;
+  const auto in_both = [](double x) { return digits(x) + " rad (" + digits(x * 180 / std::numbers::pi) + " degrees)"; };
+  const bool odd = !degrees && std::abs(*most) > kTurn;
+  throw io::InputError(table.name + ":" + std::to_string(most - list.begin() + 2) + ": " + column + ": " +
+                       in_both(*most) + ", the largest of the column, is beyond what a wing's angle may be" +
+                       (odd ? "; are these degrees?" : "") + "; accepted: at most " +
+                       in_both(model::kLargestAngle_rad) + " either way" + (odd ? ", or a column ..._deg" : ""));
 }
 
 }  // namespace

@@ -82,11 +82,18 @@ TEST(GaitFit, RefusesWhatIsNoGaitInOneLine) {
   EXPECT_EQ(
       refused(beat(names, 60, 2, 0, [](double t) { return std::pair(std::cos(kTurn * 0.8 * t), 0.0); })).substr(0, 60),
       ": stroke_rad: does not repeat with the beat: 0.383 rad rms a");
-  EXPECT_EQ(refused(beat(names, 50, 1, 0, [](double t) { return std::pair(70 * std::cos(kTurn * t), 0.0); })),
-            ": stroke_rad: 70 rad is beyond what a wing's angle may be; are these degrees?; accepted: at most 1.75 rad "
-            "either way, or a column ..._deg");
+  EXPECT_EQ(
+      refused(beat(names, 50, 1, 0, [](double t) { return std::pair(70 * std::cos(kTurn * t), 0.0); })),
+      ":2: stroke_rad: 70 rad (4.01e+03 degrees), the largest of the column, is beyond what a wing's angle may be; "
+      "are these degrees?; accepted: at most 1.75 rad (100 degrees) either way, or a column ..._deg");
   EXPECT_EQ(refused(beat(names, 50, 1, 0, [](double t) { return std::pair(2 * std::cos(kTurn * t), 0.0); })),
-            ": stroke_rad: 2 rad is beyond what a wing's angle may be; accepted: at most 1.75 rad either way");
+            ":2: stroke_rad: 2 rad (115 degrees), the largest of the column, is beyond what a wing's angle may be; "
+            "accepted: at most 1.75 rad (100 degrees) either way");
+  // a stroke from 0 to -140 degrees, half a beat after its beginning
+  EXPECT_EQ(refused(beat("beat,stroke_deg,rotation_deg", 1000, 1, 0,
+                         [](double t) { return std::pair(-70 + 70 * std::cos(kTurn * t), 0.0); })),
+            ":502: stroke_deg: -2.44 rad (-140 degrees), the largest of the column, is beyond what a wing's angle may "
+            "be; accepted: at most 1.75 rad (100 degrees) either way");
   EXPECT_EQ(refused("beat,stroke_rad,rotation_rad\n0,0,0\n0.1,0,0\n0.05,0,0\n"),
             ":4: beat: does not increase; accepted: times in their order");
   EXPECT_EQ(refused(beat("beat,stroke_rad,speed_m_s", 50, 1, 0, wing)),
