@@ -25,7 +25,6 @@ nb::object diagnose(const std::filesystem::path& vehicle, const std::vector<std:
   command.settings.threads = threads;
   command.quiet = true;
   nlohmann::ordered_json json;
-  bool stopped = false;
   {
     const Interruptible until_done;
     const nb::gil_scoped_release free;
@@ -42,7 +41,6 @@ nb::dict identify(const std::filesystem::path& vehicle_file, const std::filesyst
   if (starts < 1) throw nb::value_error(("starts: is " + std::to_string(starts) + "; accepted: 1 and more").c_str());
   identify::ForceFit fit;
   model::Vehicle vehicle;
-  bool stopped = false;
   {
     const Interruptible until_done;
     const nb::gil_scoped_release free;
@@ -54,9 +52,8 @@ nb::dict identify(const std::filesystem::path& vehicle_file, const std::filesyst
     options.seed = seed;
     options.progress = [](const std::string&, double, double) { return !io::interrupted(); };
     fit = identify::fit_forces(vehicle, identify::read_measured_map(measured_file, vehicle.driver), config, options);
-    stopped = io::interrupted();
   }
-  if (stopped) raise_interrupt();
+  if (fit.stopped) raise_interrupt();
   fit.vehicle.name = vehicle.name + "_fitted";
   fit.vehicle.posterior.reset();
   nb::list all;

@@ -8,6 +8,7 @@
 
 #include "identify/global_search.hpp"
 #include "identify/signs.hpp"
+#include "identify/units.hpp"
 #include "sim/random.hpp"
 
 namespace flappy::identify {
@@ -21,6 +22,14 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+/// Leaves a fit that `progress` stopped, however many stages were to come.
+struct Stopped {};
+
+bool tell(const FitOptions& options, const std::string& stage, double done, double cost) {
+  if (options.progress && !options.progress(stage, std::min(done, 1.0), cost)) throw Stopped();
+  return true;
+}
+
 class Fit {
  public:
   Fit(const Problem& problem, const FitOptions& options, ForceFit& result)
@@ -29,7 +38,7 @@ class Fit {
   VectorXd polish(const std::string& name, const VectorXd& start) {
     const auto began = std::chrono::steady_clock::now();
     const LeastSquares found = minimise(problem_, start, [&](const LeastSquares& s) {
-      return progress(name, static_cast<double>(s.iterations) / 20, s.cost);
+      return tell(options_, name, static_cast<double>(s.iterations) / 20, s.cost);
     });
     add(name, found.evaluations, began, found.point);
     cost_ = found.cost;
@@ -52,7 +61,7 @@ class Fit {
     const SearchResult found =
         search(genetic ? Search::genetic : Search::cma_es, cost, {nominal.begin(), nominal.end()},
                {options_.population, options_.generations, options_.seed}, [&](const SearchResult& r) {
-                 return progress(name, static_cast<double>(r.generations) / options_.generations, r.cost);
+                 return tell(options_, name, static_cast<double>(r.generations) / options_.generations, r.cost);
                });
     const VectorXd point = Eigen::Map<const VectorXd>(found.point.data(), nominal.size());
     add(name, found.evaluations, began, point);
@@ -60,10 +69,6 @@ class Fit {
   }
 
  private:
-  bool progress(const std::string& stage, double done, double cost) const {
-    return !options_.progress || options_.progress(stage, std::min(done, 1.0), cost);
-  }
-
   void add(const std::string& name, std::size_t evaluations, std::chrono::steady_clock::time_point began,
            const VectorXd& point) {
     const double wall_s = seconds_since(began);
@@ -127,7 +132,7 @@ std::vector<Eigen::Index> put_back(const Problem& problem, const FitOptions& opt
       const LeastSquares found = minimise(residuals, tried(rest), [&](const LeastSquares& s) {
         const bool gains = s.cost < last - 1e-3 * noise;  // stop at gains far below the noise
         last = s.cost;
-        return gains && (!options.progress || options.progress(stage.name, 0, s.cost));
+        return tell(options, stage.name, 0, s.cost) && gains;
       });
       tried = whole(found.point);
       cost = found.cost;
@@ -161,6 +166,9 @@ void check_simulated(const MeasuredMap& measured, const std::vector<Wrench>& sim
       refuse_apart(measured.name + ":" + std::to_string(measured.line(i)), measured.inputs[i]);
 }
 
+ForceFit fitted_to(const model::Vehicle& nominal, const MeasuredMap& measured, const FitConfig& config,
+                   const FitOptions& options);
+
 }  // namespace
 
 std::vector<std::string> spring_verdicts(const ForceFit& fit) {
@@ -183,6 +191,19 @@ std::vector<std::string> spring_verdicts(const ForceFit& fit) {
 
 ForceFit fit_forces(const model::Vehicle& nominal, const MeasuredMap& measured, const FitConfig& config,
                     const FitOptions& options) {
+  try {
+    return fitted_to(nominal, measured, config, options);
+  } catch (const Stopped&) {
+    ForceFit stopped;
+    stopped.stopped = true;
+    return stopped;
+  }
+}
+
+namespace {
+
+ForceFit fitted_to(const model::Vehicle& nominal, const MeasuredMap& measured, const FitConfig& config,
+                   const FitOptions& options) {
   const std::size_t count = config.parameters.size();
   check_inputs(measured, count);
   check_scales(measured);
@@ -190,6 +211,7 @@ ForceFit fit_forces(const model::Vehicle& nominal, const MeasuredMap& measured, 
   check_simulated(measured, before);
 
   ForceFit result;
+  check_units(measured, before, nominal);
   result.unchecked = check_signs(measured, before);
   result.before = map_error(measured.wrenches, before);
   result.sd_declared = !measured.sd.empty();
@@ -247,4 +269,5 @@ ForceFit fit_forces(const model::Vehicle& nominal, const MeasuredMap& measured, 
   return result;
 }
 
+}  // namespace
 }  // namespace flappy::identify

@@ -26,7 +26,7 @@ struct FitOptions {
   unsigned population = 200, generations = 200;  ///< for the genetic algorithm and CMA-ES
   int starts = 3;                                ///< for Gauss-Newton: first the nominal vehicle, then random points
   std::uint64_t seed = 1;
-  /// Called repeatedly with the stage, the fraction done and the lowest cost so far; returning false ends the stage.
+  /// Called repeatedly with the stage, the fraction done and the lowest cost so far; returning false stops the fit.
   std::function<bool(const std::string& stage, double done, double cost)> progress;
 };
 
@@ -38,6 +38,7 @@ struct Stage {
 };
 
 struct ForceFit {
+  bool stopped = false;  ///< by `progress`: then nothing else is known
   model::Vehicle vehicle;
   Intervals known;
   MapError before, after;

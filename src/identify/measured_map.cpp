@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <set>
 
+#include "io/log.hpp"
 #include "io/text.hpp"
 
 namespace flappy::identify {
@@ -24,28 +25,68 @@ std::string but_for_its_unit(const std::string& wrong, const Names& known) {
   return "";
 }
 
-std::string at(const io::CsvTable& table, std::size_t row, const std::string& column) {
-  return table.name + ":" + std::to_string(row + 2) + ": " + column + ": ";
+/// Leaves out rows that lack a number, with a warning; `lines` become those of the rows that are left.
+void leave_out_incomplete(io::CsvTable& table, std::vector<std::size_t>& lines) {
+  std::vector<std::size_t> whole;
+  std::string first;
+  const std::size_t rows = table.columns.front().size();
+  for (std::size_t i = 0; i < rows; ++i) {
+    const auto lacking = std::ranges::find_if(table.columns, [&](const auto& c) { return std::isnan(c[i]); });
+    if (lacking == table.columns.end()) whole.push_back(i);
+    else if (whole.size() == i)
+      first = "; " + table.names[static_cast<std::size_t>(lacking - table.columns.begin())] + " is no number in line " +
+              std::to_string(i + 2);
+  }
+  for (const std::size_t i : whole) lines.push_back(i + 2);
+  if (whole.size() == rows) return;
+  for (std::vector<double>& column : table.columns) {
+    std::vector<double> kept;
+    for (const std::size_t i : whole) kept.push_back(column[i]);
+    column = std::move(kept);
+  }
+  io::log(io::LogLevel::warning, table.name + ": " + std::to_string(rows - whole.size()) + " of " +
+                                     std::to_string(rows) + " rows left out" + first);
 }
 
-std::vector<sim::Input> inputs_of(const io::CsvTable& table, const model::Driver& driver) {
+std::vector<sim::Input> inputs_of(const io::CsvTable& table, const model::Driver& driver,
+                                  const std::vector<std::size_t>& lines = {}) {
   std::vector<sim::Input> inputs(table.columns.front().size());
   if (inputs.empty()) throw io::InputError(table.name + ":1: has no rows; accepted: a row for each input");
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     std::array<double, 4> u{};
     for (std::size_t k = 0; k < 4; ++k) u[k] = table.column(kInputNames[k])[i];
     inputs[i] = {u[0], u[1], u[2], u[3]};
-    check_limits(inputs[i], driver, table.name + ":" + std::to_string(i + 2));
+    check_limits(inputs[i], driver, table.name + ":" + std::to_string(lines.empty() ? i + 2 : lines[i]));
   }
   return inputs;
 }
 
-MeasuredMap map_of(const io::CsvTable& table, const model::Driver& driver) {
-  Names required(kInputNames.begin(), kInputNames.end());
+/// InputError for a column that is probably meant for one that is missing; else a warning of those that are not read.
+void check_others(const io::CsvTable& table, const Names& others, const Names& known) {
+  Names missing = known;
+  std::erase_if(missing, [&](const std::string& name) { return std::ranges::count(table.names, name) > 0; });
+  io::CsvTable meant{table.name, {}, {}};
+  for (const std::string& name : others)
+    if (meant.names.empty() && (!but_for_its_unit(name, missing).empty() || !io::nearest_name(name, missing).empty()))
+      meant.names = {name};
+  check_columns(meant, {}, known);
+  if (!others.empty())
+    io::log(io::LogLevel::warning, table.name + ": columns that are not read: " + io::joined(others));
+}
+
+MeasuredMap map_of(std::string_view text, const std::string& name, const model::Driver& driver) {
+  Names required(kInputNames.begin(), kInputNames.end()), known, others;
   required.insert(required.end(), channel_names().begin(), channel_names().end());
   const Names optional(sd_names().begin(), sd_names().end());
+  known = required;
+  known.insert(known.end(), optional.begin(), optional.end());
+  io::CsvTable table = io::parse_csv(text, name, known, others);
+  check_others(table, others, known);
   check_columns(table, required, optional);
-  MeasuredMap map{table.name, inputs_of(table, driver), {}};
+  std::vector<std::size_t> lines;
+  leave_out_incomplete(table, lines);
+  MeasuredMap map{table.name, inputs_of(table, driver, lines), {}};
+  if (lines.size() != lines.back() - 1) map.lines = lines;
   map.wrenches.resize(map.size());
   const bool declared =
       std::ranges::any_of(optional, [&](const auto& n) { return std::ranges::count(table.names, n); });
@@ -59,7 +100,8 @@ MeasuredMap map_of(const io::CsvTable& table, const model::Driver& driver) {
       if (!declared) continue;
       map.sd[i][k] = table.column(sd_names()[k])[i];
       if (!(map.sd[i][k] > 0))
-        throw io::InputError(at(table, i, sd_names()[k]) + io::shortest_digits(map.sd[i][k]) +
+        throw io::InputError(table.name + ":" + std::to_string(map.line(i)) + ": " + sd_names()[k] + ": " +
+                             io::shortest_digits(map.sd[i][k]) +
                              " is no standard deviation; accepted: a number above 0");
     }
   return map;
@@ -111,11 +153,11 @@ const std::array<std::string, kChannels>& sd_names() {
 }
 
 MeasuredMap read_measured_map(const std::filesystem::path& path, const model::Driver& driver) {
-  return map_of(io::read_csv(path), driver);
+  return map_of(io::read_text(path), path.string(), driver);
 }
 
 MeasuredMap parse_measured_map(std::string_view text, const std::string& name, const model::Driver& driver) {
-  return map_of(io::parse_csv(text, name), driver);
+  return map_of(text, name, driver);
 }
 
 std::vector<sim::Input> read_inputs(const std::filesystem::path& path, const model::Driver& driver) {

@@ -47,8 +47,9 @@ const std::array<std::string, kChannels>& channel_names();
 const std::array<std::string, kChannels>& sd_names();
 inline bool is_force(int channel) { return channel < 3; }
 
-/// InputError "file:line: column: what is wrong; what is accepted" as by check_columns(), for a value that is not
-/// finite, a standard deviation that is not above 0, and an input beyond the driver's limits.
+/// Rows that lack a number, and columns of other names, are left out with a warning. InputError "file:line: column: what
+/// is wrong; what is accepted" for a missing column or another unit, a standard deviation that is not above 0, and an
+/// input beyond the driver's limits.
 MeasuredMap read_measured_map(const std::filesystem::path& path, const model::Driver& driver);
 MeasuredMap parse_measured_map(std::string_view text, const std::string& name, const model::Driver& driver);
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <stdexcept>
 
@@ -62,6 +63,14 @@ std::vector<std::string> column_names(const Line& line, const std::vector<Cell>&
   return names;
 }
 
+/// The number in a cell; NaN for anything else.
+double number_or_nan(const Line&, const Cell& cell, const std::string&) {
+  double value = 0;
+  const char* const end = cell.text.data() + cell.text.size();
+  const auto [stop, error] = std::from_chars(cell.text.data(), end, value);
+  return error == std::errc() && stop == end && std::isfinite(value) ? value : std::numeric_limits<double>::quiet_NaN();
+}
+
 double to_number(const Line& line, const Cell& cell, const std::string& name) {
   const auto refuse = [&](const std::string& what) {
     line.refuse(cell.column, name + ": " + what + "; accepted: a number");
@@ -77,7 +86,9 @@ double to_number(const Line& line, const Cell& cell, const std::string& name) {
   return value;
 }
 
-void add_row(const Line& line, const std::vector<Cell>& cells, CsvTable& table) {
+using ReadCell = double (*)(const Line&, const Cell&, const std::string& name);
+
+void add_row(const Line& line, const std::vector<Cell>& cells, ReadCell read, CsvTable& table) {
   const std::size_t width = table.names.size();
   if (line.text.empty()) line.refuse(1, "is an empty line; accepted: " + std::to_string(width) + " cells");
   if (cells.size() != width) {
@@ -86,8 +97,28 @@ void add_row(const Line& line, const std::vector<Cell>& cells, CsvTable& table) 
                             ", as in the header");
   }
   for (std::size_t i = 0; i < width; ++i) {
-    table.columns[i].push_back(to_number(line, cells[i], table.names[i]));
+    table.columns[i].push_back(read(line, cells[i], table.names[i]));
   }
+}
+
+CsvTable parse(std::string_view text, const std::string& name, ReadCell read) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  if (text.empty()) throw InputError(name + ": is empty; accepted: a line of column names, then rows of numbers");
+
+  CsvTable table{name, {}, {}};
+  std::vector<Cell> cells;
+  for (std::size_t number = 1; !text.empty(); ++number) {
+    const Line line{name, number, take_line(text)};
+    split(line.text, cells);
+    if (number == 1) {
+      table.names = column_names(line, cells);
+      table.columns.resize(cells.size());
+    } else {
+      add_row(line, cells, read, table);
+    }
+  }
+  return table;
 }
 
 std::string header_text(const std::vector<std::string>& names) {
@@ -113,22 +144,18 @@ const std::vector<double>& CsvTable::column(std::string_view column_name) const 
 
 CsvTable read_csv(const std::filesystem::path& path) { return parse_csv(read_text(path), path.string()); }
 
-CsvTable parse_csv(std::string_view text, const std::string& name) {
-  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-  if (text.empty()) throw InputError(name + ": is empty; accepted: a line of column names, then rows of numbers");
+CsvTable parse_csv(std::string_view text, const std::string& name) { return parse(text, name, to_number); }
 
-  CsvTable table{name, {}, {}};
-  std::vector<Cell> cells;
-  for (std::size_t number = 1; !text.empty(); ++number) {
-    const Line line{name, number, take_line(text)};
-    split(line.text, cells);
-    if (number == 1) {
-      table.names = column_names(line, cells);
-      table.columns.resize(cells.size());
-    } else {
-      add_row(line, cells, table);
+CsvTable parse_csv(std::string_view text, const std::string& name, const std::vector<std::string>& wanted,
+                   std::vector<std::string>& others) {
+  CsvTable all = parse(text, name, number_or_nan), table{name, {}, {}};
+  for (std::size_t i = 0; i < all.names.size(); ++i) {
+    if (std::ranges::count(wanted, all.names[i]) == 0) {
+      others.push_back(all.names[i]);
+      continue;
     }
+    table.names.push_back(all.names[i]);
+    table.columns.push_back(std::move(all.columns[i]));
   }
   return table;
 }

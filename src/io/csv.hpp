@@ -14,7 +14,7 @@ namespace flappy::io {
 struct CsvTable {
   std::string name;  ///< file name, for messages
   std::vector<std::string> names;
-  std::vector<std::vector<double>> columns;  ///< [name][row], finite
+  std::vector<std::vector<double>> columns;  ///< [name][row]
 
   /// Throws InputError where there is no such column.
   const std::vector<double>& column(std::string_view column_name) const;
@@ -26,6 +26,11 @@ CsvTable read_csv(const std::filesystem::path& path);
 
 /// read_csv() for text; `name` is the file name for messages.
 CsvTable parse_csv(std::string_view text, const std::string& name);
+
+/// A table of measurements: of its columns those of `wanted` alone, where cells that are no finite numbers are NaN. The
+/// names of other columns, whose cells may hold anything, are put in `others`.
+CsvTable parse_csv(std::string_view text, const std::string& name, const std::vector<std::string>& wanted,
+                   std::vector<std::string>& others);
 
 /// Text that parse_csv() reads as the same table. Throws std::invalid_argument unless all columns have the same length.
 std::string csv_text(const std::vector<std::string>& names, const std::vector<std::vector<double>>& columns);

@@ -269,6 +269,15 @@ TEST(ForceFit, AllMethodsMeet) {
   for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(again.known.parameters[i].value, fits[2].known.parameters[i].value);
 }
 
+TEST(ForceFit, StopsAtOnce) {
+  FitOptions o = one_start();
+  int calls = 0;
+  o.progress = [&](const std::string&, double, double) { return ++calls < 2; };
+  EXPECT_TRUE(
+      fit_forces(test::nominal(), simulate_forces(test::identified(), default_inputs(), {}, 1), config(), o).stopped);
+  EXPECT_EQ(calls, 2);  // no other stage begins
+}
+
 TEST(ForceFit, NeedsAsManyInputsAsParameters) {
   std::vector<sim::Input> inputs = default_inputs();
   inputs.resize(11);

@@ -8,6 +8,8 @@
 
 #include "identify/fit_config.hpp"
 #include "identify/force_sensor.hpp"
+#include "identify/units.hpp"
+#include "model/derive.hpp"
 #include "refusal.hpp"
 #include "vehicles.hpp"
 
@@ -108,6 +110,58 @@ TEST(Signs, OneRowIsRefused) {
       << part.size();
 }
 
+/// What is said of a map whose wrenches are changed.
+std::string unit_refusal(const MeasuredMap& good, const std::function<void(Wrench&)>& change) {
+  MeasuredMap map = good;
+  for (Wrench& w : map.wrenches) change(w);
+  return test::refusal([&] { check_units(map, nominal_map(map.inputs), test::nominal()); });
+}
+
+TEST(Units, AreKnownByTheSizeOfForcesAndTorques) {
+  const MeasuredMap good = measured(default_inputs());
+  EXPECT_EQ(unit_refusal(good, [](Wrench&) {}), "accepted");
+  for (const auto& [factor, unit] :
+       {std::pair(1e3, "mN"), {101.97, "gf"}, {0.2248, "lbf"}, {0.10197, "kgf"}, {3.597, "ozf"}}) {
+    const std::string line = unit_refusal(good, [&](Wrench& w) { w[0] *= factor, w[1] *= factor, w[2] *= factor; });
+    EXPECT_TRUE(line.starts_with("m.csv:1: force_z_N: thrust against amplitude_V has slope ")) << line;
+    EXPECT_TRUE(line.ends_with(std::string(" times the vehicle's; likely in ") + unit + ", not N; accepted: N"))
+        << line;
+    // the side forces of another robot may be anything
+    EXPECT_EQ(unit_refusal(good, [&](Wrench& w) { w[2] *= factor; }), "accepted") << unit;
+  }
+  const std::string other = unit_refusal(good, [&](Wrench& w) { w[0] *= 30, w[1] *= 30, w[2] *= 30; });
+  EXPECT_TRUE(other.ends_with("; another unit, or a wrong scale; accepted: N")) << other;
+  const std::string torques = unit_refusal(good, [](Wrench& w) { w[3] *= 1e3, w[4] *= 1e3, w[5] *= 1e3; });
+  EXPECT_TRUE(torques.starts_with("m.csv:1: torque_x_Nm: torques against their inputs have slopes of ")) << torques;
+  EXPECT_TRUE(torques.ends_with(" times the vehicle's; likely in mN m or N mm, not N m; accepted: N m")) << torques;
+  // too few rows for slopes
+  const std::string few = unit_refusal(measured({{10, 0, 0, 0}, {10, 2, 0, 0}}), [](Wrench& w) {
+    for (double& x : w) x *= 1e3;
+  });
+  EXPECT_TRUE(few.ends_with(" times the vehicle's; likely in mN, not N; accepted: N")) << few;
+}
+
+TEST(Units, OfABalanceThatWasNotTared) {
+  const double weight_N = 9.81 * model::total_mass_kg(test::nominal());
+  const std::string line = unit_refusal(measured(default_inputs()), [&](Wrench& w) { w[2] -= weight_N; });
+  EXPECT_TRUE(line.starts_with("m.csv:1: force_z_N: thrust is 0.")) << line;
+  EXPECT_TRUE(
+      line.ends_with("; likely a balance that was not tared; accepted: forces of the air alone, 0 while the "
+                     "wings are at rest"))
+      << line;
+}
+
+TEST(Units, OfInputsThatAreDutyCycles) {
+  MeasuredMap map = measured(default_inputs());
+  for (sim::Input& u : map.inputs) u.amplitude_V /= 18, u.difference_V /= 18, u.bias_V /= 18;
+  const std::string line = test::refusal([&] { check_units(map, nominal_map(map.inputs), test::nominal()); });
+  EXPECT_TRUE(line.starts_with("m.csv:1: amplitude_V: at most 0.")) << line;
+  EXPECT_TRUE(
+      line.ends_with("; likely duty cycles, not volts; accepted: volts: a duty cycle times the battery's "
+                     "voltage"))
+      << line;
+}
+
 TEST(Signs, SmallMapsHaveThemToo) {
   // too few rows for slopes
   const MeasuredMap good = measured({{10, 0, 0, 0}, {10, 2, 0, 0}, {10, 0, 3, 0}, {10, 0, 0, 0.12}});
@@ -163,6 +217,7 @@ TEST(Signs, GoodMapsAreNeverRefused) {
           }
         }
         EXPECT_EQ(refusal_of(map, simulated), "accepted") << inputs.size();
+        EXPECT_EQ(test::refusal([&] { check_units(map, simulated, start); }), "accepted") << inputs.size();
         map.sd.clear();
         EXPECT_EQ(refusal_of(map, simulated), "accepted") << inputs.size();
       }

@@ -53,7 +53,7 @@ Json run(const CalibrationSettings& s, io::Program& program) {
     MeasuredMap measured = simulate_forces(truth, inputs, {}, seed, options.map);
     measured.name = s.inputs.empty() ? "map of " + s.truth : s.inputs;
     const ForceFit fit = fit_forces(vehicle, measured, config, options);
-    if (io::interrupted()) break;  // this fit was cut short
+    if (fit.stopped) break;
     of_seed[1] = fit.after.total;
     if (!held.empty()) {
       const MeasuredMap other = simulate_forces(truth, held, {}, seed + 1000000, options.map);

@@ -225,7 +225,7 @@ Json run(const ForceSettings& s) {
     };
     fit = fit_forces(vehicle, measured, config, options);
   }
-  if (io::interrupted()) throw io::InputError("interrupted: no vehicle is written");
+  if (fit.stopped) throw io::InputError("interrupted: no vehicle is written");
   fit.vehicle.name = vehicle.name + "_fitted";
   std::optional<double> held_error;
   if (held.size() > 0)
