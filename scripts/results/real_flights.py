@@ -52,7 +52,7 @@ def diagnose(name, vehicle, flights, *more):
     begin = time.monotonic()
     code, out, err = run(BIN / "flappy-gap", "diagnose", "--vehicle", vehicle, "--flights", *flights, "--out", OUT / name, *more)
     if code != 0:
-        return None, err.strip().splitlines()[-1], 0
+        return None, err.strip().splitlines()[-1] if code == 2 else out.strip().splitlines()[0], 0
     return json.loads((OUT / name / "diagnosis.json").read_text()), out, time.monotonic() - begin
 
 

@@ -115,8 +115,9 @@ expect_refused("${WORK}/good/command.csv:152: the flight lasts 3 s, at least 6 s
 # ---- data that forbid a diagnosis are a result; nothing of an earlier one stays beside it
 
 file(WRITE ${WORK}/diagnosis/vehicle_corrected.toml "of another flight")
-run(${diagnose} --out ${WORK}/diagnosis)
-expect_equal("exit code" "${code}" 0)
+run(${diagnose} --out ${WORK}/diagnosis --json ${WORK}/faulty.json)
+expect_equal("exit code" "${code}" 1)
+expect_keys(${WORK}/faulty.json "verdict.kind=STRING")
 expect_line("The data are at fault; nothing was diagnosed")
 expect_line("  ${WORK}/good/command.csv:152: the flight lasts 3 s, at least 6 s (60 beats) are needed")
 file(READ ${WORK}/diagnosis/diagnosis.json json)

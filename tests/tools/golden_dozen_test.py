@@ -38,7 +38,8 @@ def differences(is_, was, path=""):
 
 def run(work, *words):
     done = subprocess.run([str(w) for w in words], cwd=work, capture_output=True, text=True)
-    if done.returncode != 0:
+    faulty_data = words[1] == "diagnose" and done.returncode == 1 and "The data are at fault" in done.stdout  # an answer, too
+    if done.returncode != 0 and not faulty_data:
         sys.exit(f"{words[0].name} {words[1]}: exit code {done.returncode}: {done.stderr}")
 
 

@@ -170,7 +170,8 @@ int main(int argc, char** argv) {
   import.option("--out", import_command.out, "folder of the flight log").required();
   import.option("--set", import_command.overrides, "override a key of the mapping: mocap.time=received")
       .one_at_a_time();
-  io::Command diagnose = program.app().command("diagnose", "what is missing in the model of a robot that flew");
+  io::Command diagnose = program.app().command(
+      "diagnose", "what is missing in the model of a robot that flew; exit code 1 where the data forbid a diagnosis");
   gap::DiagnoseCommand command;
   diagnose.option("--vehicle", command.settings.vehicle, "the vehicle's file, as it was believed").required();
   diagnose.option("--flights", command.settings.flights, "folders of flight logs").required();
@@ -277,7 +278,9 @@ int main(int argc, char** argv) {
           return;
         }
       }
-      program.write_json(gap::run_diagnose(command));
+      const nlohmann::ordered_json found = gap::run_diagnose(command);
+      faulty = found["verdict"]["kind"] == "data";
+      program.write_json(found);
     }
   });
   return faulty ? 1 : code;

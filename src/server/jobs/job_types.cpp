@@ -117,7 +117,7 @@ const std::vector<JobType>& job_types() {
       {"train", train, true},
       {"evaluate", evaluate, true},
       {"export", export_policy, false},
-      {"diagnose", diagnose, false},
+      {"diagnose", diagnose, false, 1},
   };
   return all;
 }

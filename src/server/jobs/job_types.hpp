@@ -46,6 +46,8 @@ struct JobType {
   std::function<std::vector<std::string>(const Launch&)> command;
   /// Whether result.json says that the program stopped early; otherwise every attempt that was asked to stop did.
   bool says_stopped = false;
+  /// Exit code besides 0 with which it has answered, if its result is there: a diagnosis of faulty data ends with 1.
+  int also_done = 0;
 };
 
 const std::vector<JobType>& job_types();

@@ -145,7 +145,7 @@ Ending Runner::ending_of(const Job& job) const {
   const fs::path folder = folder_of(job);
   const JobType& kind = job_type_named(options_.kinds, job.asked.kind);
   const std::optional<Exit> exit = exit_of(folder, job.attempts);
-  const bool failed = exit && (exit->signal != 0 || exit->code != 0);
+  const bool failed = exit && (exit->signal != 0 || (exit->code != 0 && exit->code != kind.also_done));
   const std::optional<int> code = exit && exit->signal == 0 ? std::optional(exit->code) : std::nullopt;
   if (!failed && is_complete(kind, folder, job.wanted != Wanted::run)) return {State::done, code, ""};
   if (job.wanted == Wanted::cancel) return {State::cancelled, code, "cancelled"};

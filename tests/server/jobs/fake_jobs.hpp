@@ -48,7 +48,10 @@ done
 [ "$3" = mistake ] && echo "x.toml:1:1: key: is wrong; accepted: right" >&2 && exit 2
 echo end >> ends
 rm -r busy
+[ "$3" = fault ] && exit 1
 echo '{"stopped": false}' > result.json
+[ "$3" = answer ] && exit 1
+exit 0
 )sh";
 
 /// The kind "fake": config is HOW, and the override steps=N.
@@ -59,7 +62,7 @@ inline std::vector<JobType> fake_kinds() {
              return std::vector<std::string>{"/bin/sh",          "-c", kScript, "sh", launch.folder.string(), steps,
                                              launch.asked.config};
            },
-           true}};
+           true, 1}};
 }
 
 /// A folder for configurations, output and flights, and a server of fake jobs on it.

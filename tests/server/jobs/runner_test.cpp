@@ -26,12 +26,19 @@ struct Jobs : ::testing::Test {
 
 TEST_F(Jobs, EndAsTheirProgramsDo) {
   const std::uint64_t well = queue.submit(fake("a")), crash = queue.submit(fake("b", "crash")),
-                      mistake = queue.submit(fake("c", "mistake")), once = queue.submit(fake("d", "once"));
+                      mistake = queue.submit(fake("c", "mistake")), once = queue.submit(fake("d", "once")),
+                      answer = queue.submit(fake("e", "answer")), fault = queue.submit(fake("f", "fault"));
   Runner runner(queue, place.options());
   EXPECT_TRUE(comes_to(runner, well, State::done));
   EXPECT_TRUE(comes_to(runner, crash, State::failed));
   EXPECT_TRUE(comes_to(runner, mistake, State::failed));
   EXPECT_TRUE(comes_to(runner, once, State::done));
+  // 1 with a result is an answer of this kind of job, 1 alone is our fault
+  EXPECT_TRUE(comes_to(runner, answer, State::done));
+  EXPECT_TRUE(comes_to(runner, fault, State::failed));
+  EXPECT_EQ(queue.job(answer).exit_code, 1);
+  EXPECT_EQ(queue.job(answer).attempts, 1);
+  EXPECT_EQ(queue.job(fault).attempts, 3);
 
   EXPECT_EQ(queue.job(well).exit_code, 0);
   EXPECT_EQ(queue.job(well).progress, 1);
