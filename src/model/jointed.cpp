@@ -176,7 +176,13 @@ void check_gait(const io::Table& root, const Jointed& v) {
     const Jointed::Wing& w = left ? v.left : v.right;
     for (std::size_t k = 0; k < kAngles.size(); ++k) {
       const Jointed::Angle& a = w.angles[k];
-      if (a.mode == Jointed::Mode::free) continue;
+      if (a.mode == Jointed::Mode::free) {
+        const std::string path = std::string(left ? "left." : "right.") + kAngles[k];
+        if ((a.lower_rad != 0 || a.upper_rad != 0) && a.stop_stiffness_Nm_rad == 0 && a.stop_damping_Nm_s == 0)
+          root.fail(path + (a.lower_rad != 0 ? ".lower_rad" : ".upper_rad"), "is a stop that nothing holds",
+                    path + ".stop_stiffness_Nm_rad above 0, or no stop");
+        continue;
+      }
       const double scale =
           1 + most(v, [&](const auto& i) { return std::abs(i.scale[k]) + std::abs(i.scale_opposed[k]); });
       const double offset =

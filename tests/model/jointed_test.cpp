@@ -130,8 +130,7 @@ TEST(Jointed, HeldTorsoLeavesTheFreeAnglesOfKane) {
 std::string driven_text() { return io::read_text(test::source_path("configs/vehicles/hummingbird_driven.toml")); }
 
 /// What is said of the shipped file with `from` in it replaced.
-std::string refused(const std::string& from, const std::string& to) {
-  std::string text = driven_text();
+std::string refused(const std::string& from, const std::string& to, std::string text = driven_text()) {
   const std::size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   text.replace(at, from.size(), to);
@@ -171,6 +170,22 @@ TEST(JointedFile, RefusesWhatNoWingDoes) {
       refused("lag_s = 0.004 ", "scale.stroke_plane = 0.1\nlag_s = 0.004 "),
       "input.amplitude.scale.stroke_plane: changes an angle that it cannot move; accepted: an angle that is driven");
   EXPECT_EQ(refused("lag_s = 0.004 ", "offset_rad.stroke_plane = 0.1\nlag_s = 0.004 "), "accepted");
+  EXPECT_EQ(refused("mode = \"fixed\"", "mode = \"fixed\"\ncos_rad = [0.1]").substr(0, 37),
+            "left.stroke_plane.cos_rad: unknown ke");
+  // of a free angle
+  const auto refused_free = [](const std::string& from, const std::string& to) {
+    return refused(from, to, io::read_text(test::source_path("configs/vehicles/kubeetle_like.toml")));
+  };
+  EXPECT_EQ(refused_free("stop_stiffness_Nm_rad = 0.05\nstop_damping_Nm_s = 2e-5\n", ""),
+            "left.rotation.lower_rad: is a stop that nothing holds; accepted: left.rotation.stop_stiffness_Nm_rad "
+            "above 0, or no stop");
+  EXPECT_EQ(refused_free("mode = \"free\"", "mode = \"free\"\nmean_rad = 0.1").substr(0, 33),
+            "left.rotation.mean_rad: unknown k");
+  EXPECT_EQ(refused_free("lag_s = ", "offset_rad.rotation = 0.1\nlag_s = ")
+                    .find("changes an angle that it cannot "
+                          "move; accepted: an angle that is "
+                          "driven or fixed") != std::string::npos,
+            true);
   EXPECT_EQ(refused("lag_s = 0.004 ", "lag_s = 0.0 "),
             "input.amplitude.lag_s: 0 is out of range; accepted: a number from 1e-05 to 1");
   EXPECT_EQ(refused("mode = \"fixed\"", "mode = \"loose\"").substr(0, 56),
