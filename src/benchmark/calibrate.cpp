@@ -245,6 +245,7 @@ Json calibrate(const CalibrateCommand& command) {
     set_number(text, "prior", key, io::shortest_digits(value));
   std::printf("mean log probability of what is right: %.3f, was %.3f, of %zu cases\n", json["score"].get<double>(),
               json["score_before"].get<double>(), calibration.cases());
+  gap::parse_verdict_rule(text, command.out.string());  // a file that no program reads is not written
   io::write_atomically(command.out, text);
   return json;
 }

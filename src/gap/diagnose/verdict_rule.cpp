@@ -7,9 +7,10 @@
 
 namespace flappy::gap {
 
-VerdictRule read_verdict_rule(const std::filesystem::path& path) {
+namespace {
+
+VerdictRule rule_of(const io::Config& config) {
   constexpr io::Range kPositive = io::positive(), kNats = io::non_negative(), kShare{0, 1};
-  const io::Config config = io::Config::load(path);
   const io::Table root = config.root();
   root.schema(1);
   VerdictRule r{};
@@ -52,6 +53,14 @@ VerdictRule read_verdict_rule(const std::filesystem::path& path) {
               naming.number("member_of_pool", kShare), naming.number_or("least", 0, kShare)};
   root.finish();
   return r;
+}
+
+}  // namespace
+
+VerdictRule read_verdict_rule(const std::filesystem::path& path) { return rule_of(io::Config::load(path)); }
+
+VerdictRule parse_verdict_rule(std::string_view text, const std::string& name) {
+  return rule_of(io::Config::parse(text, name));
 }
 
 }  // namespace flappy::gap

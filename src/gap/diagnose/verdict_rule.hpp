@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "io/installation.hpp"
@@ -48,5 +49,7 @@ struct VerdictRule {
 
 /// io::InputError with file and line.
 VerdictRule read_verdict_rule(const std::filesystem::path& path = io::config_path("gap/verdict.toml"));
+/// The same of a file's text; `name` is the file in messages.
+VerdictRule parse_verdict_rule(std::string_view text, const std::string& name);
 
 }  // namespace flappy::gap
