@@ -60,3 +60,7 @@ refuse_edited("figure = \"stroke_rad\"" "figure = \"stroke_rad\"\nat_last = 1" "
 if(EXISTS ${WORK}/new)
   message(SEND_ERROR "a refused run left a folder")
 endif()
+
+# ---- no output replaces what is read
+
+expect_kept(${WORK}/out/config.toml --json ${config} --out ${WORK}/out ${small})

@@ -170,3 +170,7 @@ expect_refused("flappy-eval: --episodes: Value 0 not in range 1 to 100000; see f
 expect_refused("flappy-eval: --stream: training not in {test,validation}; see flappy-eval --help" ${WORK}/best.json --stream training)
 expect_refused("flappy-eval: policy is required; see flappy-eval --help")
 expect_refused("flappy-eval: --episode: no such option; accepted: --allow-network, --config, --effects, --episodes, --help, --json, --log-level, --no-baselines, --progress, --seed, --set, --stream, --task, --threads, --vehicle, --version; did you mean \"--episodes\"?; see flappy-eval --help" ${WORK}/best.json --episode=5)
+
+# ---- no output replaces what is read
+
+expect_kept(${WORK}/run/best.json --json ${WORK}/run ${few})

@@ -255,3 +255,7 @@ string(REGEX REPLACE "\"weights\":\\[[^,]+," "\"weights\":[1e39," text "${text}"
 file(WRITE ${bad}/best.json "${text}")
 sign_policy()
 refused("${bad}/best.json: has 1e+39 in it, which single precision does not hold; accepted: numbers up to 3.4e38" ${bad})
+
+# ---- no output replaces what is read
+
+expect_kept(${WORK}/run/best.json --json ${WORK}/run --out ${WORK}/kept)

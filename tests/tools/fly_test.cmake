@@ -83,3 +83,14 @@ expect_refused("${WORK}/bad.toml: is no folder; accepted: a new folder, an empty
   ${hover} --log ${WORK}/bad.toml)
 expect_refused("${WORK}/logs: holds 0000; accepted: a new folder, an empty one, or logs of as many flights to replace"
   ${hover} --log ${WORK}/logs)
+
+# ---- no output replaces what is read, named on the command line or by the configuration
+
+file(COPY ${SOURCE}/configs/fly ${SOURCE}/configs/vehicles ${SOURCE}/configs/tasks ${SOURCE}/configs/sensors ${SOURCE}/configs/controllers
+  ${SOURCE}/configs/randomisation DESTINATION ${WORK}/configs)
+set(own ${WORK}/configs/fly/hover.toml)
+foreach(file IN ITEMS fly/hover.toml vehicles/hummingbird_identified.toml tasks/hover.toml)
+  foreach(option IN ITEMS --json --mcap --progress)
+    expect_kept(${WORK}/configs/${file} ${option} ${own} --count 1 --set flight.duration_s=0.1)
+  endforeach()
+endforeach()

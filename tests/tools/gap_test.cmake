@@ -131,3 +131,10 @@ endif()
 
 expect_refused("${WORK}/good: has no diagnosis.json; accepted: the folder of a finished flappy-gap diagnose --out"
   mcap ${WORK}/good --vehicle ${SOURCE}/configs/vehicles/hummingbird_nominal.toml --diagnosis ${WORK}/good --out ${WORK}/good.mcap)
+
+# ---- no output replaces what is read
+
+foreach(file IN ITEMS flight.toml imu.csv)
+  expect_kept(${WORK}/good/${file} --json check ${WORK}/good)
+  expect_kept(${WORK}/good/${file} --json ${diagnose})
+endforeach()

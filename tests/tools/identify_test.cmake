@@ -164,3 +164,8 @@ expect_match("stdout" "${out}" "^left\\.stroke: mean -?0\\.00 deg, first harmoni
 expect_keys(${WORK}/gait.json angles.0.angle=STRING angles.0.cos_rad=ARRAY)
 expect_refused("${WORK}/gait.csv: a gap of 0.25 beats from 0 of the beat on; accepted: at most 0.0625 beats for 8 harmonics, or fewer of them"
   gait ${WORK}/gait.csv --frequency-Hz 25)
+
+# ---- no output replaces what is read
+
+expect_kept(${WORK}/map.csv --json forces ${WORK}/map.csv --vehicle ${nominal} --out ${WORK}/kept.toml)
+expect_kept(${WORK}/slow.toml --json simulate-forces --vehicle ${WORK}/slow.toml --out ${WORK}/kept.csv)

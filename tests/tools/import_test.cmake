@@ -104,3 +104,12 @@ set(PROGRAM ${FLY})
 expect_refused("--mcap: is of one flight, not of 2; accepted: --count 1"
   ${SOURCE}/configs/fly/hover.toml --count 2 --mcap ${WORK}/two.mcap)
 expect_refused("${WORK}/none/f.mcap: cannot be written: No such file or directory" ${SOURCE}/configs/fly/hover.toml --mcap ${WORK}/none/f.mcap)
+
+# ---- no output replaces what is read
+
+file(COPY ${mapping} DESTINATION ${WORK})
+foreach(file IN ITEMS f.mcap ros2.toml)
+  expect_kept(${WORK}/${file} --json import ${WORK}/f.mcap --mapping ${WORK}/ros2.toml --out ${WORK}/kept)
+endforeach()
+run(import ${WORK}/log/mocap.csv ${WORK}/log/imu.csv ${WORK}/log/command.csv --mapping ${SOURCE}/configs/mapping/csv.toml --out ${WORK}/log)
+expect_equal("exit code of a log onto what it was made of" "${code}" 2)

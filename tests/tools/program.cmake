@@ -29,6 +29,16 @@ function(expect_refused line)
   expect_equal("files left by: ${line}" "${left}" "")
 endfunction()
 
+# `file` is read by the command, and so refused as the output `option`; it stays as it is.
+function(expect_kept file option)
+  file(SHA256 ${file} before)
+  run(${ARGN} ${option} ${file})
+  expect_match("stderr of ${option} ${file}" "${err}" "(^|\n)${file}: is read by the same command; accepted: another file\n$")
+  expect_equal("exit code of ${option} ${file}" "${code}" 2)
+  file(SHA256 ${file} after)
+  expect_equal("${file}, which ${option} would replace" "${after}" "${before}")
+endfunction()
+
 # These keys (dotted) are there, and are what they say; others may join them.
 function(expect_keys file)
   file(READ ${file} json)

@@ -46,3 +46,8 @@ file(WRITE ${WORK}/hover/mocap.csv "${header}\n")
 run(${WORK}/hover --out ${WORK}/report.html)
 expect_equal("exit code of an empty flight" "${code}" 2)
 expect_match("an empty flight" "${err}" "^${WORK}/hover/mocap.csv: [^\n]*\n$")
+
+# ---- no output replaces what is read
+
+expect_kept(${WORK}/hover/mocap.csv --json ${WORK}/hover --out ${WORK}/kept.html)
+expect_kept(${WORK}/hover/mocap.csv --out ${WORK}/hover)

@@ -136,3 +136,8 @@ run(--resume ${WORK}/whole --from ${before_name})
 expect_equal("exit code" "${code}" 0)
 digest(${WORK}/whole actual)
 expect_equal("from the one before" "${actual}" "${expected}")
+
+# ---- no output replaces what is read
+
+expect_kept(${WORK}/whole/best.json --json ${escape} ${some} --init ${WORK}/whole --out ${WORK}/kept)
+expect_kept(${WORK}/whole/config/train.toml --json --resume ${WORK}/whole)

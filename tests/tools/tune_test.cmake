@@ -67,3 +67,19 @@ expect_refused("${WORK}/none/out.toml: cannot be written: No such file or direct
 if(EXISTS ${WORK}/out.toml)
   message(SEND_ERROR "a refused run left a controller")
 endif()
+
+# ---- no output replaces what is read, but for the controller that the search starts from
+
+file(COPY ${SOURCE}/configs/fly ${SOURCE}/configs/vehicles ${SOURCE}/configs/tasks ${SOURCE}/configs/sensors ${SOURCE}/configs/controllers
+  ${SOURCE}/configs/randomisation DESTINATION ${WORK}/configs)
+file(READ ${WORK}/good.toml own)
+string(REPLACE "${SOURCE}/configs" "${WORK}/configs" own "${own}")
+file(WRITE ${WORK}/own.toml "${own}")
+file(STRINGS ${WORK}/configs/fly/hover.toml controller REGEX "^controller = ")
+string(REGEX REPLACE ".*/controllers/([^\"]+)\".*" "\\1" controller "${controller}")
+foreach(file IN ITEMS own.toml configs/fly/hover.toml configs/tasks/hover.toml configs/controllers/${controller})
+  expect_kept(${WORK}/${file} --json ${WORK}/own.toml ${WORK}/out.toml)
+endforeach()
+expect_refused("${WORK}/configs/tasks/hover.toml: is read by the same command; accepted: another file" ${WORK}/own.toml ${WORK}/configs/tasks/hover.toml)
+run(${WORK}/own.toml ${WORK}/configs/controllers/${controller})
+expect_equal("stderr, of a controller that is tuned in its place" "${err}" "")
