@@ -311,9 +311,9 @@ TEST(Import, DoesWithoutAnAttitudeThatIsNotMeasured) {
   const Imported back = there_and_back(test::some_log(), kAttitudeOfImu);
   EXPECT_FALSE(back.log.attitude || back.log.header.attitude);
   EXPECT_EQ(back.report.warnings,
-            (Lines{"attitude: /imu has 0 usable samples, 200 that are not (200 orientation.w is not measured, as the "
+            (Lines{"attitude: /imu has 0 usable samples, 250 that are not (250 orientation.w is not measured, as the "
                    "message says), and 0 at the time of another: done without"}));
-  EXPECT_EQ(back.log.imu.t_s.size(), 200u);  // the rate and the force of the same messages
+  EXPECT_EQ(back.log.imu.t_s.size(), 250u);  // the rate and the force of the same messages
 }
 
 TEST(Import, LeavesOutWhatMessagesSayIsNotMeasured) {
