@@ -70,6 +70,7 @@ struct OtherKind {
 };
 
 using namespace std::string_view_literals;
+constexpr std::string_view kOfArduPilot = "mavlogdump.py --format csv --types IMU FILE, one table for each type";
 const OtherKind kOtherKinds[] = {
     {"\x89MCAP0\r\n"sv,
      0,
@@ -96,9 +97,12 @@ const OtherKind kOtherKinds[] = {
     {"ustar"sv, 257, {".tar", ".tgz"}, "a tar archive", "tar xf FILE"},
     {"\x89HDF\r\n"sv, 0, {".h5", ".hdf5"}, "an HDF5 file", "export it as CSV"},
     {"MATLAB 5.0 MAT-file"sv, 0, {".mat"}, "a MATLAB file", "writetable, and the CSV"},
+    {"MATLAB 7.3 MAT-file"sv, 0, {".mat"}, "a MATLAB file", "writetable, and the CSV"},
     {"PAR1"sv, 0, {".parquet"}, "a Parquet file", "pandas.read_parquet(FILE).to_csv(...)"},
     {"\x93NUMPY"sv, 0, {".npy"}, "a NumPy array", "numpy.savetxt with header= and delimiter=\",\""},
-    {"\xA3\x95"sv, 0, {}, "a log of ArduPilot", "mavlogdump.py --format csv FILE"},
+    {"\xA3\x95"sv, 0, {}, "a log of ArduPilot", kOfArduPilot},
+    {"FMT, 128, 89,"sv, 0, {}, "a text log of ArduPilot", kOfArduPilot},
+    {"H Product:Blackbox flight data recorder"sv, 0, {}, "a blackbox log of Betaflight", "blackbox_decode FILE"},
     {"\xD0\xCF\x11\xE0"sv, 0, {".xls"}, "an Excel file", "export it as CSV"},
     {"\xFF\xFE"sv, 0, {}, "text in UTF-16", "iconv -f UTF-16 -t UTF-8 FILE"},
     {"\xFE\xFF"sv, 0, {}, "text in UTF-16", "iconv -f UTF-16 -t UTF-8 FILE"},

@@ -178,6 +178,35 @@ Header header_of(std::string_view text, const std::string& name) {
                        "; accepted: a line of column names, then rows of numbers");
 }
 
+/// The columns of a line up to the last that holds something.
+std::size_t used(const Cells& cells) {
+  std::size_t width = cells.size();
+  while (width > 0 && cells[width - 1].empty()) --width;
+  return width;
+}
+
+/// The first line below `above` that looks like names: it holds words, and the next line as many numbers. 0 if there is none.
+std::size_t line_of_names(std::string_view text, std::size_t above) {
+  Lines lines(text);
+  Cells names;  // of the line before, if it holds words
+  std::size_t at = 0;
+  while (const auto line = lines.next()) {
+    if (line->number <= above || is_blank(line->text) || is_comment(line->text)) continue;
+    const char separator = separator_of(line->text);
+    Cells cells = split(line->text, separator);
+    const auto is_word = [&](const std::string& cell) { return std::isinf(to_number(cell, separator != ',')); };
+    if (std::ranges::any_of(cells, is_word)) {
+      names = std::move(cells);
+      at = line->number;
+    } else {
+      const std::size_t named = used(names), width = used(cells);
+      if (named > 1 && width >= named && width <= names.size()) return at;
+      names.clear();
+    }
+  }
+  return 0;
+}
+
 struct LeftOut {
   std::size_t count = 0, first_line = 0;
   std::string first;
@@ -229,13 +258,23 @@ class TableReader {
       }
     }
     if (!row.empty()) split_apart(splitter, row);
-    if (rows_ == 0 && other_width_.count > 0)
-      throw io::InputError(name_ + ":" + std::to_string(other_width_.first_line) + ":1: " + other_width_.first +
-                           ", and no row is otherwise; accepted: rows of as many cells");
+    refuse_other_widths();
     warn(warnings);
   }
 
  private:
+  /// InputError where no row has the cells of the names, or few have, and names stand below a head.
+  void refuse_other_widths() const {
+    if (other_width_.count <= rows_) return;
+    const std::size_t below = line_of_names(text_, header_.line);
+    if (rows_ > 0 && below == 0) return;
+    std::string accepted = "rows of as many cells";
+    if (below > 0) accepted = "names in the first line, as made by: tail -n +" + std::to_string(below) + " FILE";
+    throw io::InputError(name_ + ":" + std::to_string(other_width_.first_line) + ":1: " + other_width_.first +
+                         (rows_ == 0 ? ", and no row is otherwise" : ", and most rows are otherwise") +
+                         "; accepted: " + accepted);
+  }
+
   /// Treats each line as a row of its own, because one opens quotes that are never closed; leaves that one out.
   void split_apart(RowSplitter& splitter, std::vector<Line>& lines) {
     splitter.end_row();

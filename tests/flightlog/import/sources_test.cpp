@@ -146,6 +146,16 @@ TEST(Sources, SayWhatOtherFilesAre) {
             ": is compressed by zstd" + accepted + ", as made by: zstd -d FILE");
   EXPECT_EQ(refusal("log.zip", "PK\x03\x04..."), ": is a zip archive, as .npz and .xlsx files are" + accepted +
                                                      ", as made by: unzip FILE, or export it as CSV");
+  const std::string ardupilot =
+      accepted + ", as made by: mavlogdump.py --format csv --types IMU FILE, one table for each type";
+  EXPECT_EQ(refusal("flight.bin", "\xA3\x95\x80\x80YFMT"), ": is a log of ArduPilot" + ardupilot);
+  EXPECT_EQ(refusal("flight.log", "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nIMU, 0, 0.0\n"),
+            ": is a text log of ArduPilot" + ardupilot);
+  EXPECT_EQ(refusal("flight.bbl", "H Product:Blackbox flight data recorder by Nicholas Sherlock\nH Data version:2\n"),
+            ": is a blackbox log of Betaflight" + accepted + ", as made by: blackbox_decode FILE");
+  for (const char* version : {"5.0", "7.3"})
+    EXPECT_EQ(refusal("take.mat", std::string("MATLAB ") + version + " MAT-file, Platform: GLNXA64"),
+              ": is a MATLAB file" + accepted + ", as made by: writetable, and the CSV");
   EXPECT_EQ(refusal("any.zip", "any bytes"), ": does not begin as a .zip file" + accepted);
   EXPECT_EQ(refusal("bytes.csv", std::string("t,x\n\0\1", 6)), ": holds bytes that are no text" + accepted);
   EXPECT_EQ(refusal("bag.mcap.gz", gzipped("\x89MCAP0\r\n...")),

@@ -122,5 +122,21 @@ TEST(Table, RefusesWhatIsNone) {
             "f.csv:2:1: 3 cells for 2 names, and no row is otherwise; accepted: rows of as many cells");
 }
 
+TEST(Table, NamesTheLineOfNamesBelowAHead) {
+  const auto refusal = [](const std::string& text) { return test::refusal([&] { read(text); }); };
+  // as Motive exports a rigid body; the last column has no name
+  EXPECT_EQ(
+      refusal("Format Version,1.23,Take Name,hover\r\n\r\n,Type,Rigid Body\r\n,ID,1\r\nt,x,\r\n0,0.5,1\r\n1,0.6,1\r\n"),
+      "f.csv:3:1: 3 cells for 4 names, and no row is otherwise; accepted: names in the first line, as made by: tail "
+      "-n +5 FILE");
+  // as QTM does: some lines of the head have as many cells as the first, and rows end with a tab
+  EXPECT_EQ(
+      refusal("FRAMES\t4\nCAMERAS\t8\nFrame\tt\tx\n1\t0.0\t5\t\n2\t0.1\t6\t\n3\t0.2\t7\t\n"),
+      "f.csv:3:1: 3 cells for 2 names, and most rows are otherwise; accepted: names in the first line, as made by: "
+      "tail -n +3 FILE");
+  // some rows of another width are left out, as ever
+  EXPECT_EQ(read("t,x\n0.5,9\n0.75,1\na,b,c\n1,2,3\n").t, (std::vector<double>{0.5, 0.75}));
+}
+
 }  // namespace
 }  // namespace flappy::flightlog::table_test
