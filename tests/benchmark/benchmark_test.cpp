@@ -1,6 +1,5 @@
 // The blind benchmark from making to scoring, with a predictor that costs nothing.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <cmath>
@@ -45,7 +44,7 @@ std::string detectability(const std::vector<std::string>& only = {}) {
 /// A folder of its own, with a table of detectability in it, by which ground and ceiling effect fly.
 class Benchmark : public testing::Test {
  protected:
-  Benchmark() : root_(fs::path(testing::TempDir()) / ("blind_" + name() + "_" + std::to_string(getpid()))) {
+  Benchmark() : root_(fs::path(testing::TempDir()) / ("blind_" + name())) {
     fs::remove_all(root_);
     fs::create_directories(root_);
     io::write_atomically(root_ / "detectable.toml", detectability({"ground_effect", "ceiling_effect"}));
@@ -73,16 +72,16 @@ class Benchmark : public testing::Test {
 
   /// Two robots of a part as make() leaves them, flown once for all tests.
   void copy_two(const std::string& part = "singles") const {
-    const fs::path kept = made_ / part;
+    const fs::path kept = made() / part;
     if (!fs::exists(kept)) {
       ASSERT_TRUE(make(2, part));
-      fs::create_directories(made_);
+      fs::create_directories(made());
       fs::copy(root_ / "bench", kept, fs::copy_options::recursive);
     } else {
       fs::copy(kept, root_ / "bench", fs::copy_options::recursive);
     }
   }
-  static void TearDownTestSuite() { fs::remove_all(made_); }
+  static void TearDownTestSuite() { fs::remove_all(made()); }
 
   /// Says ground effect, whatever it is asked, unless it may not.
   ScoreCommand command() {
@@ -114,7 +113,7 @@ class Benchmark : public testing::Test {
     return c;
   }
 
-  static inline const fs::path made_ = fs::path(testing::TempDir()) / ("blind_made_" + std::to_string(getpid()));
+  static fs::path made() { return fs::path(testing::TempDir()) / "blind_made"; }
   fs::path root_;
   std::atomic<int> asked_ = 0;
 };

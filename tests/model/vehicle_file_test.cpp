@@ -3,7 +3,6 @@
 #include "flappy/vehicle_file.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -197,8 +196,7 @@ class VehicleFile : public testing::Test {
   }
 
  private:
-  std::filesystem::path folder_ =
-      std::filesystem::temp_directory_path() / ("flappy_vehicle_" + std::to_string(getpid()));
+  std::filesystem::path folder_ = std::filesystem::temp_directory_path() / "flappy_vehicle";
 };
 
 void expect_same(Vehicle a, Vehicle b) {
@@ -300,8 +298,7 @@ TEST_F(VehicleFile, RefusesWhatIsNoPointOfContact) {
   EXPECT_NE(with(many).find("contact: has too many points; accepted: 1 to 16"), std::string::npos);
   // of a robot that is known by the beat there is nothing to touch with
   std::string text = io::read_text(test::source_path("configs/vehicles/flapper_nimble.toml")) + point("foot");
-  const std::filesystem::path file =
-      std::filesystem::temp_directory_path() / ("flappy_contact_" + std::to_string(getpid()));
+  const std::filesystem::path file = std::filesystem::temp_directory_path() / "flappy_contact";
   std::ofstream(file) << text;
   try {
     read_any_vehicle(file);

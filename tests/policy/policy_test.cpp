@@ -34,6 +34,7 @@ std::vector<float> acts(const policy::Policy& policy, std::size_t count, const s
 
 TEST(HeaderPolicy, ActsOnRows) {
   const Folder folder;
+  const std::string before = fs::temp_directory_path().string();
   setenv("TMPDIR", (folder / "").c_str(), 1);
   fs::create_directories(folder / "a b \"c\"");
   const std::string name = folder.write("a b \"c\"/policy.h", kSizes + kStep + kTest);
@@ -50,7 +51,7 @@ TEST(HeaderPolicy, ActsOnRows) {
       1, 1);
   EXPECT_EQ(acts(*other, 2, {4, 5}), (std::vector<float>{-4, -5}));
   EXPECT_EQ(acts(*policy, 1, kSeen), (std::vector<float>{5, 2.5F}));
-  unsetenv("TMPDIR");
+  setenv("TMPDIR", before.c_str(), 1);
   std::size_t left = 0;
   for (const auto& entry : fs::directory_iterator(folder / "")) left += entry.path().extension() != ".h";
   EXPECT_EQ(left, 1u);  // the folder of the first header

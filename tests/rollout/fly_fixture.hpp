@@ -1,8 +1,6 @@
 // What the tests of whole flights share.
 #pragma once
 
-#include <unistd.h>
-
 #include <filesystem>
 #include <fstream>
 #include <numbers>
@@ -19,8 +17,7 @@ inline constexpr double kPi = std::numbers::pi;
 /// Gone at the end of its test.
 class Folder {
  public:
-  Folder()
-      : path_(fs::temp_directory_path() / ("fly_test_" + std::to_string(getpid()) + "_" + std::to_string(++count_))) {
+  Folder() : path_(fs::temp_directory_path() / ("fly_test_" + std::to_string(++count_))) {
     fs::create_directories(path_);
   }
   ~Folder() { fs::remove_all(path_); }
