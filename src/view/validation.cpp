@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <map>
 
+#include "io/files.hpp"
 #include "io/text.hpp"
 #include "view/results.hpp"
 #include "view/sections.hpp"
