@@ -19,6 +19,7 @@
 #include "io/installation.hpp"
 #include "io/sha256.hpp"
 #include "loop.hpp"
+#include "policy/policy.hpp"
 
 namespace flappy::blind {
 namespace {
