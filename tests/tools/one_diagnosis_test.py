@@ -15,7 +15,6 @@ import time
 
 from golden_dozen_test import differences
 
-DOMAIN = 100 + os.getpid() % 133
 PATIENCE_S = 300
 
 
@@ -28,14 +27,13 @@ def run(*words, **more):
 
 def by_server(tools, project, work, vehicle, flights):
     """The result of a job."""
-    dds = [f"dds.{key}" for key in ("enabled=true", f"domain={DOMAIN}", "reach=loopback")]
-    options = [word for key in dds for word in ("--set", key)]
     more = ["--set", f'jobs.configs="{project}/configs"', "--set", f'jobs.output="{work}/server"', "--set", f'jobs.data="{flights[0].parent}"']
-    server = subprocess.Popen([tools / "flappy-server", project / "configs/server/local.toml", *options, *more], stdout=subprocess.DEVNULL)
+    server = subprocess.Popen([tools / "flappy-server", project / "configs/server/local.toml", *more], stdout=subprocess.DEVNULL)
     try:
-        client = [word for key in (f"domain={DOMAIN}", "reach=loopback") for word in ("--dds", key)]
+        while not (work / "server/jobs.sock").exists():
+            time.sleep(0.05)
         overrides = [word for f in flights for word in ("--set", f"flight={f.name}")]
-        run(tools / "flappy-job", *client, "submit", "diagnose", vehicle.relative_to(project / "configs"), *overrides)
+        run(tools / "flappy-job", "--jobs", work / "server", "submit", "diagnose", vehicle.relative_to(project / "configs"), *overrides)
         result, end = work / "server/1/result.json", time.monotonic() + PATIENCE_S
         while not result.exists() and time.monotonic() < end:
             time.sleep(0.5)

@@ -1,10 +1,12 @@
 // flappy-job: sends commands to a flappy-server, on this machine or another.
 #include <cstdio>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "io/program.hpp"
 #include "io/progress.hpp"
 #include "server/commands/command_client.hpp"
+#include "server/http/socket_client.hpp"
 
 namespace flappy::job {
 namespace {
@@ -31,6 +33,18 @@ Json json_of(const server::JobStatus& j) {
 
 bool is_over(const server::JobStatus& j) { return j.state == "done" || j.state == "failed" || j.state == "cancelled"; }
 
+/// Over DDS if one of its keys is given, else over the socket in the folder of jobs.
+std::unique_ptr<server::JobClient> client_of(const std::string& jobs, const std::vector<std::string>& dds,
+                                             double timeout_s) {
+  if (dds.empty()) return std::make_unique<server::SocketClient>(jobs, timeout_s);
+  std::vector<std::string> overrides = {"dds.enabled=true"};
+  for (const std::string& each : dds) overrides.push_back("dds." + each);
+  const io::Config config = io::Config::parse("", "--dds", overrides);
+  const io::DdsConfig where = io::read_dds_config(config.root());
+  config.root().finish();
+  return std::make_unique<server::CommandClient>(where, timeout_s);
+}
+
 }  // namespace
 }  // namespace flappy::job
 
@@ -40,7 +54,10 @@ int main(int argc, char** argv) {
   const io::Command& app = program.app();
   std::vector<std::string> dds;
   double timeout_s = 5;
-  app.option("--dds", dds, "where the server is, as a key of [dds]: domain=3, reach=network").one_at_a_time();
+  std::string jobs = server::kJobsFolder;
+  app.option("--jobs", jobs, "the server's folder of jobs, on this machine").shows_default();
+  app.option("--dds", dds, "of a server with dds.enabled, where it is, as a key of [dds]: domain=3, reach=network")
+      .one_at_a_time();
   app.option("--timeout", timeout_s, "seconds without an answer").range(0.1, 3600.0).shows_default();
 
   server::Command asked;
@@ -69,28 +86,23 @@ int main(int argc, char** argv) {
   app.expect_commands(1, 1);
 
   return program.run(argc, argv, [&] {
-    std::vector<std::string> overrides = {"dds.enabled=true"};
-    for (const std::string& each : dds) overrides.push_back("dds." + each);
-    const io::Config config = io::Config::parse("", "--dds", overrides);
-    const io::DdsConfig where = io::read_dds_config(config.root());
-    config.root().finish();
-    server::CommandClient client(where, timeout_s);
+    const std::unique_ptr<server::JobClient> client = job::client_of(jobs, dds, timeout_s);
 
     if (list.given()) {
       nlohmann::ordered_json all = nlohmann::ordered_json::array();
-      for (const server::JobStatus& each : client.list()) job::print(each), all.push_back(job::json_of(each));
+      for (const server::JobStatus& each : client->list()) job::print(each), all.push_back(job::json_of(each));
       return program.write_json({{"jobs", all}});
     }
     if (watch.given()) {
       io::stop_on_interrupt();
       bool over = false, exists = watched == 0;
-      for (const server::JobStatus& each : client.list())
+      for (const server::JobStatus& each : client->list())
         if (watched == 0 || each.id == watched)
           exists = true, job::print(each), over |= each.id == watched && job::is_over(each);
       if (!exists)
         throw io::InputError(std::to_string(watched) + ": no such job; accepted: those that flappy-job list shows");
       if (!over)
-        client.watch(
+        client->watch(
             [&](const server::JobStatus& each) {
               if (watched != 0 && each.id != watched) return true;
               job::print(each);
@@ -100,7 +112,7 @@ int main(int argc, char** argv) {
       return;
     }
     if (fetch.given()) {
-      const std::size_t count = client.fetch(asked.job, out, [](const server::JobFile& file) {
+      const std::size_t count = client->fetch(asked.job, out, [](const server::JobFile& file) {
         std::printf("%12llu  %s\n", static_cast<unsigned long long>(file.bytes), file.name.c_str());
       });
       std::printf("%zu files in %s\n", count, out.c_str());
@@ -109,7 +121,7 @@ int main(int argc, char** argv) {
     asked.verb = "submit";
     for (const auto& [command, verb] : verbs)
       if (command.given()) asked.verb = verb;
-    const server::CommandResult result = client.ask(asked);
+    const server::CommandResult result = client->ask(asked);
     if (!result.accepted) throw io::InputError(result.message);
     std::printf("%s\n", result.message.c_str());
     program.write_json({{"id", result.id}, {"job", result.job}, {"message", result.message}});

@@ -7,6 +7,7 @@
 #include "io/program.hpp"
 #include "io/progress.hpp"
 #include "server/commands/command_server.hpp"
+#include "server/http/command_socket.hpp"
 #include "server/http/dashboard.hpp"
 #include "server/jobs/commands.hpp"
 #include "server/jobs/runner.hpp"
@@ -36,6 +37,7 @@ int main(int argc, char** argv) {
       dashboard.emplace(queue, watched, config);
       std::printf("dashboard: http://%s/\n", dashboard->address().c_str());
     }
+    const server::CommandSocket socket(commands, config.jobs.folders.output);
     std::optional<server::CommandServer> command_server;
     if (config.dds.enabled) command_server.emplace(config.dds, commands, watched);
     std::printf("%s: %zu jobs to go on with\n", config.jobs.folders.output.c_str(),

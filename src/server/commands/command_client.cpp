@@ -5,7 +5,6 @@
 #include <cstring>
 #include <fstream>
 #include <optional>
-#include <random>
 
 #include "io/progress.hpp"
 
@@ -17,17 +16,6 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kLook{50};
 
-std::string fresh_id() {
-  std::random_device random;
-  std::string id;
-  for (int i = 0; i < 4; ++i) {
-    char text[9];
-    std::snprintf(text, sizeof text, "%08x", random());
-    id += text;
-  }
-  return id;
-}
-
 template <std::size_t kSize>
 void put(char (&to)[kSize], const std::string& from, const char* what) {
   if (from.size() >= kSize)
@@ -38,15 +26,6 @@ void put(char (&to)[kSize], const std::string& from, const char* what) {
 
 JobStatus status_of(const JobStatusMessage& m) {
   return {m.id, m.kind, m.config, m.state, static_cast<int>(m.attempts), m.exit_code, m.progress, m.message, m.folder};
-}
-
-/// A file name from the server, which need not be trusted. Throws io::InputError unless it stays below the folder.
-fs::path safe(const std::string& name) {
-  fs::path path(name);
-  const bool odd = name.empty() || path.is_absolute() ||
-                   std::ranges::any_of(path, [](const fs::path& part) { return part == ".." || part == "."; });
-  if (odd) throw io::InputError("the server names a file \"" + shown(name) + "\"; accepted: names below a folder");
-  return path;
 }
 
 }  // namespace
@@ -191,9 +170,7 @@ std::size_t CommandClient::fetch(std::uint64_t job, const fs::path& folder,
   });
   for (const JobFile& file : files) {
     see(file);
-    const fs::path path = folder / safe(file.name);
-    io::make_folder(path.parent_path());
-    io::AtomicFile to(path);
+    io::AtomicFile to(place_of(folder, file.name));
     std::uint64_t got = 0, size = 0;
     ask_for(file.name, [&](const Piece& m) {
       if (m.offset != got) throw io::InputError(file.name + ": a piece is missing");

@@ -8,23 +8,20 @@
 #include <vector>
 
 #include "server/dds/participant.hpp"
-#include "server/jobs/commands.hpp"
+#include "server/jobs/job_client.hpp"
 
 namespace flappy::server {
 
-class CommandClient {
+class CommandClient : public JobClient {
  public:
-  /// Throws io::InputError where no server answers within `timeout_s`; so do ask, list and fetch.
+  /// Throws io::InputError where no server answers within `timeout_s`.
   CommandClient(const io::DdsConfig& config, double timeout_s);
 
-  /// Sends a command and returns the server's answer. An empty id is replaced by a random one.
-  CommandResult ask(Command command);
-  std::vector<JobStatus> list();  ///< newest first
-  /// Calls `see` with each job that changes, until `see` or `keep_going` returns false.
-  void watch(const std::function<bool(const JobStatus& job)>& see, const std::function<bool()>& keep_going);
-  /// Downloads a job's files into `folder`, under their names, and returns their number. Calls `see` before each.
+  CommandResult ask(Command command) override;
+  std::vector<JobStatus> list() override;
+  void watch(const std::function<bool(const JobStatus& job)>& see, const std::function<bool()>& keep_going) override;
   std::size_t fetch(std::uint64_t job, const std::filesystem::path& folder,
-                    const std::function<void(const JobFile&)>& see);
+                    const std::function<void(const JobFile&)>& see) override;
 
  private:
   /// A FileChunk that has been received.

@@ -195,6 +195,8 @@ bool CommandServer::send_piece(Transfer& t) {
 }
 
 void CommandServer::show_changes(bool all) {
+  const std::uint64_t changes = commands_.changes();
+  if (!all && std::exchange(shown_changes_, changes) == changes) return;
   std::map<std::uint64_t, JobStatus> jobs;
   for (JobStatus& s : commands_.statuses()) jobs.emplace(s.id, std::move(s));
   for (const auto& [id, s] : jobs) {

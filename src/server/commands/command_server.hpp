@@ -73,6 +73,7 @@ class CommandServer {
   Reader<BatteryState> battery_;
   WaitSet waiting_;
   std::map<std::uint64_t, JobStatus> shown_;
+  std::uint64_t shown_changes_ = UINT64_MAX;  ///< Commands::changes() when jobs were shown last
   std::deque<Answer> answers_;
   std::deque<Transfer> transfers_;
   ShownState state_;

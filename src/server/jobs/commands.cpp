@@ -61,7 +61,7 @@ CommandResult Commands::execute(const Command& command) {
   bool in_time = true;
   {
     const std::lock_guard guard(mutex_);
-    in_time = limit_.take(command.client.substr(0, kMaxOfId), now);
+    in_time = command.client.empty() || limit_.take(command.client.substr(0, kMaxOfId), now);
   }
   if (!in_time) return refused(command, std::string(kTooMany) + "; accepted: the same one later", now);
   try {

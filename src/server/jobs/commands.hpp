@@ -16,7 +16,7 @@ namespace flappy::server {
 
 struct Command {
   std::string id;            ///< chosen by the client; the same id submitted twice is one job
-  std::string client;        ///< the sender, whose rate limit applies
+  std::string client;        ///< the sender, whose rate limit applies; empty: this machine's user, who has none
   std::string verb;          ///< submit, list, pause, resume, cancel, fetch
   std::string kind, config;  ///< for submit
   std::uint64_t job = 0;     ///< for pause, resume, cancel, fetch
@@ -60,7 +60,12 @@ class Commands {
   /// Never throws because of what a client sent. Only accepts list and fetch; the functions below answer them.
   CommandResult execute(const Command& command);
 
-  std::vector<JobStatus> statuses() const;              ///< the newest kMaxListed, newest first
+  std::vector<JobStatus> statuses() const;  ///< the newest kMaxListed, newest first
+  /// As of Queue: how often the queue has changed, also once that differs from `seen` or `most` has passed.
+  std::uint64_t changes() const { return queue_.changes(); }
+  std::uint64_t wait_for_change(std::uint64_t seen, std::chrono::milliseconds most) const {
+    return queue_.wait_for_change(seen, most);
+  }
   std::vector<JobFile> files(std::uint64_t job) const;  ///< throws io::InputError for an unknown job
   /// At most kMaxOfChunk bytes; empty at the end. Throws io::InputError where `file` is no file below the job's folder.
   std::string chunk(std::uint64_t job, const std::string& file, std::uint64_t offset) const;

@@ -19,8 +19,13 @@ JobsConfig read_jobs(const io::Table& table) {
   JobsConfig c;
   c.folders.configs = existing_folder(table, "configs");
   if (table.has("data")) c.folders.data = existing_folder(table, "data");
-  io::make_folder(table.file("output"));
-  c.folders.output = existing_folder(table, "output");
+  if (table.has("output")) {
+    io::make_folder(table.file("output"));
+    c.folders.output = existing_folder(table, "output");
+  } else {
+    io::make_folder(kJobsFolder);
+    c.folders.output = fs::canonical(kJobsFolder);
+  }
   c.backend =
       table.choice_or("backend", "local", {"local", "slurm"}) == "slurm" ? BackendKind::slurm : BackendKind::local;
   c.at_once = static_cast<int>(table.integer_or("at_once", 1, 1, 1000));

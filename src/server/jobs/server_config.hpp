@@ -10,6 +10,9 @@
 
 namespace flappy::server {
 
+/// Where jobs go, in the folder in which flappy-server is started, unless its configuration says so.
+inline constexpr const char* kJobsFolder = "runs/server";
+
 enum class BackendKind { local, slurm };
 
 struct JobsConfig {

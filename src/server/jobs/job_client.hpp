@@ -1,0 +1,33 @@
+// What a client asks of a flappy-server, over whatever it is reached by.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <vector>
+
+#include "server/jobs/commands.hpp"
+
+namespace flappy::server {
+
+/// All throw io::InputError where the server does not answer in time.
+class JobClient {
+ public:
+  virtual ~JobClient() = default;
+  /// Sends a command and returns the server's answer. An empty id is replaced by a random one.
+  virtual CommandResult ask(Command command) = 0;
+  virtual std::vector<JobStatus> list() = 0;  ///< newest first
+  /// Calls `see` with each job that changes, until `see` or `keep_going` returns false.
+  virtual void watch(const std::function<bool(const JobStatus& job)>& see, const std::function<bool()>& keep_going) = 0;
+  /// Downloads a job's files into `folder`, under their names, and returns their number. Calls `see` before each.
+  virtual std::size_t fetch(std::uint64_t job, const std::filesystem::path& folder,
+                            const std::function<void(const JobFile&)>& see) = 0;
+};
+
+/// 32 random hexadecimal digits.
+std::string fresh_id();
+
+/// Where a file that the server names goes below `folder`; the folder is made. Throws io::InputError for a name that
+/// would leave it: a server need not be trusted.
+std::filesystem::path place_of(const std::filesystem::path& folder, const std::string& name);
+
+}  // namespace flappy::server
