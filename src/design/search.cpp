@@ -4,16 +4,11 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
-#include <pagmo/algorithm.hpp>
-#include <pagmo/algorithms/nsga2.hpp>
-#include <pagmo/batch_evaluators/member_bfe.hpp>
-#include <pagmo/bfe.hpp>
-#include <pagmo/population.hpp>
-#include <pagmo/problem.hpp>
 #include <pagmo/utils/hypervolume.hpp>
 #include <set>
 #include <sstream>
 
+#include "design/nsga2.hpp"
 #include "io/parallel.hpp"
 #include "io/progress.hpp"
 #include "io/refuse.hpp"
@@ -23,7 +18,6 @@ namespace flappy::design {
 namespace {
 
 constexpr const char* kStages[] = {"built", "stand", "hover", "escape", "effects"};
-constexpr double kCrossover = 0.9, kCrossoverIndex = 10, kMutationIndex = 20;  // Deb's, for real variables
 constexpr double kAway = 0.1;                   // sd of first designs about the published one, in shares of each range
 constexpr std::uint32_t kNearBuilt = 1U << 31;  // takes the place of a generation in the keys of their random numbers
 constexpr double kRefused =
@@ -101,28 +95,6 @@ std::vector<Record> read_records(const std::filesystem::path& file) {
   return records;
 }
 
-/// The designs as a problem of pagmo.
-struct Search::Problem {
-  Search* search = nullptr;
-
-  std::vector<double> fitness(const std::vector<double>& point) const { return search->judge_all({point})[0]; }
-  std::vector<double> batch_fitness(const std::vector<double>& points) const {
-    const std::size_t n = search->judge_.config().space.variables.size();
-    std::vector<std::vector<double>> list;
-    for (std::size_t at = 0; at < points.size(); at += n)
-      list.emplace_back(points.begin() + static_cast<std::ptrdiff_t>(at),
-                        points.begin() + static_cast<std::ptrdiff_t>(at + n));
-    std::vector<double> all;
-    for (const std::vector<double>& f : search->judge_all(list)) all.insert(all.end(), f.begin(), f.end());
-    return all;
-  }
-  std::vector<double>::size_type get_nobj() const { return search->config_.objectives.size(); }
-  std::pair<std::vector<double>, std::vector<double>> get_bounds() const {
-    const std::size_t n = search->judge_.config().space.variables.size();
-    return {std::vector<double>(n, 0), std::vector<double>(n, 1)};
-  }
-};
-
 Search::Search(const Judge& judge, SearchConfig config, const std::vector<Record>& known)
     : judge_(judge), config_(std::move(config)), upto_(Stage::built) {
   for (const Figure f : config_.objectives) upto_ = std::max(upto_, info_of(f).stage);
@@ -199,7 +171,7 @@ bool Search::report(unsigned number, const std::function<bool(const Generation&)
 
 bool Search::run(const std::function<bool(const Generation&)>& progress) try {
   const std::size_t n = judge_.config().space.variables.size();
-  const auto points = [&](unsigned generation) {
+  const auto drawn = [&](unsigned generation) {
     std::vector<std::vector<double>> list;
     for (unsigned i = 0; i < config_.population; ++i) {
       const sim::RandomKey key{config_.seed, i, generation, sim::Stream::design};
@@ -211,12 +183,12 @@ bool Search::run(const std::function<bool(const Generation&)>& progress) try {
   };
   if (config_.random) {
     for (unsigned g = 0; g < config_.generations; ++g) {
-      judge_all(points(g));
+      judge_all(drawn(g));
       if (!report(g + 1, progress)) return false;
     }
     return true;
   }
-  std::vector<std::vector<double>> first = points(0);
+  Points first = drawn(0);
   const std::vector<double> built = judge_.config().space.unit(judge_.config().space.built);
   for (unsigned i = 0; i < config_.population / 2; ++i)
     for (std::size_t k = 0; k < n; ++k) {
@@ -224,15 +196,16 @@ bool Search::run(const std::function<bool(const Generation&)>& progress) try {
       const double away = i == 0 ? 0 : kAway * sim::normal(key, static_cast<std::uint32_t>(k));
       first[i][k] = std::clamp(built[k] + away, 0.0, 1.0);
     }
-  const std::vector<std::vector<double>> values = judge_all(first);
-  pagmo::population population(pagmo::problem(Problem{this}), 0, static_cast<unsigned>(config_.seed));
-  for (std::size_t i = 0; i < first.size(); ++i) population.push_back(first[i], values[i]);
+  Points points = std::move(first), f = judge_all(points);
   if (!report(1, progress)) return false;
   for (unsigned g = 1; g < config_.generations; ++g) {
-    pagmo::nsga2 nsga2(1, kCrossover, kCrossoverIndex, 1.0 / static_cast<double>(n), kMutationIndex,
-                       static_cast<unsigned>(config_.seed) * 1000003U + g);
-    nsga2.set_bfe(pagmo::bfe(pagmo::member_bfe{}));
-    population = pagmo::algorithm(nsga2).evolve(population);
+    const Points children = children_of(points, f, static_cast<unsigned>(config_.seed) * 1000003U + g);
+    const Points theirs = judge_all(children);
+    Points all = std::move(points), all_f = std::move(f);
+    all.insert(all.end(), children.begin(), children.end());
+    all_f.insert(all_f.end(), theirs.begin(), theirs.end());
+    points.clear(), f.clear();
+    for (const std::size_t i : best_of(all_f, config_.population)) points.push_back(all[i]), f.push_back(all_f[i]);
     if (!report(g + 1, progress)) return false;
   }
   return true;

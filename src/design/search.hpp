@@ -1,8 +1,7 @@
-// The search for designs that no other design beats in every objective: pagmo's NSGA-II (Deb et al., IEEE T-EC 6, 2002)
-// over the unit cube of the variables, half of whose first generation is near the published robot; or random points
-// of it. Each point is rounded to the workshop's steps and judged
-// once. A search is a function of its configuration: one that was stopped takes the designs that it judged from its
-// record and goes the same way again.
+// The search for designs that no other design beats in every objective: NSGA-II (nsga2.hpp) over the unit cube of the
+// variables, half of whose first generation is near the published robot; or random points of it. Each point is rounded
+// to the workshop's steps and judged once. A search is a function of its configuration: one that was stopped takes the
+// designs that it judged from its record and goes the same way again.
 #pragma once
 
 #include <functional>
@@ -69,7 +68,6 @@ class Search {
   double hypervolume() const;
 
  private:
-  struct Problem;
   std::vector<std::vector<double>> judge_all(const std::vector<std::vector<double>>& points);
   void judge_missing(const std::vector<Values>& missing);
   bool report(unsigned number, const std::function<bool(const Generation&)>& progress);
