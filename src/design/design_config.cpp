@@ -1,5 +1,6 @@
 #include "design/design_config.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -52,13 +53,18 @@ DesignConfig read_design_config(const std::filesystem::path& path, const std::ve
 
   for (const io::Table& t : root.tables("objective")) {
     t.accept({"figure"});
-    c.search.objectives.push_back(read_figure(t));
+    const Figure figure = read_figure(t);
+    if (std::ranges::count(c.search.objectives, figure) > 0)
+      t.fail("figure", "is an objective already", "each figure in one objective");
+    c.search.objectives.push_back(figure);
   }
   if (c.search.objectives.size() < 2) root.fail("objective", "there are too few", "two objectives or more");
   for (const io::Table& t : root.tables("limit")) {
     t.accept({"figure", "at_least", "at_most"});
     constexpr double kNone = std::numeric_limits<double>::infinity();
     Limit limit{read_figure(t), -kNone, kNone};
+    if (std::ranges::count(c.judge.limits, limit.figure, &Limit::figure) > 0)
+      t.fail("figure", "is limited already", "each figure in one limit, with at_least and at_most");
     if (t.has("at_least")) limit.at_least = t.number("at_least");
     if (t.has("at_most")) limit.at_most = t.number("at_most");
     if (limit.at_least == -kNone && limit.at_most == kNone) t.fail("", "limits nothing", "at_least or at_most");

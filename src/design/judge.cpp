@@ -89,15 +89,15 @@ Judge::Judge(JudgeConfig config) : config_(std::move(config)) {
     throw io::InputError(c.vehicle_file_name + ": does not lift itself; accepted: a robot that hovers");
 }
 
-bool Judge::allowed(Judged& j, Stage stage) const {
+bool Judge::allowed(Judged& j, Stage stage, bool past_limits) const {
   for (const Limit& l : config_.limits) {
     if (info_of(l.figure).stage != stage) continue;
     const double value = figure_of(j.figures, l.figure);
     if (value >= l.at_least && value <= l.at_most) continue;
     const bool low = !(value >= l.at_least);
-    j.refused = io::format("%s is %.4g, %s %.4g", info_of(l.figure).name, value, low ? "below" : "above",
-                           low ? l.at_least : l.at_most);
-    return false;
+    j.refused += io::format("%s%s is %.4g, %s %.4g", j.refused.empty() ? "" : "; ", info_of(l.figure).name, value,
+                            low ? "below" : "above", low ? l.at_least : l.at_most);
+    if (!past_limits) return false;
   }
   return true;
 }
@@ -158,7 +158,7 @@ void Judge::fly(const rollout::FlyConfig& config, std::size_t count, std::uint32
   }
 }
 
-Judged Judge::judge(const Values& values, Stage upto) const {
+Judged Judge::judged(const Values& values, Stage upto, bool past_limits) const {
   constexpr std::uint32_t first_flapper = rollout::kTrainingFlappers;
   Judged j{.robot = build(config_.space, values),
            .controller = config_.hover.fleet.controller,
@@ -169,27 +169,28 @@ Judged Judge::judge(const Values& values, Stage upto) const {
   if (!j.refused.empty()) return j;
   const WholeBody body = whole_body(j.robot.vehicle);
   figure_of(j.figures, Figure::mass) = body.mass_kg;
-  if (!allowed(j, Stage::built) || upto == Stage::built) return j;
+  if (!allowed(j, Stage::built, past_limits) || upto == Stage::built) return j;
 
   const rollout::FlyConfig& hover = config_.hover;
   const double gravity = hover.fleet.batch.world.gravity_m_s2;
   const Stand stand = measure(j.robot, config_.space.workshop, hover.fleet.batch.step_s, gravity, j.flown_s);
   put_stand(j.robot, stand, body.mass_kg * gravity, j.figures);
   j.reached = Stage::stand;
-  if (!stand.hovers) j.refused = "cannot hold its weight";
-  for (std::size_t a = 0; a < kAxes && j.refused.empty(); ++a)
+  std::string fault = stand.hovers ? "" : "cannot hold its weight";
+  for (std::size_t a = 0; a < kAxes && fault.empty(); ++a)
     if (!(stand.moment_per_input[a][a] * built_.moment_per_input[a][a] > 0))
-      j.refused = std::string(name_of(static_cast<Axis>(a))) + " answers its input the wrong way round";
-  if (!j.refused.empty() || !allowed(j, Stage::stand)) return j;
+      fault = std::string(name_of(static_cast<Axis>(a))) + " answers its input the wrong way round";
+  if (!fault.empty()) return j.refused = fault, j;
+  if (!allowed(j, Stage::stand, past_limits)) return j;
   j.controller = fitted(j.robot, stand);
   if (upto == Stage::stand) return j;
 
   j.reached = Stage::hover;
   fly(flights(hover, j.robot, j.controller), config_.hover_flights, first_flapper, Stage::hover, j);
-  if (!allowed(j, Stage::hover) || upto == Stage::hover) return j;
+  if (!allowed(j, Stage::hover, past_limits) || upto == Stage::hover) return j;
   j.reached = Stage::escape;
   fly(flights(config_.escape, j.robot, j.controller), config_.escape_flights, first_flapper, Stage::escape, j);
-  if (!allowed(j, Stage::escape) || upto == Stage::escape) return j;
+  if (!allowed(j, Stage::escape, past_limits) || upto == Stage::escape) return j;
 
   j.reached = Stage::effects;
   double successes = 0;
@@ -204,7 +205,7 @@ Judged Judge::judge(const Values& values, Stage upto) const {
     ++effects;
   }
   figure_of(j.figures, Figure::effects_success) = successes / static_cast<double>(effects);
-  allowed(j, Stage::effects);
+  allowed(j, Stage::effects, past_limits);
   return j;
 }
 

@@ -81,7 +81,9 @@ class Judge {
 
   const JudgeConfig& config() const { return config_; }
   /// Judges on one thread, up to a stage, or up to the first limit that is not met.
-  Judged judge(const Values& values, Stage upto) const;
+  Judged judge(const Values& values, Stage upto) const { return judged(values, upto, false); }
+  /// Judges the published robot up to a stage. Limits that it misses are in `refused`, and do not end it.
+  Judged judge_published(Stage upto) const { return judged(config_.space.built, upto, true); }
   /// The flights of a robot with a controller: `which` is the configuration's hover or escape.
   rollout::FlyConfig flights(const rollout::FlyConfig& which, const Robot& robot,
                              const flight::Controller& controller) const;
@@ -93,7 +95,8 @@ class Judge {
            Judged& into) const;
 
  private:
-  bool allowed(Judged& judged, Stage stage) const;
+  Judged judged(const Values& values, Stage upto, bool past_limits) const;
+  bool allowed(Judged& judged, Stage stage, bool past_limits) const;
 
   JudgeConfig config_;
   Stand built_;  ///< what the stand measures of the published robot

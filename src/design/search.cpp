@@ -100,7 +100,7 @@ Search::Search(const Judge& judge, SearchConfig config, const std::vector<Record
   for (const Figure f : config_.objectives) upto_ = std::max(upto_, info_of(f).stage);
   for (const Limit& l : judge_.config().limits) upto_ = std::max(upto_, info_of(l.figure).stage);
   for (const Record& r : known) known_.emplace(r.values, r);
-  published_ = record_of(judge_.judge(judge_.config().space.built, upto_));
+  published_ = record_of(judge_.judge_published(upto_));
 }
 
 std::vector<double> Search::objectives(const Record& r) const {
@@ -111,8 +111,9 @@ std::vector<double> Search::objectives(const Record& r) const {
       continue;
     }
     const double was = figure_of(published_.figures, figure), is = figure_of(r.figures, figure);
-    const double scale = is_share(figure) || was == 0 || !std::isfinite(was) ? 1 : std::abs(was);
-    const double worse = std::isfinite(was) ? (is - was) / scale : is;
+    const double scale = is_share(figure) || was == 0 ? 1 : std::abs(was);
+    // a power or a time that the published robot never has: any is better, a lower one more so
+    const double worse = std::isfinite(was) ? (is - was) / scale : -1 / (1 + is);
     const double change = info_of(figure).more_is_better ? -worse : worse;
     f.push_back(std::isfinite(change) ? std::min(change, kRefused / 2) : kRefused / 2);
   }

@@ -57,6 +57,7 @@ class Search {
 
   const SearchConfig& config() const { return config_; }
   Stage upto() const { return upto_; }  ///< the last stage that objectives and limits need
+  /// Its figures are known even where it misses limits; `refused` says which.
   const Record& published() const { return published_; }
   /// All designs, in the order in which they were asked for.
   std::vector<Record> records() const;

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "flappy/vehicle_file.hpp"
+#include "io/program.hpp"
 #include "io/progress.hpp"
 #include "io/text.hpp"
 #include "io/toml_writer.hpp"
@@ -150,13 +152,14 @@ std::vector<Record> choose(const Search& search, std::size_t count) {
 
 Verified verify(const Judge& judge, const Search& search, const DesignConfig& config, const Record& record,
                 const std::string& name) {
-  Verified v{.name = name,
-             .record = record,
-             .tuned = judge.judge(record.values, Stage::effects),
-             .fine = {},
-             .limited_by = limits_of(judge, record.values, record.figures),
-             .policy = {},
-             .sensitivity = sensitivity_of(judge, search, record.values)};
+  Verified v{
+      .name = name,
+      .record = record,
+      .tuned = name == kPublished ? judge.judge_published(Stage::effects) : judge.judge(record.values, Stage::effects),
+      .fine = {},
+      .limited_by = limits_of(judge, record.values, record.figures),
+      .policy = {},
+      .sensitivity = sensitivity_of(judge, search, record.values)};
   tune_gains(judge, config, v);
   Judged fine = v.tuned;
   fly_again(judge, config, v.tuned, judge.config().hover.fleet.batch.step_s);
@@ -171,10 +174,29 @@ std::vector<double> given_away(const Search& search) {
     for (std::size_t k = 0; k < f.size(); ++k) {
       bool free = true;
       for (std::size_t other = 0; other < f.size(); ++other) free = free && (other == k || f[other] <= 0);
-      if (free && f[k] < 0 && !(-f[k] <= most[k])) most[k] = -f[k];
+      const double share =
+          std::isfinite(figure_of(search.published().figures, search.config().objectives[k])) ? -f[k] : 1;
+      if (free && f[k] < 0 && !(share <= most[k])) most[k] = share;
     }
   }
   return most;
+}
+
+std::string why(const Record& record) {
+  const std::size_t is = record.refused.find(" is "), bound = record.refused.find(", ");
+  const std::string figure = record.refused.substr(0, is);
+  if (is != std::string::npos && bound != std::string::npos && figure_named(figure))
+    return figure + record.refused.substr(bound + 1);
+  return record.reached == Stage::built ? "cannot be built" : record.refused;
+}
+
+std::vector<std::pair<std::string, std::size_t>> refusals(const std::vector<Record>& records) {
+  std::map<std::string, std::size_t> counts;
+  for (const Record& r : records)
+    if (!r.refused.empty()) ++counts[why(r)];
+  std::vector<std::pair<std::string, std::size_t>> list(counts.begin(), counts.end());
+  std::ranges::stable_sort(list, std::ranges::greater(), &std::pair<std::string, std::size_t>::second);
+  return list;
 }
 
 void write_records(const std::filesystem::path& folder, const Search& search, const std::vector<Generation>& history) {
@@ -195,7 +217,7 @@ void write_records(const std::filesystem::path& folder, const Search& search, co
 void write_design(const std::filesystem::path& folder, const Judge& judge, const Verified& design) {
   io::make_folder(folder);
   model::Vehicle vehicle = design.tuned.robot.vehicle;
-  if (design.name != "00") vehicle.name += "_" + design.name;
+  if (design.name != kPublished) vehicle.name += "_" + design.name;
   io::write_atomically(folder / "vehicle.toml", model::vehicle_text(vehicle));
   io::write_atomically(folder / "controller.toml",
                        rollout::controller_text(design.tuned.controller, "Gains of design " + design.name + "."));
@@ -215,6 +237,7 @@ void write_results(const std::filesystem::path& folder, const Judge& judge, cons
   const Space& space = judge.config().space;
   Json json;
   json["schema"] = 1;
+  json["commit"] = io::commit();
   for (const Figure f : search.config().objectives)
     json["objectives"].push_back({{"figure", info_of(f).name},
                                   {"words", info_of(f).words},

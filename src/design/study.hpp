@@ -17,9 +17,11 @@ struct Policy {
   double success = std::numeric_limits<double>::quiet_NaN(), low = success, high = success;
 };
 
+inline constexpr const char* kPublished = "00";  ///< the published robot's name among the chosen designs
+
 /// A chosen design, verified.
 struct Verified {
-  std::string name;                        ///< "00" is the published robot
+  std::string name;
   Record record;                           ///< as the search has it
   Judged tuned;                            ///< with tuned gains, on other vehicles, with the configuration's step
   Figures fine;                            ///< the same flights with VerifyConfig::step_s
@@ -37,8 +39,12 @@ std::vector<Record> choose(const Search& search, std::size_t count);
 Verified verify(const Judge& judge, const Search& search, const DesignConfig& config, const Record& record,
                 const std::string& name);
 
-/// Largest improvement of each objective on the front that costs no other objective; NaN: there is none.
+/// Largest improvement of each objective on the front that costs no other objective; NaN: there is none; 1 where the
+/// published robot has no finite value.
 std::vector<double> given_away(const Search& search);
+
+/// Why designs were refused, such as "stroke_rad above 1.5", and how many; the most frequent first.
+std::vector<std::pair<std::string, std::size_t>> refusals(const std::vector<Record>& records);
 
 void write_records(const std::filesystem::path& folder, const Search& search, const std::vector<Generation>& history);
 void write_design(const std::filesystem::path& folder, const Judge& judge, const Verified& design);

@@ -111,6 +111,60 @@ TEST(Search, RandomPointsAreOthers) {
   EXPECT_EQ(random.search.records().size(), 8U);
 }
 
+TEST(Search, CountsWhatRefusedWhereNothingIsLeft) {
+  const Small none({R"(limit=[{figure="mass_kg",at_most=0.001}])", "search.generations=1"});
+  ASSERT_TRUE(none.done);
+  EXPECT_TRUE(none.search.front().empty());
+  const std::vector<Record> all = none.search.records();
+  const auto counts = refusals(all);
+  ASSERT_FALSE(counts.empty());
+  EXPECT_EQ(counts[0].first, "mass_kg above 0.001");
+  std::size_t sum = 0;
+  for (const auto& [why, count] : counts) sum += count;
+  EXPECT_EQ(sum, all.size());
+  for (const double share : given_away(none.search)) EXPECT_TRUE(std::isnan(share));
+}
+
+TEST(Search, JudgesThePublishedRobotPastLimitsThatItMisses) {
+  const Small strict(
+      {R"(limit=[{figure="stroke_rad",at_most=1.0},{figure="mass_kg",at_most=0.001}])", "search.generations=1"});
+  const Record &published = strict.search.published(), &as_shipped = searched().search.published();
+  EXPECT_TRUE(published.refused.starts_with("mass_kg is 0.0")) << published.refused;
+  EXPECT_NE(published.refused.find(", above 0.001; stroke_rad is 1."), std::string::npos) << published.refused;
+  EXPECT_EQ(as_shipped.refused, "");
+  for (const Figure f : strict.search.config().objectives)
+    EXPECT_EQ(figure_of(published.figures, f), figure_of(as_shipped.figures, f)) << info_of(f).name;
+}
+
+TEST(Search, PrefersAnyTimeToNoneOfThePublishedRobot) {
+  DesignConfig c = small_config();
+  c.judge.limits.clear();
+  c.judge.escape.fleet.task.constants.success.by_s = 0.01;  // nobody is there so soon
+  const Judge judge(c.judge);
+  const Search search(judge, c.search);
+  Record r = search.published();
+  ASSERT_EQ(figure_of(r.figures, Figure::escape_time), std::numeric_limits<double>::infinity());
+  const auto objective = [&](double time_s) {
+    figure_of(r.figures, Figure::escape_time) = time_s;
+    return search.objectives(r)[2];
+  };
+  EXPECT_EQ(objective(std::numeric_limits<double>::infinity()), 0);
+  EXPECT_LT(objective(0.5), 0);
+  EXPECT_LT(objective(0.3), objective(0.5));
+}
+
+TEST(Config, RefusesAFigureTwice) {
+  const std::string twice = test::refusal(
+      [] { small_config({R"(objective=[{figure="mass_kg"},{figure="stroke_rad"},{figure="mass_kg"}])"}); });
+  EXPECT_NE(twice.find("figure: is an objective already; accepted: each figure in one objective"), std::string::npos)
+      << twice;
+  const std::string limited = test::refusal(
+      [] { small_config({R"(limit=[{figure="mass_kg",at_least=0.01},{figure="mass_kg",at_most=0.001}])"}); });
+  EXPECT_NE(limited.find("figure: is limited already; accepted: each figure in one limit, with at_least and at_most"),
+            std::string::npos)
+      << limited;
+}
+
 TEST(Records, ReadBackAsTheyWere) {
   const io::TemporaryFolder folder;
   const auto file = folder.path() / "designs.csv";

@@ -34,6 +34,29 @@ foreach(name IN ITEMS hover escape)
   expect_equal("flappy-fly of the published robot's ${name}.toml (${err})" "${code}" 0)
 endforeach()
 
+# ---- limits that nothing meets; the published robot misses them, too
+
+set(none ${config} --out ${WORK}/none ${small} --set "limit=[{figure=\"mass_kg\",at_most=0.001}]")
+run(${none} --json ${WORK}/none.json)
+expect_equal("exit code of limits that nothing meets (${err})" "${code}" 1)
+expect_match("stdout" "${out}" "\nno design met the limits; of ([0-9]+) designs were refused:\n  [0-9]+: mass_kg above 0.001\n")
+expect_match("stdout" "${out}" "\n${WORK}/none/designs.csv has the figures of each\nthe published robot misses limits: mass_kg is 0.01[0-9]+, above 0.001\n$")
+foreach(text IN ITEMS "${out}" "${err}")
+  if("${text}" MATCHES "nan")
+    message(SEND_ERROR "a figure that is no number:\n${text}")
+  endif()
+endforeach()
+expect_keys(${WORK}/none.json front=NUMBER given_away.0=NULL refused.0.why=STRING refused.0.designs=NUMBER published_misses=STRING)
+run(${none})
+expect_equal("exit code of the same command again (${err})" "${code}" 1)
+
+# ---- what another version judged is not mixed in
+
+file(READ ${WORK}/none/config.toml kept)
+string(REGEX REPLACE "(# judged by flappy at commit )[^\n]+\n$" "\\1abcdef012345\n" kept "${kept}")
+file(WRITE ${WORK}/none/config.toml "${kept}")
+expect_refused("${WORK}/none/config.toml: its designs were judged by flappy at commit abcdef012345; accepted: a new folder, or that version" ${none})
+
 # ---- refusals
 
 expect_refused("${WORK}/out/config.toml: is another configuration; accepted: a new folder, or the same configuration" ${config} --out ${WORK}/out)
