@@ -38,6 +38,15 @@ const Family& family_named(const std::string& name) {
   throw io::InputError("--family " + name + ": no such family; accepted: a, b or c");
 }
 
+void check_engine(const std::filesystem::path& folder, const std::string& family, const std::string& engine) {
+  if (engine.empty()) return;
+  const std::string own = family_named(family).engine();
+  if (engine != own)
+    throw io::InputError((folder / "manifest.json").string() + ": its robots are of " + engine +
+                         ", and fly otherwise with " + (own.empty() ? "family " + family + " here" : own) +
+                         "; accepted: a build with " + engine);
+}
+
 bool in_catalogue(const blind::FamilyEffect& effect) { return !effect.id.starts_with("outside_"); }
 
 std::uint64_t seed_of_draw(std::uint64_t seed, std::uint64_t draw) { return seed * blind::kTries + draw; }

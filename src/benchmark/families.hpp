@@ -15,6 +15,9 @@ inline constexpr const char* kFamilies[] = {"a", "b", "c"};
 /// InputError if there is no such family, or if this build lacks it.
 const blind::Family& family_named(const std::string& name);
 
+/// InputError if the robots of a benchmark are of another engine, or version of it, than those that this build flies.
+void check_engine(const std::filesystem::path& folder, const std::string& family, const std::string& engine);
+
 /// Whether the catalogue has an effect with this cause.
 bool in_catalogue(const blind::FamilyEffect& effect);
 

@@ -130,6 +130,7 @@ class Maker {
                declared_.vehicle_sha256,
                {},
                io::commit(),
+               family_.engine(),
                {}};
     Json cases = Json::array(), never = Json::array(), undetectable = Json::array();
     std::size_t lost = 0;

@@ -65,6 +65,7 @@ Json to_json(const Manifest& m) {
           {"vehicle_sha256", m.vehicle_sha256},
           {"labels_sha256", m.labels_sha256},
           {"commit", m.commit},
+          {"engine", m.engine},
           {"cases", cases}};
 }
 
@@ -82,6 +83,7 @@ Manifest read_manifest(const std::filesystem::path& folder) {
                json.at("vehicle_sha256"),
                json.at("labels_sha256"),
                json.at("commit"),
+               json.value("engine", ""),
                {}};
     for (const Json& c : json.at("cases"))
       m.cases.push_back({c.at("number"), c.at("withheld"), c.at("files").get<std::map<std::string, std::string>>()});

@@ -34,6 +34,7 @@ struct PublicCase {
 
 struct Manifest {
   std::string family, set, vehicle, vehicle_sha256, labels_sha256, commit;
+  std::string engine;  ///< blind::Family::engine() of the maker; empty: none, or not recorded
   std::vector<PublicCase> cases;
 };
 Json to_json(const Manifest& manifest);

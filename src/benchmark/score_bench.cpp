@@ -115,6 +115,7 @@ class Predictions {
 struct Bench {
   Bench(const ScoreCommand& command, const fs::path& at)
       : folder(at), manifest(read_manifest(at)), predictions(command, folder, manifest) {
+    check_engine(folder, manifest.family, manifest.engine);
     if (io::writes(command.ranks)) lock.emplace(folder);
   }
   Bench(const Bench&) = delete;

@@ -110,6 +110,8 @@ class Family {
  public:
   virtual ~Family() = default;
   virtual std::string name() const = 0;
+  /// An engine whose version is part of its robots, as "MuJoCo 2.2.2"; empty: none.
+  virtual std::string engine() const { return ""; }
   virtual const std::vector<FamilyEffect>& effects() const = 0;
   static constexpr std::size_t kFlights = 3;
   static constexpr double kFlight_s = 10;

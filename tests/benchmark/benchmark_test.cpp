@@ -581,6 +581,10 @@ TEST_F(Benchmark, RefusesWhatThereIsNot) {
 #else
   EXPECT_EQ(family_named("b").name(), "b");
 #endif
+  EXPECT_EQ(test::refusal([] { check_engine("bench", "a", ""); }), "accepted");
+  EXPECT_EQ(test::refusal([] { check_engine("bench", "a", "MuJoCo 3.17.0"); }),
+            "bench/manifest.json: its robots are of MuJoCo 3.17.0, and fly otherwise with family a here; accepted: a "
+            "build with MuJoCo 3.17.0");
   blind::Assignment a;
   a.vehicle_file = kConfigs + "vehicles/hummingbird_nominal.toml";
   a.effects = {{"wnd", 1}};

@@ -39,6 +39,7 @@ constexpr std::string_view kParts[] = {"singles", "typical",         "withheld",
 /// A scored benchmark. The constructor checks the hashes of its predictions and opens the labels.
 struct Scored {
   explicit Scored(const fs::path& at) : folder(at), manifest(benchmark::read_manifest(at)) {
+    benchmark::check_engine(folder, manifest.family, manifest.engine);
     benchmark::check_predictions(folder, manifest);
     if (io::sha256(io::read_text(manifest.vehicle)) != manifest.vehicle_sha256)
       throw io::InputError(manifest.vehicle + ": has changed since " + at.string() +

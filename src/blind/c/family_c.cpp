@@ -4,6 +4,7 @@
 #include "blind/c/effects.hpp"
 #include "blind/c/escape.hpp"
 #include "blind/c/flight.hpp"
+#include "blind/c/mechanism.hpp"
 
 namespace flappy::blind::c {
 namespace {
@@ -11,6 +12,7 @@ namespace {
 class FamilyC final : public Family {
  public:
   std::string name() const override { return "c"; }
+  std::string engine() const override { return std::string("MuJoCo ") + mj_versionString(); }
   const std::vector<FamilyEffect>& effects() const override { return effect_table(); }
   FamilyFlight fly(const Assignment& a, std::size_t flight) const override {
     if (!a.proposed) return fly_one(a, flight).flight;

@@ -12,12 +12,20 @@ namespace {
 mjModel* compiled(const std::string& text) {
   static std::mutex one_at_a_time;  // MuJoCo's parser keeps global state
   const std::lock_guard<std::mutex> lock(one_at_a_time);
+  if (mj_version() != mjVERSION_HEADER)
+    throw std::runtime_error(std::string("family C: MuJoCo's library is ") + mj_versionString() +
+                             ", its headers are of another version");
   const auto files = std::make_unique<mjVFS>();
   mj_defaultVFS(files.get());
   const char* name = "flapper.xml";
+#if mjVERSION_HEADER < 300
   if (mj_makeEmptyFileVFS(files.get(), name, static_cast<int>(text.size())) != 0)
     throw std::runtime_error("family C: no room for a model");
   std::memcpy(files->filedata[mj_findFileVFS(files.get(), name)], text.data(), text.size());
+#else
+  if (mj_addBufferVFS(files.get(), name, text.data(), static_cast<int>(text.size())) != 0)
+    throw std::runtime_error("family C: no room for a model");
+#endif
   char error[1000] = "";
   mjModel* model = mj_loadXML(name, files.get(), error, sizeof error);
   mj_deleteVFS(files.get());
@@ -118,7 +126,7 @@ void Mechanism::step(const std::array<double, 2>& motor_Nm, const std::array<dou
   mjData* d = data_.get();
   mj_step1(m, d);
   if (added_mass_ > 0) add_virtual_mass();
-  mju_zero(d->qfrc_applied, m->nv);
+  mju_zero(d->qfrc_applied, static_cast<int>(m->nv));
   for (std::size_t side = 0; side < 2; ++side) {
     d->qfrc_applied[drive_v_[side]] += motor_Nm[side];
     d->qfrc_applied[stroke_v_[side]] += spring_Nm[side];
@@ -136,7 +144,7 @@ void Mechanism::step(const std::array<double, 2>& motor_Nm, const std::array<dou
 void Mechanism::add_virtual_mass() {
   mjModel* m = model_.get();
   mjData* d = data_.get();
-  const int nv = m->nv;
+  const int nv = static_cast<int>(m->nv);
   Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, 32> along(3, nv), about(3, nv);
   for (const auto& wing : strips_)
     for (const std::ptrdiff_t geom : wing) {
@@ -147,14 +155,17 @@ void Mechanism::add_virtual_mass() {
       const Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, 32> v = R.transpose() * along,
                                                                              w = R.transpose() * about;
       const Eigen::Vector3d mass = scale * vector_of(fluid + 6), moment = scale * vector_of(fluid + 9);
-      for (int i = 0; i < nv; ++i) {
-        int at = m->dof_Madr[i];
-        for (int j = i; j >= 0; j = m->dof_parentid[j]) {
-          double sum = 0;
-          for (int k = 0; k < 3; ++k) sum += mass[k] * v(k, i) * v(k, j) + moment[k] * w(k, i) * w(k, j);
-          d->qM[at++] += sum;
-        }
-      }
+      const auto add = [&](int i, int j, mjtNum& to) {
+        double sum = 0;
+        for (int k = 0; k < 3; ++k) sum += mass[k] * v(k, i) * v(k, j) + moment[k] * w(k, i) * w(k, j);
+        to += sum;
+      };
+      for (int i = 0; i < nv; ++i)
+#if mjVERSION_HEADER < 300  // a row of M from its diagonal on, by parents
+        for (int j = i, at = m->dof_Madr[i]; j >= 0; j = m->dof_parentid[j]) add(i, j, d->qM[at++]);
+#else  // its columns as listed
+        for (int at = m->M_rowadr[i]; at < m->M_rowadr[i] + m->M_rownnz[i]; ++at) add(i, m->M_colind[at], d->M[at]);
+#endif
     }
   mj_factorM(m, d);
 }
@@ -163,9 +174,12 @@ void Mechanism::add_virtual_mass() {
 void Mechanism::hold_torso(const Motion& held) {
   mjModel* m = model_.get();
   mjData* d = data_.get();
-  const int nv = m->nv, rest = nv - 6;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, 32, 32> M(nv, nv);
-  mj_fullM(m, M.data(), d->qM);
+  const int nv = static_cast<int>(m->nv), rest = nv - 6;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 32, 32> M(nv, nv);
+  for (int k = 0; k < nv; ++k) {  // by columns, as each version keeps M in another form
+    const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 32, 1> unit = Eigen::VectorXd::Unit(nv, k);
+    mj_mulM(m, d, M.col(k).data(), unit.data());
+  }
   Eigen::Matrix<double, 6, 1> change;
   change.head<3>() = held.acceleration_W - vector_of(d->qacc);
   change.tail<3>() = held.turning_B - vector_of(d->qacc + 3);

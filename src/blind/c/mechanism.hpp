@@ -2,7 +2,8 @@
 // fluid model [1], at nodes and with areas of the Gauss quadrature for the planform's moments r00, r11, r22, r33: force
 // and moment about the shoulder are the whole planform's where of second degree in the radius. Chord: of an ellipse of
 // the wing's length and area, its middle 0.55 mean chords behind the leading edge. MuJoCo omits the force of the
-// virtual mass under acceleration [1]; only the effect added_mass adds it.
+// virtual mass under acceleration [1]; only the effect added_mass adds it. Up to 3.13 MuJoCo's lift has a floor of 1e-15 in
+// a denominator, which takes lift from these wings below 0.8 m/s: other versions have other robots (Family::engine).
 // [1] MuJoCo documentation, Computation, Fluid forces: ellipsoid model; after Andersen, Pesavento, Wang, J. Fluid Mech.
 // 541 (2005).
 #pragma once
