@@ -19,6 +19,7 @@ import statistics
 import subprocess
 import sys
 import time
+import tomllib
 
 SHARES = (0.5, 0.8, 0.9, 0.95)
 FLIGHTS, UNSEEN = 500, 1_000_000
@@ -101,7 +102,7 @@ def by_sb3(library, algorithm, env_id, variant, seed):
     return clock, module.__version__
 
 
-def by_rltools(algorithm, env_id, variant, seed):
+def by_rltools(algorithm, env_id, config, variant, seed):
     import importlib.metadata
 
     import gymnasium
@@ -112,7 +113,27 @@ def by_rltools(algorithm, env_id, variant, seed):
     if variant == "recipe":
         options |= {"GAMMA": 0.98, "ACTOR_BATCH_SIZE": 128, "CRITIC_BATCH_SIZE": 128, "ACTOR_HIDDEN_DIM": 32, "CRITIC_HIDDEN_DIM": 128, "ACTOR_POLYAK": 0.98, "CRITIC_POLYAK": 0.98}
         options |= {"TARGET_NEXT_ACTION_NOISE_STD": 0.1, "TARGET_NEXT_ACTION_NOISE_CLIP": 0.3} if algorithm == "TD3" else {}
-    state = getattr(rltools, algorithm)(lambda: gymnasium.wrappers.TimeLimit(gymnasium.make(f"flappy:{env_id}"), 400), **options).State(seed)
+    # RLtools reads no `truncated` of an environment, only a number of steps: the task's own
+    task = tomllib.loads((ROOT / f"configs/tasks/{config}.toml").read_text())
+
+    class OwnEnd(gymnasium.Wrapper):
+        over = False
+
+        def reset(self, **given):
+            self.over = False
+            return super().reset(**given)
+
+        def step(self, action):
+            assert not self.over, "a step past the end of an episode"
+            result = super().step(action)
+            self.over = result[2] or result[3]
+            return result
+
+    def env():
+        made = OwnEnd(gymnasium.make(f"flappy:{env_id}"))
+        return gymnasium.wrappers.TimeLimit(made, round(task["end"]["time_s"] / made.unwrapped.step_s))
+
+    state = getattr(rltools, algorithm)(env, **options).State(seed)
     clock, steps = Clock(), 0
     while True:
         for _ in range(200):
@@ -168,7 +189,7 @@ def cell(name, task, variant, seed):
         if name == "rltools-loop":
             clock, version = by_rltools_loop(seed)
         elif library == "rltools":
-            clock, version = by_rltools(algorithm.upper(), env_id, variant, seed)
+            clock, version = by_rltools(algorithm.upper(), env_id, config, variant, seed)
         else:
             clock, version = by_sb3({"sb3": "stable_baselines3"}.get(library, library), algorithm.upper(), env_id, variant, seed)
         to = {str(s): next((row["wall_s"] for row in clock.rows if row["success"] >= s), None) for s in SHARES}
