@@ -28,7 +28,6 @@ constexpr double kMaxDistance = 2;
 /// A change follows a function of the place if its square along it is at least this share of the largest.
 constexpr double kFollows = 0.1;
 constexpr int kMaxEffectSteps = 2;
-constexpr int kMaxEffectRefits = 6;
 
 /// Directions of a fit with a column.
 std::vector<Index> seen_directions(const Fit& fit) {
@@ -497,10 +496,6 @@ Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int max_itera
   Fit result = before;
   result.statistics = evidence_->statistics(before.residual);
   return improve(hypothesis, std::move(result), max_iterations, nullptr, false);
-}
-
-Fit Fitter::refit_effects(const Hypothesis& hypothesis, const Fit& before) const {
-  return improve(hypothesis, before, kMaxEffectRefits, &before, true);
 }
 
 /// Gauss-Newton. Columns are kept while steps stay close; the last point gets its own. `columns_are_here`: `fit` has

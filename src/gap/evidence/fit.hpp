@@ -126,10 +126,8 @@ class Fitter {
                 int max_iterations) const;
   /// Fits the effects alone, so that all effects are compared with the same columns of the parameters.
   Fit fit_effects(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters) const;
-  /// This and the next continue another fit, along its directions.
+  /// Continues another fit, along its directions.
   Fit refit(const Hypothesis& hypothesis, const Fit& before, int max_iterations) const;
-  /// Finds new columns of the effects at each point; keeps those of the parameters.
-  Fit refit_effects(const Hypothesis& hypothesis, const Fit& before) const;
   /// A linear fit without a residual, around the magnitudes of the vehicle file. `effects`: columns of the unknowns of
   /// the effects; an unknown with an empty column is not fitted.
   Fit fit_linear(const Hypothesis& hypothesis, const Fit& parameters,
