@@ -42,8 +42,7 @@ Kind recognised_folder(const fs::path& path) {
 Kind recognised_json(const fs::path& path) {
   const Json json = read_results(path);
   const auto has = [&](const char* key) { return json.is_object() && json.contains(key); };
-  if (has("verdict") && (has("hypotheses") || has("candidates")) && has("where"))
-    return Kind::diagnosis;  // "candidates" is the key in schema 1
+  if (has("verdict") && has("hypotheses") && has("locations")) return Kind::diagnosis;
   if (has("effects") && has("choices")) return Kind::plan;
   if (has("policy") && has("success_rate")) return Kind::evaluation;
   if (has("parameters") && has("total_error_after")) return Kind::identification;

@@ -57,7 +57,7 @@ def diagnoses(tools, project, work, golden, write):
         vehicle = project / "configs/vehicles/hummingbird_nominal.toml"
         run(work, tools / "flappy-gap", "diagnose", "--vehicle", vehicle, "--flights", *flights, *withheld, "--out", number)
         diagnosis, file = json.loads((work / number / "diagnosis.json").read_text()), golden / f"{number}.json"
-        del diagnosis["locations"]  # a thousand, of which "where" has the most telling
+        del diagnosis["locations"]  # a thousand
         if write:
             file.write_text(json.dumps(diagnosis, indent=1) + "\n")
         else:

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "flappy/vehicle_file.hpp"
-#include "gap/diagnose/diagnosis_files.hpp"
 #include "gap/diagnose/summary.hpp"
 #include "gap/result/diagnosis_json.hpp"
 #include "io/files.hpp"
@@ -48,7 +47,7 @@ void look_ahead(const DiagnosisRequest& request, Diagnosed& d) {
   propose_experiment(request, d);
 }
 
-constexpr std::array kWritten = {kDiagnosisFile, kVehicleFile, kResidualsFile, kHypothesesFile};
+constexpr std::array kWritten = {kDiagnosisFile, kVehicleFile};
 
 /// Removes the files of an earlier diagnosis first.
 void write_files(const std::filesystem::path& out, const Diagnosed& d) {
@@ -91,8 +90,7 @@ nlohmann::ordered_json run_diagnose(const DiagnoseCommand& command) {
                                                   : "stopped before every effect was weighed");
   if (!out.empty()) {
     std::string written = kDiagnosisFile;
-    for (const char* name : {kVehicleFile, kResidualsFile, kHypothesesFile})
-      if (std::filesystem::exists(out / name)) written += std::string(", ") + name;
+    if (d.corrected) written += std::string(", ") + kVehicleFile;
     print("written to " + command.out + ": " + written);
     print(io::shown_by(command.out));
   }

@@ -8,7 +8,6 @@
 
 #include "flappy/vehicle_file.hpp"
 #include "flightlog/ros/flight_mcap.hpp"
-#include "gap/diagnose/diagnosis_files.hpp"
 #include "gap/replay/reset_prediction.hpp"
 #include "gap/replay/residuals.hpp"
 #include "gap/result/diagnosis_json.hpp"

@@ -11,8 +11,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Most rows of "where", the largest discoveries.
-constexpr std::size_t kMaxWhere = 20;
 constexpr const char* kThirds[] = {"all", "low", "middle", "high"};
 
 Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
@@ -245,15 +243,14 @@ Diagnosis read(const Json& json) {
 }  // namespace
 
 Json to_json(const Diagnosis& d) {
-  Json faults = Json::array(), hypotheses = Json::array(), terms = Json::array(), where = Json::array(),
-       locations = Json::array(), closed_loop = Json::array(), moved = Json::object(), suspects = Json::array();
+  Json faults = Json::array(), hypotheses = Json::array(), terms = Json::array(), locations = Json::array(),
+       closed_loop = Json::array(), moved = Json::object(), suspects = Json::array();
   for (const flightlog::DataFault& f : d.faults)
     faults.push_back({{"file", f.file}, {"line", f.line}, {"what", f.what}});
   for (const RankedHypothesis& h : d.hypotheses) hypotheses.push_back(to_json(h));
   for (const Suspect& s : d.suspects)
     suspects.push_back({{"effect", s.effect}, {"probability", s.probability}, {"closure", to_json(s.closure)}});
   for (const UnexplainedTerm& t : d.unexplained) terms.push_back(to_json(t));
-  for (const ResidualLocation& l : largest_discoveries(d, Stage::refit, kMaxWhere)) where.push_back(to_json(l));
   for (const ResidualLocation& l : d.locations) locations.push_back(to_json(l));
   for (const auto& [name, sd] : d.moved_parameters) moved[name] = sd;
   for (const ClosedLoop& c : d.closed_loop)
@@ -282,7 +279,6 @@ Json to_json(const Diagnosis& d) {
                {"background", to_json(d.background)},
                {"sensors", to_json(d.sensors)},
                {"moved_parameters", moved},
-               {"where", where},
                {"gap",
                 {{"nominal", optional(d.nominal_loss)},
                  {"refit", optional(d.refit_loss)},
@@ -300,6 +296,10 @@ Json to_json(const Diagnosis& d) {
   return json;
 }
 
+void write_diagnosis(const std::filesystem::path& folder, const Diagnosis& diagnosis) {
+  io::write_atomically(folder / kDiagnosisFile, to_json(diagnosis).dump(1) + "\n");
+}
+
 Diagnosis diagnosis_from(const Json& json, const std::filesystem::path& file) {
   try {
     if (const Json& schema = json.at("schema"); schema != kDiagnosisSchema)
@@ -308,7 +308,7 @@ Diagnosis diagnosis_from(const Json& json, const std::filesystem::path& file) {
                            std::to_string(kDiagnosisSchema) + ", as flappy-gap diagnose writes it");
     return read(json);
   } catch (const Json::exception& e) {
-    // "[json.exception.out_of_range.403] key 'where' not found"
+    // "[json.exception.out_of_range.403] key 'verdict' not found"
     const std::string what = e.what();
     const std::size_t bracket = what.find("] ");
     throw io::InputError(file.string() + ": " + (bracket == std::string::npos ? what : what.substr(bracket + 2)) +

@@ -9,8 +9,11 @@
 namespace flappy::gap {
 
 inline constexpr int kDiagnosisSchema = 2;
+/// Files of a diagnosis in its folder.
+inline constexpr const char *kDiagnosisFile = "diagnosis.json", *kVehicleFile = "vehicle_corrected.toml";
 
 nlohmann::ordered_json to_json(const Diagnosis& diagnosis);
+void write_diagnosis(const std::filesystem::path& folder, const Diagnosis& diagnosis);
 
 /// `file`: named in errors. io::InputError if `json` is not a diagnosis, or has another schema.
 Diagnosis diagnosis_from(const nlohmann::ordered_json& json, const std::filesystem::path& file);

@@ -9,7 +9,7 @@
 #include "flappy/vehicle_file.hpp"
 #include "flightlog/ros/bag.hpp"
 #include "flightlog/ros/cdr.hpp"
-#include "gap/diagnose/diagnosis_files.hpp"
+#include "gap/result/diagnosis_json.hpp"
 #include "io/files.hpp"
 #include "refusal.hpp"
 #include "rollout/fly.hpp"

@@ -146,8 +146,6 @@ TEST(Diagnosis, ListsTheLargestDiscoveries) {
   EXPECT_EQ(largest[19].gap, 9);
   EXPECT_EQ(largest_discoveries(d, Stage::refit, 100).size(), 26u) << "inputs do not say where";
   EXPECT_TRUE(largest_discoveries(d, Stage::nominal, 5).empty());
-  EXPECT_EQ(to_json(d)["where"].size(), 20u);
-  EXPECT_EQ(to_json(d)["where"][0]["gap"], 28);
 }
 
 }  // namespace
