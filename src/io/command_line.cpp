@@ -88,10 +88,6 @@ Option Command::flag(const std::string& name, bool& value, const std::string& he
 Command Command::command(const std::string& name, const std::string& help) const {
   return Command(app_->add_subcommand(name, help));
 }
-void Command::renamed_flag(const std::string& name, const std::string& now) const {
-  app_->add_flag_callback(name, [=] { throw InputError(name + ": has another name now; accepted: " + now); })
-      ->group("");
-}
 void Command::expect_commands(std::size_t least, std::size_t most) const { app_->require_subcommand(least, most); }
 bool Command::given() const { return app_->parsed(); }
 

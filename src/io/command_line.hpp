@@ -46,8 +46,6 @@ class Command {
   template <class T>
   Option option(const std::string& name, T& value, const std::string& help) const;
   Option flag(const std::string& name, bool& value, const std::string& help) const;  ///< "!--name" sets false
-  /// Accepts the old name of a flag, hidden from --help, and throws InputError with its new name.
-  void renamed_flag(const std::string& name, const std::string& now) const;
   Command command(const std::string& name, const std::string& help) const;
   void expect_commands(std::size_t least, std::size_t most) const;
 

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "io/installation.hpp"
-#include "io/renamed_keys.hpp"
 #include "io/schema.hpp"
 #include "io/toml.hpp"
 #include "io/toml_writer.hpp"
@@ -106,8 +105,6 @@ std::string kind(const toml::node& node) {
   const std::string where = place(key.source(), section.document->name);
   const std::string path = toml_path(section.path, key.str());
   const std::vector<std::string> names(known.begin(), known.end());
-  if (const char* now = new_name(key.str()))
-    refuse(where, path, "unknown key: it was renamed; accepted here: " + toml_string(now), "");
   const std::string same = in_another_unit(key.str(), names);
   if (!same.empty()) refuse(where, path, "unknown key; accepted here with another unit: " + toml_string(same), "");
   refuse(where, path, "unknown key", (names.empty() ? "no key here" : joined(names)) + did_you_mean(key.str(), names));
@@ -120,9 +117,6 @@ std::string kind(const toml::node& node) {
   for (const auto& [key, node] : *section.table) {
     if (!section.asked.contains(key.str())) unasked.emplace_back(key.str());
   }
-  for (const std::string& key : unasked)
-    if (const char* now = new_name(key); now && now == name)
-      refuse_unknown(section, section.table->find(key)->first, section.asked);
   const std::string same = in_another_unit(name, unasked);
   if (!same.empty()) refuse_unknown(section, section.table->find(same)->first, section.asked);
   const std::string typo = nearest_name(name, unasked);

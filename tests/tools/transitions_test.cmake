@@ -43,7 +43,6 @@ expect_refused("${WORK}/none/t.csv: cannot be written: No such file or directory
   transitions ${WORK}/gone --csv ${WORK}/none/t.csv)
 expect_refused("${WORK}/flights/../flights/0000/: is given twice; accepted: each flight once"
   transitions ${flights} ${WORK}/flights/../flights/0000/)
-expect_refused("--accept-surprise: has another name now; accepted: --accept-innovation" transitions ${WORK}/flights/0000 --accept-surprise)
 foreach(flight IN LISTS flights)  # or beside them
   file(RENAME ${flight}/hummingbird_identified.toml ${WORK}/flights/hummingbird_identified.toml)
 endforeach()

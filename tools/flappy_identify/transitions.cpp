@@ -136,7 +136,6 @@ Command add_transitions(const io::Command& program) {
   sub.option("--csv", request->csv, "write the distributions of all errors to this file");
   sub.flag("--accept-innovation", request->options.accept_innovation,
            "also flights whose motion capture and IMU disagree by more than 5 times their declared noise");
-  sub.renamed_flag("--accept-surprise", "--accept-innovation");
   sub.flag("--truth", request->truth,
            "states and wings from truth.csv of simulated flights: the floor without sensors");
   return {sub, [request] {
