@@ -179,10 +179,13 @@ Label label_from(const Json& json) {
 }
 
 Json to_json(const Prediction& p) {
-  Json baselines = Json::object();
-  for (const auto& [name, b] : p.baselines) baselines[name] = {{"named", b.named}, {"ranking", b.ranking}};
-  return {{"diagnosis", to_json(p.diagnosis)}, {"baselines", baselines},           {"features", p.features},
-          {"corrected", p.corrected},          {"with_residual", p.with_residual}, {"crashed", p.crashed}};
+  const Json best_rmse =
+      p.best_rmse ? Json{{"named", p.best_rmse->named}, {"ranking", p.best_rmse->ranking}} : Json(nullptr);
+  return {{"diagnosis", to_json(p.diagnosis)},
+          {"best_rmse", best_rmse},
+          {"corrected", p.corrected},
+          {"with_residual", p.with_residual},
+          {"crashed", p.crashed}};
 }
 
 Prediction read_prediction(const std::filesystem::path& file) {
@@ -190,9 +193,8 @@ Prediction read_prediction(const std::filesystem::path& file) {
   try {
     Prediction p;
     p.diagnosis = gap::diagnosis_from(json.at("diagnosis"), file);
-    for (const auto& [name, b] : json.at("baselines").items())
-      p.baselines[name] = {b.at("named").get<Names>(), b.at("ranking").get<Names>()};
-    p.features = json.at("features").get<std::vector<double>>();
+    if (const Json& b = json.at("best_rmse"); !b.is_null())
+      p.best_rmse = Baseline{b.at("named").get<Names>(), b.at("ranking").get<Names>()};
     p.corrected = json.at("corrected");
     p.with_residual = json.at("with_residual");
     p.crashed = json.at("crashed");

@@ -123,18 +123,13 @@ ScoreValue share(const Cases& cases, const Is& is) {
                     cases.size());
 }
 
-/// Shares of the baselines, each over the cases that it has an answer for.
+/// Share of the baseline, over the cases that it has an answer for.
 template <class Is>
-std::map<std::string, ScoreValue> of_baselines(const Cases& cases, const Is& is) {
-  std::map<std::string, ScoreValue> scores;
-  for (const char* name : kBaselines) {
-    Cases had = cases;
-    std::erase_if(had, [&](const ScoredCase* c) { return !c->prediction.baselines.contains(name); });
-    if (!had.empty())
-      scores[name] =
-          share(had, [&](const ScoredCase& c) { return is(c.truth, c.prediction.baselines.find(name)->second); });
-  }
-  return scores;
+std::optional<ScoreValue> of_baseline(const Cases& cases, const Is& is) {
+  Cases had = cases;
+  std::erase_if(had, [&](const ScoredCase* c) { return !c->prediction.best_rmse; });
+  if (had.empty()) return std::nullopt;
+  return share(had, [&](const ScoredCase& c) { return is(c.truth, *c.prediction.best_rmse); });
 }
 
 bool baseline_first(const CaseTruth& t, const Baseline& b) {
@@ -154,15 +149,14 @@ enum class Bar { at_least, at_most, within };
 
 /// A row of the table. For Bar::within, `must` and `aim` are lower ends of ranges.
 ScoreLine line(std::string key, std::string what, Bar bar, double must, double aim, ScoreValue score,
-               std::map<std::string, ScoreValue> baselines = {}, double must_high = 0, double aim_high = 0) {
+               std::optional<ScoreValue> best_rmse = {}, double must_high = 0, double aim_high = 0) {
   const auto text = [&](double b, double high) {
     char t[40];
     if (bar == Bar::within) std::snprintf(t, sizeof t, "%.2f to %.2f", b, high);
     else std::snprintf(t, sizeof t, bar == Bar::at_least ? "%.2f" : "at most %.2f", b);
     return std::string(t);
   };
-  ScoreLine l{std::move(key),      std::move(what), text(must, must_high), text(aim, aim_high), score, {}, {},
-              std::move(baselines)};
+  ScoreLine l{std::move(key), std::move(what), text(must, must_high), text(aim, aim_high), score, {}, {}, best_rmse};
   if (score.value) {
     const double v = *score.value;
     const auto meets = [&](double b, double high) {
@@ -200,7 +194,7 @@ ScoreLine coverage_line(const Cases& cases) {
 }
 
 ScoreLine first_line(const char* key, const char* what, double must, double aim, const Cases& cases) {
-  return line(key, what, Bar::at_least, must, aim, share(cases, named_alone), of_baselines(cases, baseline_first));
+  return line(key, what, Bar::at_least, must, aim, share(cases, named_alone), of_baseline(cases, baseline_first));
 }
 
 /// With the case of `singles` of the same robot, if the same draw flew.
@@ -244,14 +238,13 @@ bool next_brings_truth(const ScoredCase& c) {
 
 ScoreLine pairs_line(const Cases& cases, double must = 0.75) {
   std::vector<std::pair<Names, Names>> own;
-  std::map<std::string, std::vector<std::pair<Names, Names>>> others;
+  std::vector<std::pair<Names, Names>> others;
   for (const ScoredCase* c : cases) {
     own.emplace_back(at_work(c->prediction), c->truth.effects);
-    for (const auto& [name, b] : c->prediction.baselines) others[name].emplace_back(b.named, c->truth.effects);
+    if (const std::optional<Baseline>& b = c->prediction.best_rmse) others.emplace_back(b->named, c->truth.effects);
   }
-  std::map<std::string, ScoreValue> baselines;
-  for (const auto& [name, list] : others) baselines[name] = f1_score(list);
-  return line("pairs_f1", "pairs: F1 of names", Bar::at_least, must, 0.92, f1_score(own), std::move(baselines));
+  return line("pairs_f1", "pairs: F1 of names", Bar::at_least, must, 0.92, f1_score(own),
+              others.empty() ? std::nullopt : std::optional(f1_score(others)));
 }
 
 /// Standard error of the difference of two scores as if independent; they share cases, so it is rather too large.
@@ -259,20 +252,17 @@ double standard_error(const ScoreValue& a, const ScoreValue& b) {
   return std::hypot(a.high - a.low, b.high - b.low) / (2 * io::kNormal975);
 }
 
-std::map<std::string, std::vector<std::string>> unbeaten_lines(const std::vector<ScoreLine>& lines) {
-  std::map<std::string, std::vector<std::string>> unbeaten;
-  for (const char* name : kBaselines) {
-    std::optional<bool> alarms;  // whether there are too many false alarms; none: not known
-    std::vector<std::string> keys;
-    for (const ScoreLine& l : lines) {
-      const auto b = l.baselines.find(name);
-      if (b == l.baselines.end() || !b->second.value || !l.score.value) continue;
-      if (l.key.starts_with("false_alarm")) alarms = alarms.value_or(false) || *b->second.value > kFalseAlarms;
-      else if (!(*l.score.value - *b->second.value > standard_error(l.score, b->second))) keys.push_back(l.key);
-    }
-    if (alarms && !*alarms) unbeaten[name] = std::move(keys);
+std::optional<std::vector<std::string>> unbeaten_lines(const std::vector<ScoreLine>& lines) {
+  std::optional<bool> alarms;  // whether there are too many false alarms; none: not known
+  std::vector<std::string> keys;
+  for (const ScoreLine& l : lines) {
+    const std::optional<ScoreValue>& b = l.best_rmse;
+    if (!b || !b->value || !l.score.value) continue;
+    if (l.key.starts_with("false_alarm")) alarms = alarms.value_or(false) || *b->value > kFalseAlarms;
+    else if (!(*l.score.value - *b->value > standard_error(l.score, *b))) keys.push_back(l.key);
   }
-  return unbeaten;
+  if (!alarms || *alarms) return std::nullopt;
+  return keys;
 }
 
 bool within_noise(const ScoredCase& c) { return c.change_over_noise && *c.change_over_noise < kBeyondNoise; }
@@ -293,8 +283,7 @@ Answer answer_of(const Prediction& p) {
   if (d.refit_loss) a.floor = d.noise_floor;
   if (!d.unexplained.empty()) a.where = Where{d.unexplained.front().channel, d.unexplained.front().regime};
   if (d.next) a.manoeuvre = d.next->manoeuvre;
-  a.baselines = p.baselines;
-  a.features = p.features;
+  a.best_rmse = p.best_rmse;
   for (const gap::Suspect& s : d.suspects) a.suspects.push_back(s.effect);
   for (const gap::RankedHypothesis& h : d.hypotheses) {
     a.evidence.push_back({h.effects, h.log_evidence - h.log_prior});
@@ -422,9 +411,9 @@ std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases) {
   l.push_back(first_line("top1_current", "right effect first, current logged too", 0.88, 0.97,
                          of_parts(cases, {"singles_current"})));
   l.push_back(line("group_top1", "right group first", Bar::at_least, 0.92, 0.98, share(singles, right_group),
-                   of_baselines(singles, baseline_group)));
+                   of_baseline(singles, baseline_group)));
   l.push_back(line("top3", "right effect among three", Bar::at_least, 0.95, 0.99, share(singles, among_three),
-                   of_baselines(singles, baseline_among_three)));
+                   of_baseline(singles, baseline_among_three)));
   l.push_back(
       first_line("top1_typical", "right effect first at typical magnitude", 0.80, 0.93, of_parts(cases, {"typical"})));
   l.push_back(line("suspects", "given that an effect is missing: it is among the three named", Bar::at_least, 0.60,
@@ -438,7 +427,7 @@ std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases) {
     const Cases harmless = of_parts(cases, {part});
     l.push_back(line(std::string("false_alarm_") + part, what, Bar::at_most, kFalseAlarms, 0.02,
                      share(harmless, false_alarm),
-                     of_baselines(harmless, [](const CaseTruth&, const Baseline& b) { return !b.named.empty(); })));
+                     of_baseline(harmless, [](const CaseTruth&, const Baseline& b) { return !b.named.empty(); })));
   }
   l.push_back(redeclared_line(of_parts(cases, {"redeclared"}), singles));
   l.push_back(line("unknown", "withheld or outside: \"unknown\"", Bar::at_least, 0.75, 0.90,
@@ -474,9 +463,9 @@ std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases) {
   const Cases changed = of("changed"), strange = of_parts(cases, {"changed_withheld", "changed_outside"});
   l.push_back(first_line("contrast_top1", "contrast: right effect first", 0.85, 0.95, changed));
   l.push_back(line("contrast_group_top1", "contrast: right group first", Bar::at_least, 0.92, 0.98,
-                   share(changed, right_group), of_baselines(changed, baseline_group)));
+                   share(changed, right_group), of_baseline(changed, baseline_group)));
   l.push_back(line("contrast_top3", "contrast: right effect among three", Bar::at_least, 0.97, 0.99,
-                   share(changed, among_three), of_baselines(changed, baseline_among_three)));
+                   share(changed, among_three), of_baseline(changed, baseline_among_three)));
   l.push_back(first_line("contrast_short_reference", "contrast: right first, reference of 10 s", 0.75, 0.90,
                          of("changed_short_reference")));
   l.push_back(
@@ -488,7 +477,7 @@ std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases) {
         {"unchanged_calm", "false_alarm_contrast_calm", "contrast: harmless, reference in hover and on slow paths"}}) {
     const Cases harmless = of(part);
     l.push_back(line(key, what, Bar::at_most, kFalseAlarms, 0.02, share(harmless, false_alarm),
-                     of_baselines(harmless, [](const CaseTruth&, const Baseline& b) { return !b.named.empty(); })));
+                     of_baseline(harmless, [](const CaseTruth&, const Baseline& b) { return !b.named.empty(); })));
   }
   const auto left = [](const ScoredCase& c) {
     return c.prediction.kind == "unknown" || c.prediction.kind == "remainder";

@@ -85,8 +85,7 @@ struct Answer {
   std::vector<std::string> suspects;  ///< most probable effects given that one is missing
   double none = 0, parameters = 0, unknown = 0;
   std::optional<double> nominal, refit, floor;  ///< mean losses: vehicle file, parameters fitted, noise alone
-  std::map<std::string, Baseline> baselines;    ///< by name (kBaselines)
-  std::vector<double> features;
+  std::optional<Baseline> best_rmse;
   std::string manoeuvre;  ///< the proposed flight; empty: none
   std::optional<Where> where;
 };
@@ -110,14 +109,13 @@ struct ScoreLine {
   std::string key, what, must, aim;
   ScoreValue score;
   std::optional<bool> meets_must, meets_aim;
-  std::map<std::string, ScoreValue> baselines;  ///< baselines to which the score applies
+  std::optional<ScoreValue> best_rmse;  ///< the baseline's; none: the score does not apply to it
 };
 
 struct Scores {
   std::vector<ScoreLine> lines;
-  /// By baseline: rows on which the diagnosis does not beat it by a standard error. Only baselines with few false
-  /// alarms.
-  std::map<std::string, std::vector<std::string>> unbeaten;
+  /// Rows on which the diagnosis does not beat the baseline by a standard error; none: it has too many false alarms.
+  std::optional<std::vector<std::string>> unbeaten;
 };
 
 Scores score(const std::vector<ScoredCase>& cases);

@@ -5,7 +5,6 @@
 #include <memory>
 #include <set>
 
-#include "benchmark/black_box.hpp"
 #include "benchmark/change_over_noise.hpp"
 #include "benchmark/families.hpp"
 #include "benchmark/foresee_bench.hpp"
@@ -160,7 +159,7 @@ bool fit_truths(const ScoreCommand& command, Bench& bench) {
           if (std::ranges::count(bench.cases[open[k]].truth.effects, std::string(e.info.id)) == 0)
             others.emplace_back(e.info.id);
         Question q = bench.predictions.question(c, others);
-        q.baselines = false;
+        q.baseline = false;
         q.experiments.clear();
         io::write_atomically(file_of(open[k]), to_json(command.predictor(q)).dump(1) + "\n");
       });
@@ -221,7 +220,7 @@ bool fly_proposals(const ScoreCommand& command, Bench& bench) {
         const PublicCase& c = bench.manifest.cases[open[k]];
         const Label& label = bench.labels.at(c.number);
         Question q = bench.predictions.question(c, c.withheld);
-        q.baselines = false;
+        q.baseline = false;
         q.experiments.clear();
         const std::string& name = bench.cases[open[k]].prediction.manoeuvre;
         const auto manoeuvre = std::ranges::find(manoeuvres, name, &gap::Manoeuvre::name);
@@ -250,28 +249,6 @@ bool fly_proposals(const ScoreCommand& command, Bench& bench) {
   return true;
 }
 
-/// Learnt on the robots of the other families; none if there are too few.
-void ask_black_box(const std::vector<std::unique_ptr<Bench>>& benches, const std::string& family) {
-  constexpr std::size_t kFewest = 20;
-  const std::set<std::string> kTeaching = {"singles",        "singles_current", "typical", "none",     "parameters",
-                                           "own_parameters", "conventions",     "changed", "unchanged"};
-  std::vector<Example> examples;
-  for (const auto& b : benches)
-    for (const ScoredCase& c : b->cases)
-      if (b->manifest.family != family && kTeaching.contains(c.truth.part) && !c.prediction.features.empty())
-        examples.push_back({c.prediction.features, c.truth.effects.empty() ? "" : c.truth.effects.front()});
-  if (examples.size() < kFewest) return;
-  const BlackBox box(examples);
-  for (const auto& b : benches)
-    for (ScoredCase& c : b->cases) {
-      if (b->manifest.family != family || c.prediction.features.empty()) continue;
-      Baseline& said = c.prediction.baselines["black_box"];
-      said.ranking = box.ranked(c.prediction.features);
-      if (!said.ranking.front().empty()) said.named = {said.ranking.front()};
-      std::erase(said.ranking, "");
-    }
-}
-
 std::string figure(const std::optional<double>& value) {
   if (!value) return "-";
   char text[24];
@@ -282,22 +259,17 @@ std::string figure(const std::optional<double>& value) {
 std::string interval(const ScoreValue& s) { return s.value ? figure(s.low) + " to " + figure(s.high) : "-"; }
 
 std::string table(const std::string& title, const Scores& scores) {
-  std::string text = "| " + title +
-                     " | must | aim | measured | 95 % interval | count | largest residual | best RMSE | STLSQ | "
-                     "black box |\n|---|---|---|---|---|---|---|---|---|---|\n";
-  for (const ScoreLine& l : scores.lines) {
+  std::string text =
+      "| " + title + " | must | aim | measured | 95 % interval | count | best RMSE |\n|---|---|---|---|---|---|---|\n";
+  for (const ScoreLine& l : scores.lines)
     text += "| " + l.what + " | " + l.must + " | " + l.aim + " | " + figure(l.score.value) +
             (l.meets_must && !*l.meets_must ? " (missed)" : "") + " | " + interval(l.score) + " | " +
-            std::to_string(l.score.count);
-    for (const char* name : kBaselines) {
-      const auto b = l.baselines.find(name);
-      text += " | " + (b == l.baselines.end() ? "-" : figure(b->second.value));
-    }
-    text += " |\n";
-  }
-  for (const auto& [name, keys] : scores.unbeaten)
-    text += "\nBaseline " + name + ", within the bar of false alarms: " +
-            (keys.empty() ? "beaten on every row" : "not beaten by a standard error on " + io::joined(keys)) + ".\n";
+            std::to_string(l.score.count) + " | " + (l.best_rmse ? figure(l.best_rmse->value) : "-") + " |\n";
+  if (scores.unbeaten)
+    text += "\nBaseline best RMSE, within the bar of false alarms: " +
+            (scores.unbeaten->empty() ? "beaten on every row"
+                                      : "not beaten by a standard error on " + io::joined(*scores.unbeaten)) +
+            ".\n";
   return text;
 }
 
@@ -312,14 +284,11 @@ void add(Json& json, const std::string& key, const ScoreValue& s) {
 Json scores_json(const Scores& scores, std::size_t cases) {
   Json json = {{"cases", cases}};
   for (const ScoreLine& l : scores.lines) add(json, l.key, l.score);
-  json["baselines"] = Json::object();
-  for (const char* name : kBaselines) {
-    Json own = Json::object();
-    for (const ScoreLine& l : scores.lines)
-      if (const auto b = l.baselines.find(name); b != l.baselines.end()) add(own, l.key, b->second);
-    if (const auto u = scores.unbeaten.find(name); u != scores.unbeaten.end()) own["unbeaten"] = u->second;
-    json["baselines"][name] = std::move(own);
-  }
+  Json best_rmse = Json::object();
+  for (const ScoreLine& l : scores.lines)
+    if (l.best_rmse) add(best_rmse, l.key, *l.best_rmse);
+  if (scores.unbeaten) best_rmse["unbeaten"] = *scores.unbeaten;
+  json["best_rmse"] = std::move(best_rmse);
   return json;
 }
 
@@ -376,8 +345,7 @@ Json score_bench(const ScoreCommand& command) {
       "case,part,effects,magnitudes,verdict,named,probability,right,closure,seconds,channel,regime,seed,draw,"
       "family,set,commit\n";
   std::set<std::string> families;
-  for (const auto& b : benches)
-    if (families.insert(b->manifest.family).second) ask_black_box(benches, b->manifest.family);
+  for (const auto& b : benches) families.insert(b->manifest.family);
   for (const auto& b : benches) {
     std::vector<ScoredCase>& own = by_family[b->manifest.family];
     own.insert(own.end(), b->cases.begin(), b->cases.end());

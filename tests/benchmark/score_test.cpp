@@ -4,11 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
-#include "benchmark/black_box.hpp"
 #include "benchmark/change_over_noise.hpp"
-#include "benchmark/predict/baselines.hpp"
 
 namespace flappy::benchmark {
 namespace {
@@ -364,115 +361,35 @@ TEST(Score, HoverAbstains) {
   EXPECT_DOUBLE_EQ(*main_score(flown, "hover_next").value, 0.25);
 }
 
-TEST(Score, BaselinesStandInTheSameLines) {
+TEST(Score, TheBaselineStandsInTheSameLines) {
   ScoredCase c = judged("singles", {"tether"}, "effect", {"tether"}, 0.9);
-  c.prediction.baselines["stlsq"] = {{"wind", "tether"}, {"wind", "tether"}};
+  c.prediction.best_rmse = {{"wind", "tether"}, {"wind", "tether"}};
   ScoredCase none = judged("none", {}, "none", {}, 0.9);
-  none.prediction.baselines["stlsq"] = {{}, {}};
+  none.prediction.best_rmse = {{}, {}};
   const Scores s = score({c, none});
-  EXPECT_DOUBLE_EQ(*line_of(s.lines, "top1_mocap_imu").baselines.at("stlsq").value, 0);
-  EXPECT_DOUBLE_EQ(*line_of(s.lines, "group_top1").baselines.at("stlsq").value, 1);
-  EXPECT_DOUBLE_EQ(*line_of(s.lines, "top3").baselines.at("stlsq").value, 1);
-  EXPECT_DOUBLE_EQ(*line_of(s.lines, "false_alarm_none").baselines.at("stlsq").value, 0);
-  EXPECT_FALSE(line_of(s.lines, "ece").baselines.contains("stlsq"));
+  EXPECT_DOUBLE_EQ(*line_of(s.lines, "top1_mocap_imu").best_rmse->value, 0);
+  EXPECT_DOUBLE_EQ(*line_of(s.lines, "group_top1").best_rmse->value, 1);
+  EXPECT_DOUBLE_EQ(*line_of(s.lines, "top3").best_rmse->value, 1);
+  EXPECT_DOUBLE_EQ(*line_of(s.lines, "false_alarm_none").best_rmse->value, 0);
+  EXPECT_FALSE(line_of(s.lines, "ece").best_rmse);
 }
 
-TEST(Score, BaselinesWithinTheBarAreToBeBeatenByAStandardError) {
-  std::vector<ScoredCase> cases;
-  for (int i = 0; i < 100; ++i) {
-    ScoredCase c = judged("singles", {"tether"}, i < 90 ? "effect" : "unknown", {"tether"}, 0.9);
-    c.prediction.baselines["best_rmse"] = {{"tether"},
-                                           {i < 88 ? "tether" : "wind"}};  // 0.90 and 0.88, each with a sd of 0.03
-    c.prediction.baselines["stlsq"] = {{"tether"}, {i < 80 ? "tether" : "com_offset"}};
-    c.prediction.baselines["black_box"] = {{"tether"}, {"tether"}};
-    cases.push_back(std::move(c));
-    ScoredCase none = judged("none", {}, "none", {}, 0.9);
-    none.prediction.baselines["best_rmse"] = none.prediction.baselines["stlsq"] = {{}, {}};
-    none.prediction.baselines["black_box"] = {{i < 6 ? Names{"wind"} : Names{}}, {"wind"}};
-    cases.push_back(std::move(none));
-  }
-  const auto unbeaten = score(cases).unbeaten;
-  EXPECT_FALSE(unbeaten.contains("black_box")) << "six false alarms of 100";
-  EXPECT_FALSE(unbeaten.contains("largest_residual")) << "nobody asked it";
-  EXPECT_EQ(std::ranges::count(unbeaten.at("best_rmse"), "top1_mocap_imu"), 1);
-  EXPECT_EQ(std::ranges::count(unbeaten.at("stlsq"), "top1_mocap_imu"), 0);
-}
-
-// ---- sparse regression
-
-/// Two flights of 500 rows: residual 0.5 x column 1 + 2 x column 0 + noise of sd 0.2; column 2 and 3 have nothing in it.
-Regression mixture() {
-  Regression r{{"", "tether", "wind", "com_offset"}, {}, {}};
-  std::uint64_t state = 7;
-  const auto draw = [&] {  // uniform of variance 1
-    state = state * 6364136223846793005U + 1442695040888963407U;
-    return (static_cast<double>(state >> 11) * 0x1p-53 - 0.5) * std::sqrt(12.0);
-  };
-  for (int f = 0; f < 2; ++f) {
-    Eigen::MatrixXd rows(500, 5);
-    for (Eigen::Index i = 0; i < rows.rows(); ++i) {
-      for (Eigen::Index k = 0; k < 4; ++k) rows(i, k) = draw();
-      rows(i, 4) = 2 * rows(i, 0) + 0.5 * rows(i, 1) + 0.2 * draw();
+TEST(Score, ABaselineWithinTheBarIsToBeBeatenByAStandardError) {
+  // 0.90 of 100 against `right` of 100, each with a sd of 0.03
+  const auto unbeaten = [](int right, int false_alarms) {
+    std::vector<ScoredCase> cases;
+    for (int i = 0; i < 100; ++i) {
+      cases.push_back(judged("singles", {"tether"}, i < 90 ? "effect" : "unknown", {"tether"}, 0.9));
+      cases.back().prediction.best_rmse = {{"tether"}, {i < right ? "tether" : "wind"}};
+      cases.push_back(judged("none", {}, "none", {}, 0.9));
+      cases.back().prediction.best_rmse = {{i < false_alarms ? Names{"wind"} : Names{}}, {"wind"}};
     }
-    r.sums.emplace_back(rows.transpose() * rows);
-    r.rows.push_back(500);
-  }
-  return r;
-}
-
-TEST(Stlsq, KeepsWhatContributes) {
-  // coefficients are good to 0.2/sqrt(500) = 0.009: the truth stands at 0.5, the others far below 0.05
-  Regression r = mixture();
-  EXPECT_EQ(stlsq(r).named, Names{"tether"});
-  r.effects[1] = "";
-  EXPECT_EQ(stlsq(r).named, Names{}) << "a parameter has no name";
-}
-
-TEST(Stlsq, NeverThresholdsAParameter) {
-  // Of two columns that are alike, -0.009 x a parameter's and 0.0105 x an effect's, without noise: the second is above the
-  // least threshold, 0.01, the first free of it. Without the parameter, 0.0105 - 0.9 x 0.009 would be left of the effect.
-  Eigen::MatrixXd rows(4, 3);
-  const double other = std::sqrt(1 - 0.81);
-  for (Eigen::Index i = 0; i < 4; ++i) {
-    rows(i, 0) = i % 2 == 0 ? 1 : -1;
-    rows(i, 1) = 0.9 * rows(i, 0) + (i < 2 ? other : -other);
-    rows(i, 2) = -0.009 * rows(i, 0) + 0.0105 * rows(i, 1);
-  }
-  EXPECT_EQ(stlsq({{"", "wind"}, {rows.transpose() * rows}, {4}}).named, Names{"wind"});
-  EXPECT_EQ(stlsq({{"tether", "wind"}, {rows.transpose() * rows}, {4}}).named, Names{});
-}
-
-/// Robots of three kinds, of a family whose features all stand `higher`; the last feature is the same of all.
-std::vector<Example> robots_of_a_family(double higher, unsigned seed) {
-  std::mt19937 random(seed);
-  std::normal_distribution<double> normal;
-  std::vector<Example> list;
-  for (int i = 0; i < 60; ++i) {
-    const char* const kNames[] = {"", "wind", "tether"};
-    Example e{std::vector<double>(41, 7.0), kNames[i % 3]};
-    for (int k = 0; k < 40; ++k)
-      e.features[static_cast<std::size_t>(k)] = higher + normal(random) + (k % 4 == i % 3 ? 1.5 : 0);
-    list.push_back(std::move(e));
-  }
-  return list;
-}
-
-TEST(BlackBox, NamesWhatItLearntOnAnotherFamily) {
-  // ten features of 40 tell a kind by 1.5 sd each: 4.7 sd together
-  const BlackBox box(robots_of_a_family(0, 1));
-  int right = 0;
-  for (const Example& e : robots_of_a_family(0.3, 2)) right += box.ranked(e.features).front() == e.effect;
-  EXPECT_GE(right, 54);
-  EXPECT_EQ(box.ranked(robots_of_a_family(0, 3).front().features).size(), 3U);
-}
-
-TEST(BlackBox, LearnsNothingFromNothing) {
-  std::vector<Example> same = robots_of_a_family(0, 1);
-  for (Example& e : same) e.features.assign(41, 1.0);
-  const BlackBox box(same);
-  const std::vector<std::string> one = box.ranked(same.front().features),
-                                 other = box.ranked(std::vector<double>(41, 9.0));
-  EXPECT_EQ(one, other);
+    return score(cases).unbeaten;
+  };
+  EXPECT_FALSE(unbeaten(100, 6)) << "six false alarms of 100";
+  EXPECT_EQ(std::ranges::count(unbeaten(88, 0).value(), "top1_mocap_imu"), 1);
+  EXPECT_EQ(std::ranges::count(unbeaten(80, 0).value(), "top1_mocap_imu"), 0);
+  EXPECT_FALSE(score({judged("none", {}, "none", {}, 0.9)}).unbeaten) << "nobody asked it";
 }
 
 }  // namespace

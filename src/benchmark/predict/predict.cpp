@@ -1,6 +1,6 @@
 #include "benchmark/predict/predict.hpp"
 
-#include "benchmark/predict/baselines.hpp"
+#include "benchmark/predict/best_rmse.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "gap/diagnose/corrected_vehicle.hpp"
 #include "gap/diagnose/diagnose.hpp"
@@ -45,11 +45,7 @@ Prediction predict(const Question& q) {
       d.corrected = gap::corrected_vehicle(request.vehicle, d.inference, request.uncertain);
     }
     p.corrected = text_of(*std::move(d.corrected));
-    if (q.baselines) {
-      const gap::Flights flights = tests_of(d.flights);
-      p.baselines = baselines(flights, *d.uncertain, d.inference, q.withheld, settings.threads);
-      p.features = features(flights, d.inference);
-    }
+    if (q.baseline) p.best_rmse = best_rmse(tests_of(d.flights), d.inference);
   }
   p.diagnosis = std::move(d.result);
   return p;

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 #include <functional>
-#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,22 +12,19 @@
 
 namespace flappy::benchmark {
 
-/// The answer of one of the simpler methods that the diagnosis is compared with.
+/// The answer of the simpler method that the diagnosis is compared with (best_rmse.hpp).
 struct Baseline {
   std::vector<std::string> named;    ///< ids of the effects that it says are present; empty: none
   std::vector<std::string> ranking;  ///< ids of effects, the most likely first; may lack effects that it cannot judge
 };
 
-inline constexpr const char* kBaselines[] = {"largest_residual", "best_rmse", "stlsq", "black_box"};
-
 /// The prediction of a case, made before its label is opened.
 struct Prediction {
   gap::Diagnosis diagnosis;
-  std::map<std::string, Baseline> baselines;  ///< by name; all but "black_box", which the scorer adds
-  std::vector<double> features;               ///< features of the residuals, for the black box (baselines.hpp)
-  std::string corrected;                      ///< text of the corrected vehicle file; empty if the logs are faulty
-  std::string with_residual;  ///< the same with what is left as a smooth load; empty if that does not help
-  bool crashed = false;       ///< the robot crashed in the proposed flight, so nothing was predicted
+  std::optional<Baseline> best_rmse;  ///< none: not asked for, or the logs are faulty
+  std::string corrected;              ///< text of the corrected vehicle file; empty if the logs are faulty
+  std::string with_residual;          ///< the same with what is left as a smooth load; empty if that does not help
+  bool crashed = false;               ///< the robot crashed in the proposed flight, so nothing was predicted
 };
 
 /// Whether a verdict gives no single answer: it is a group, or its probability is below one half.
@@ -40,7 +37,7 @@ struct Question {
   std::filesystem::path vehicle, priors, discrepancy, verdict, sessions;
   std::vector<std::string> withheld;  ///< effects to leave out of the catalogue
   bool residual = false;              ///< make a second corrected vehicle, which has what is left as a smooth load
-  bool baselines = true;              ///< also compute Prediction::baselines and ::features
+  bool baseline = true;               ///< also compute Prediction::best_rmse
   /// Folder of manoeuvres (*.toml), one of which is proposed if the verdict abstains; empty: none.
   std::filesystem::path experiments;
 };
