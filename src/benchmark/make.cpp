@@ -82,7 +82,7 @@ class Maker {
       io::write_atomically(now.vehicle_file,
                            model::vehicle_text(sampled_.sample({now.seed, 0, 0, sim::Stream::vehicle})));
     };
-    Label label{p, 0, {}, {}, {}};
+    Label label{p, 0, {}, {}};
     for (const blind::FamilyEffect& e : family_.effects())
       if (std::ranges::count(p.effects, e.id, &blind::BlindEffect::id) > 0) {
         label.channels.insert(label.channels.end(), e.channels.begin(), e.channels.end());
@@ -105,7 +105,6 @@ class Maker {
         flightlog::write_flight_log(case_folder(p) / (kFlightFolder + std::to_string(k + 1)), log);
       }
       label.draw = flown.draw;
-      label.true_values = true_values(p, flown.assignment);
       json = to_json(label);
     } catch (const blind::NeverFlies&) {
       json = to_json(label);
@@ -113,14 +112,6 @@ class Maker {
     }
     fs::remove_all(drawn);
     io::write_atomically(label_file(p), json.dump(1) + "\n");
-  }
-
-  std::map<std::string, double> true_values(const PlannedCase& p, const blind::Assignment& flown) const {
-    std::map<std::string, double> known;
-    if (!command_.true_values || (p.part != "singles" && p.part != "changed")) return known;
-    for (const auto& [name, value] : command_.true_values(flown, p.effects))
-      if (value) known[name] = *value;
-    return known;
   }
 
   void seal() const {

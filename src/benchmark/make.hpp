@@ -1,9 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
-#include <map>
-#include <optional>
 #include <string>
 
 #include "benchmark/families.hpp"
@@ -21,11 +18,6 @@ struct MakeCommand {
   PlanOptions plan;
   int threads = 0;  ///< 0: one for each processor
   io::Ranks* ranks = nullptr;
-  /// Returns the catalogue parameters nearest to a case's effects, by "effect.parameter"; null: none comes near. Called
-  /// only for parts "singles" and "changed", whose intervals are scored; unset: no true values.
-  std::function<std::map<std::string, std::optional<double>>(const blind::Assignment&,
-                                                             const std::vector<blind::BlindEffect>&)>
-      true_values;
 };
 
 /// Flies the cases into `out`/cases and seals their labels. Resumes an interrupted run; false if interrupted again.

@@ -117,7 +117,7 @@ Json open_labels(const std::filesystem::path& folder, const Manifest& manifest) 
 }
 
 CaseTruth Label::truth() const {
-  CaseTruth t{planned.part, {}, true_values, channels, regimes, planned.seed, draw};
+  CaseTruth t{planned.part, {}, channels, regimes, planned.seed, draw};
   for (const blind::BlindEffect& e : planned.effects) t.effects.push_back(e.id);
   return t;
 }
@@ -151,7 +151,6 @@ Json to_json(const Label& label) {
   json["draw"] = label.draw;
   json["channels"] = label.channels;
   json["regimes"] = label.regimes;
-  json["true_values"] = label.true_values;
   return json;
 }
 
@@ -174,7 +173,6 @@ Label label_from(const Json& json) {
   l.draw = json.at("draw");
   l.channels = json.at("channels").get<Names>();
   l.regimes = json.at("regimes").get<Names>();
-  l.true_values = json.at("true_values").get<std::map<std::string, double>>();
   return l;
 }
 

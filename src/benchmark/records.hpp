@@ -55,7 +55,6 @@ struct Label {
   PlannedCase planned;
   std::uint64_t draw = 0;                      ///< number of the first draw of its seed that did not crash
   std::vector<std::string> channels, regimes;  ///< where its effects act (blind::FamilyEffect)
-  std::map<std::string, double> true_values;   ///< by "effect.parameter"
   CaseTruth truth() const;
   blind::Assignment robot(const std::filesystem::path& vehicle) const;
 };

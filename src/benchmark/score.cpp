@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <iterator>
 #include <set>
 #include <tuple>
 
 #include "benchmark/change_over_noise.hpp"
 #include "io/statistics.hpp"
+#include "io/text.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::benchmark {
@@ -69,19 +69,6 @@ const FittedSet* fitted(const Answer& p, const Names& effects) {
   for (const FittedSet& s : p.sets)
     if (same(s.effects, effects)) return &s;
   return nullptr;
-}
-
-/// True values, and those within intervals, if the verdict names the true effects or their group.
-void count_covered(const ScoredCase& c, std::size_t& covered, std::size_t& all) {
-  if (!named_alone(c) && !group_holds(c)) return;
-  const FittedSet* set = fitted(c.prediction, c.truth.effects);
-  if (set == nullptr) return;
-  for (const auto& [name, value] : c.truth.true_values) {
-    const auto e = set->values.find(name);
-    if (e == set->values.end()) continue;
-    covered += e->second.low <= value && value <= e->second.high;
-    ++all;
-  }
 }
 
 /// For a group, of its most probable set.
@@ -145,25 +132,17 @@ bool baseline_among_three(const CaseTruth& t, const Baseline& b) {
   return std::find(b.ranking.begin(), end, t.effects.front()) != end;
 }
 
-enum class Bar { at_least, at_most, within };
+enum class Bar { at_least, at_most };
 
-/// A row of the table. For Bar::within, `must` and `aim` are lower ends of ranges.
+/// A row of the table.
 ScoreLine line(std::string key, std::string what, Bar bar, double must, double aim, ScoreValue score,
-               std::optional<ScoreValue> best_rmse = {}, double must_high = 0, double aim_high = 0) {
-  const auto text = [&](double b, double high) {
-    char t[40];
-    if (bar == Bar::within) std::snprintf(t, sizeof t, "%.2f to %.2f", b, high);
-    else std::snprintf(t, sizeof t, bar == Bar::at_least ? "%.2f" : "at most %.2f", b);
-    return std::string(t);
-  };
-  ScoreLine l{std::move(key), std::move(what), text(must, must_high), text(aim, aim_high), score, {}, {}, best_rmse};
+               std::optional<ScoreValue> best_rmse = {}) {
+  const auto text = [&](double b) { return io::format(bar == Bar::at_least ? "%.2f" : "at most %.2f", b); };
+  ScoreLine l{std::move(key), std::move(what), text(must), text(aim), score, {}, {}, best_rmse};
   if (score.value) {
-    const double v = *score.value;
-    const auto meets = [&](double b, double high) {
-      return bar == Bar::at_most ? v <= b : v >= b && (bar == Bar::at_least || v <= high);
-    };
-    l.meets_must = meets(must, must_high);
-    l.meets_aim = meets(aim, aim_high);
+    const auto meets = [&](double b) { return bar == Bar::at_most ? *score.value <= b : *score.value >= b; };
+    l.meets_must = meets(must);
+    l.meets_aim = meets(aim);
   }
   return l;
 }
@@ -184,13 +163,6 @@ ScoreLine closure_line(const Cases& cases) {
                 for (const std::size_t i : which) some.push_back(values[i]);
                 return io::median(std::move(some));
               }));
-}
-
-ScoreLine coverage_line(const Cases& cases) {
-  std::size_t covered = 0, all = 0;
-  for (const ScoredCase* c : cases) count_covered(*c, covered, all);
-  return line("interval_coverage", "90 % intervals of magnitude that hold the true one", Bar::within, 0.82, 0.87,
-              proportion(covered, all), {}, 0.97, 0.93);
 }
 
 ScoreLine first_line(const char* key, const char* what, double must, double aim, const Cases& cases) {
@@ -295,9 +267,7 @@ Answer answer_of(const Prediction& p) {
       same->probability += h.probability;  // hypotheses with and without a remainder count together
       continue;
     }
-    FittedSet set{h.effects, h.probability, {}, h.loss, h.loss_gain_sd};
-    for (const gap::Estimate& e : h.parameters) set.values[e.name] = {e.value, e.low, e.high};
-    a.sets.push_back(std::move(set));
+    a.sets.push_back({h.effects, h.probability, h.loss, h.loss_gain_sd});
   }
   return a;
 }
@@ -441,7 +411,6 @@ std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases) {
   l.push_back(line("unknown_where", "unknown: where it acts is described as sealed", Bar::at_least, 0.80, 0.95,
                    share(unknown, described)));
   l.push_back(calibration_line(cases));
-  l.push_back(coverage_line(singles));
   l.push_back(closure_line(singles));
   l.push_back(pairs_line(of_parts(cases, {"pairs"})));
   l.push_back(line("hover_abstain", "hover only: abstains", Bar::at_least, 0.85, 0.95,
@@ -495,9 +464,6 @@ std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases) {
   ScoreLine ece = calibration_line(cases);
   ece.key = "contrast_ece", ece.what = "contrast: calibration error (ECE) over all parts";
   l.push_back(std::move(ece));
-  ScoreLine coverage = coverage_line(changed);
-  coverage.key = "contrast_coverage", coverage.what = "contrast: 90 % intervals that hold the true magnitude";
-  l.push_back(std::move(coverage));
   ScoreLine closed = closure_line(changed);
   closed.key = "contrast_closure", closed.what = "contrast: closure as a share of the truth's, median";
   l.push_back(std::move(closed));

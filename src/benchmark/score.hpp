@@ -14,7 +14,6 @@ namespace flappy::benchmark {
 struct CaseTruth {
   std::string part;                            ///< one of kParts or kContrastParts
   std::vector<std::string> effects;            ///< effects of the robot
-  std::map<std::string, double> true_values;   ///< by "effect.parameter", where the catalogue has an equivalent
   std::vector<std::string> channels, regimes;  ///< where the effects act (blind::FamilyEffect)
   std::uint64_t seed = 0, draw = 0;            ///< identify the robot
 };
@@ -45,16 +44,11 @@ inline constexpr const char* kContrastParts[] = {
     "changed",        "changed_short_reference", "changed_short_test", "unchanged",    "changed_calm",
     "unchanged_calm", "changed_withheld",        "changed_outside",    "changed_pairs"};
 
-struct ScoredParameter {
-  double value = 0, low = 0, high = 0;
-};
-
 struct FittedSet {
   std::vector<std::string> effects;
   double probability = 0;
-  std::map<std::string, ScoredParameter> values;  ///< by "effect.parameter"
-  std::optional<double> left;                     ///< mean loss in held-out flights; none: not fitted
-  double gain_sd = 0;                             ///< standard deviation of its gain over the parameters alone
+  std::optional<double> left;  ///< mean loss in held-out flights; none: not fitted
+  double gain_sd = 0;          ///< standard deviation of its gain over the parameters alone
 };
 
 /// Place of an unknown cause, in the terms of blind::FamilyEffect.

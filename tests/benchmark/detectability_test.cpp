@@ -1,4 +1,4 @@
-// How large effects have to be, the robot's reset predictions of its own flights, and true magnitudes.
+// How large effects have to be.
 #include "benchmark/detectability.hpp"
 
 #include <gtest/gtest.h>
@@ -7,104 +7,9 @@
 #include <limits>
 #include <numbers>
 
-#include "benchmark/robot_prediction.hpp"
-#include "benchmark/true_values.hpp"
-#include "full.hpp"
-#include "gap/replay/reset_prediction.hpp"
-#include "vehicles.hpp"
-
 namespace flappy::benchmark {
 using namespace blind;
 namespace {
-
-Case flown(const std::vector<BlindEffect>& effects) {
-  Case c{.vehicle = test::identified(), .magnitudes = Magnitudes(effects), .seed = 11};
-  c.declared_density_kg_m3 = c.vehicle.air_density_kg_m3;
-  return c;
-}
-
-gap::ResetPrediction predicted(const Case& c, std::size_t flight) {
-  RobotFlight f = fly(c, flight);
-  EXPECT_FALSE(f.crashed) << f.how;
-  return gap::ResetPrediction(gap::Recording("flight", std::move(f.log), c.vehicle));
-}
-
-/// Rms over beats of the steady turn and force, [channel].
-std::array<double, 6> mean_rms(const gap::PredictedFlight& flight, const gap::Rows& rows) {
-  std::array<double, 6> rms{};
-  for (std::size_t s = 0; s < 6; ++s) {
-    double n = 0;
-    for (std::size_t j = 0; j < flight.beats(); ++j) {
-      if (!flight.covers(j, static_cast<int>(s))) continue;
-      n += 1;
-      rms[s] += std::pow(rows[j * gap::kRowsPerBeat + s * gap::kCoefficients], 2);
-    }
-    rms[s] = std::sqrt(rms[s] / n);
-  }
-  return rms;
-}
-
-/// What a perturbed robot leaves of them.
-std::array<double, 6> left(const gap::PredictedFlight& flight, const Perturbation& perturbation) {
-  gap::Rows rows = predict_perturbed(flight, perturbation, 0);
-  for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = flight.measured()[i] - rows[i];
-  return mean_rms(flight, rows);
-}
-
-// A robot that predicts its own flight leaves the noise of the sensors, and half as much for what the record gets wrong of the torso's motion.
-// How it lived before the record is known nearly: a battery is as empty as the first beats of it, repeated, leave it, to some percent.
-// Without the effect that it flew with, what is left is several times as much.
-TEST(ResetPrediction, KnowsItsOwnFlight) {
-  if (!test::full()) GTEST_SKIP() << "takes ten seconds: with --full";
-  for (const std::vector<BlindEffect>& effects : {std::vector<BlindEffect>{{"coulomb_friction", 1}, {"body_drag", 1}},
-                                                  {{"wind", 2}},            // its gusts come as they came
-                                                  {{"battery_sag", 4}}}) {  // empty by as much as the trim took
-    const Case c = flown(effects);
-    const gap::ResetPrediction flight = predicted(c, 0);
-    const auto with = left(flight, {c.vehicle, c.magnitudes, c.seed}), without = left(flight, {c.vehicle, {}, c.seed});
-    const auto noise = mean_rms(flight, flight.declared_noise(1));
-    double worst = 0;
-    for (std::size_t s = 0; s < 6; ++s) {
-      EXPECT_LT(with[s], 1.5 * noise[s] + 0.02 * without[s])
-          << effects[0].id << ' ' << gap::channel_name(static_cast<int>(s));
-      worst = std::max(worst, without[s] / with[s]);
-    }
-    EXPECT_GT(worst, 2) << effects[0].id;
-  }
-}
-
-TEST(TrueValues, SensorsDoNotChangeTheFlight) {
-  const RobotFlight plain = fly(flown({}), 0);
-  std::vector<BlindEffect> all;
-  for (std::size_t e = 0; e < kBlindEffects; ++e)
-    if (acts_on_sensors(static_cast<Effect>(e))) all.push_back({effect_names()[e], 2});
-  const RobotFlight f = fly(flown(all), 0);
-  EXPECT_EQ(f.log.command, plain.log.command);
-  EXPECT_NE(f.log.imu, plain.log.imu);
-  EXPECT_NE(f.log.mocap, plain.log.mocap);
-  for (std::size_t k = 0; k < 22; ++k) EXPECT_EQ(f.truth[k], plain.truth[k]) << k;
-}
-
-// Effects whose magnitude both sides state in the same units: the entry comes out as what was put in. Poses
-// are jittered by as much as a tenth of the delay.
-TEST(TrueValues, FindsWhatWasPutIn) {
-  const auto uncertain =
-      sim::read_randomisation(test::nominal(), io::Config::load(test::source_path("configs/gap/priors.toml")).root());
-  if (!test::full()) GTEST_SKIP() << "fits for 15 s: scripts/test --full";
-  const std::vector<BlindEffect> put_in{{"mocap_delay", 1}, {"com_offset", 2}, {"mocap_tilt", 2}};
-  const auto values = true_values(flown({}), put_in, uncertain, 2);
-  const auto at = [&](const char* name) {
-    const auto found = values.find(name);
-    if (found == values.end() || !found->second) ADD_FAILURE() << name;
-    return found == values.end() ? 0 : found->second.value_or(0);
-  };
-  EXPECT_NEAR(at("mocap_delay.delay_s"), 0.005, 0.0005);
-  EXPECT_EQ(values.size(), 6u);
-  EXPECT_NEAR(std::hypot(at("mocap_tilt.x_rad"), at("mocap_tilt.y_rad")), 0.02, 0.002);
-  EXPECT_NEAR(std::hypot(at("com_offset.x_m"), at("com_offset.y_m")), 0.002, 0.0002);
-}
-
-// ---- of families
 
 /// 1,000 beats of a robot that hovers: its weight, and a first harmonic of 10 sqrt 2 m/s^2 along x, so that the three forces have a
 /// waveform of sqrt((96.04 + 100)/3) = 8.084 m/s^2.

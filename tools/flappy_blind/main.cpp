@@ -10,12 +10,9 @@
 #include "benchmark/foresee_bench.hpp"
 #include "benchmark/make.hpp"
 #include "benchmark/score_bench.hpp"
-#include "benchmark/true_values.hpp"
 #include "blind/a/family_a.hpp"
 #include "blind/firmware/firmware.hpp"
 #include "escapes.hpp"
-#include "flappy/vehicle_file.hpp"
-#include "io/config.hpp"
 #include "io/installation.hpp"
 #include "io/sha256.hpp"
 #include "loop.hpp"
@@ -276,12 +273,6 @@ int main(int argc, char** argv) {
     using blind::Programme;
     if (make.given()) {
       made.plan.reported = set == "reported";
-      const sim::Randomisation uncertain =
-          sim::read_randomisation(model::read_vehicle(made.vehicle), io::Config::load(scored.priors, {}).root());
-      if (made.family == "a")
-        made.true_values = [&](const blind::Assignment& a, const std::vector<blind::BlindEffect>& effects) {
-          return benchmark::true_values(blind::case_of(a), effects, uncertain, 1);
-        };
       made.ranks = program.ranks("work: make\n");
       if (benchmark::make_bench(made)) program.write_json({{"out", made.out.string()}});
       else std::printf("stopped; what has flown stays: the same command goes on\n");
