@@ -47,7 +47,7 @@ bool foresee_bench(const BenchQuestions& command) {
     if (fs::exists(true_fits(folder)))
       throw io::InputError(folder.string() + ": its labels were opened; accepted: a benchmark that was never scored");
     io::make_folder(folder / "foreseen");
-    if (const std::string other = command.other_option(folder / "foreseen" / "options.txt", ""); !other.empty())
+    if (const std::string other = command.other_option(folder / "foreseen" / "options.txt"); !other.empty())
       throw io::InputError(folder.string() + ": was planned with another " + other +
                            "; accepted: the same options, or without the folder " + (folder / "foreseen").string());
     const std::map<std::string, double> alone = magnitudes_alone(manifest.family);

@@ -13,8 +13,8 @@ fs::path BenchQuestions::vehicle_of(const Manifest& manifest) const {
   return vehicle.empty() ? fs::path(manifest.vehicle) : vehicle;
 }
 
-std::string BenchQuestions::other_option(const fs::path& file, const std::string& further) const {
-  std::string now = further;
+std::string BenchQuestions::other_option(const fs::path& file) const {
+  std::string now;
   for (const auto& [option, path] : {std::pair{"--priors", priors},
                                      {"--discrepancy", discrepancy},
                                      {"--sessions", sessions},

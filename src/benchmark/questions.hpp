@@ -22,8 +22,8 @@ struct BenchQuestions {
 
   std::filesystem::path vehicle_of(const Manifest& manifest) const;
   /// The option of this command whose file or value is not the one kept in `file` (then as text: "--verdict"); empty if all are. If
-  /// `file` does not exist, keeps them there. `further`: lines "--option value".
-  std::string other_option(const std::filesystem::path& file, const std::string& further) const;
+  /// `file` does not exist, keeps them there.
+  std::string other_option(const std::filesystem::path& file) const;
   /// About a case of the benchmark in `folder`; nothing is withheld.
   Question question(const std::filesystem::path& folder, const Manifest& manifest, const PublicCase& of) const;
 };

@@ -182,7 +182,6 @@ Json to_json(const Prediction& p) {
   return {{"diagnosis", to_json(p.diagnosis)},
           {"best_rmse", best_rmse},
           {"corrected", p.corrected},
-          {"with_residual", p.with_residual},
           {"crashed", p.crashed}};
 }
 
@@ -194,7 +193,6 @@ Prediction read_prediction(const std::filesystem::path& file) {
     if (const Json& b = json.at("best_rmse"); !b.is_null())
       p.best_rmse = Baseline{b.at("named").get<Names>(), b.at("ranking").get<Names>()};
     p.corrected = json.at("corrected");
-    p.with_residual = json.at("with_residual");
     p.crashed = json.at("crashed");
     return p;
   } catch (const Json::exception& e) {

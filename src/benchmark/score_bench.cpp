@@ -55,19 +55,16 @@ class Predictions {
   /// Makes and seals the missing predictions; false if interrupted.
   bool make() const {
     const fs::path options = folder_ / "predictions" / "options.txt";
-    const auto other_option = [&] {
-      return command_.other_option(options, "--residual " + std::to_string(command_.residual) + "\n");
-    };
     if (fs::exists(sums_)) {
       check_predictions(folder_, manifest_);
-      if (const std::string other = fs::exists(options) ? other_option() : ""; !other.empty())
+      if (const std::string other = fs::exists(options) ? command_.other_option(options) : ""; !other.empty())
         std::printf("%s: its predictions are sealed, and were made with another %s\n", folder_.c_str(), other.c_str());
       return true;
     }
     if (fs::exists(true_fits(folder_))) refuse(sums_, "is missing, though labels were opened");
     io::make_folder(folder_ / "predictions");
     if (io::writes(command_.ranks))
-      if (const std::string other = other_option(); !other.empty())
+      if (const std::string other = command_.other_option(options); !other.empty())
         throw io::InputError(folder_.string() + ": its predictions were begun with another " + other +
                              "; accepted: the same options, or a new benchmark");
     std::vector<const PublicCase*> open;
@@ -93,7 +90,6 @@ class Predictions {
   Question question(const PublicCase& c, const std::vector<std::string>& withheld) const {
     Question q = command_.question(folder_, manifest_, c);
     q.withheld = withheld;
-    q.residual = command_.residual;
     q.experiments = command_.experiments;
     return q;
   }

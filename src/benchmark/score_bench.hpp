@@ -12,7 +12,6 @@ struct ScoreCommand : BenchQuestions {
   std::filesystem::path out;  ///< folder for score.md and score.csv; empty: the first of `folders`
   std::filesystem::path experiments = io::config_path("gap/experiments");  ///< manoeuvres that may be proposed
   bool proposals = false;  ///< also fly what undecided diagnoses of part "singles" propose
-  bool residual = false;   ///< also make corrected vehicles with what is left as a smooth load, for flappy-blind loop
   io::Ranks* ranks = nullptr;
   Predictor predictor = predict;
 };

@@ -27,10 +27,10 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// Policies that every robot flies. The last two were trained on with a corrected vehicle, the last with one that has what is left as a
-/// smooth load. A robot without such a vehicle flies the policy before it.
-enum Policy { kAsShipped, kFile, kCorrected, kWithResidual, kPolicies };
-constexpr std::array<const char*, kPolicies> kNames = {"as_shipped", "file", "corrected", "with_residual"};
+/// Policies that every robot flies. The last was trained on with the robot's corrected vehicle; a robot without one flies
+/// the policy before it.
+enum Policy { kAsShipped, kFile, kCorrected, kPolicies };
+constexpr std::array<const char*, kPolicies> kNames = {"as_shipped", "file", "corrected"};
 
 /// Parts of a benchmark whose robots have an effect and are diagnosed from rich flights. Each robot occurs once in them.
 constexpr std::string_view kParts[] = {"singles", "typical",         "withheld",      "outside",
@@ -164,14 +164,12 @@ class Loop {
     const fs::path declared = scored_.front()->manifest.vehicle;
     if (!train_on(declared, without(), 0)) return false;
     std::vector<fs::path> runs;
-    for (const Robot& r : robots_)
-      for (const Policy p : {kCorrected, kWithResidual}) {
-        const std::string& vehicle = p == kCorrected ? r.said.corrected : r.said.with_residual;
-        if (vehicle.empty()) continue;
-        runs.push_back(r.own / kNames[p]);
-        io::make_folder(r.own);
-        io::write_atomically(vehicle_of(runs.back()), vehicle);
-      }
+    for (const Robot& r : robots_) {
+      if (r.said.corrected.empty()) continue;
+      runs.push_back(r.own / kNames[kCorrected]);
+      io::make_folder(r.own);
+      io::write_atomically(vehicle_of(runs.back()), r.said.corrected);
+    }
     return benchmark::work_through("training", runs.size(), command_.threads, nullptr,
                                    [&](std::size_t i) { train_on(vehicle_of(runs[i]), runs[i], 1); });
   }
@@ -197,7 +195,6 @@ class Loop {
 
   /// Flies the escapes of a robot with a policy; empty after Ctrl-C.
   std::optional<std::size_t> flown(const Robot& r, Policy p) const {
-    if (p == kWithResidual && r.said.with_residual.empty()) p = kCorrected;
     if (p == kCorrected && r.said.corrected.empty()) p = kFile;  // its logs were faulty
     const fs::path run = p == kAsShipped ? fs::path(command_.run) : p == kFile ? without() : r.own / kNames[p];
     return succeeded(r, kNames[p], r.made, run / "best.json");
@@ -220,7 +217,7 @@ class Loop {
   }
 
   struct Row {
-    std::size_t robots = 0, escapes = 0, with_residual = 0;
+    std::size_t robots = 0, escapes = 0;
     std::array<std::size_t, kPolicies> succeeded{}, better{}, worse{};  ///< better and worse than kFile
     /// Share of the robots that fly better with the policy than with kFile; ties count half.
     double ties_half(Policy p) const {
@@ -245,7 +242,6 @@ class Loop {
       for (Row* row : {&rows[family], &rows["all"]}) {
         ++row->robots;
         row->escapes += command_.escapes;
-        row->with_residual += !r.said.with_residual.empty();
         for (int p = 0; p < kPolicies; ++p) {
           row->succeeded[p] += count[p];
           row->better[p] += count[p] > count[kFile];
@@ -256,10 +252,10 @@ class Loop {
       lines += "," + std::to_string(label.planned.seed) + "," + std::to_string(label.draw) + "\n";
     }
     std::string text =
-        "| family | robots | better with the diagnosis (95 %) | as good | worse | better, ties half | with what is "
-        "left (robots) "
-        "| success as shipped | trained on with the file | with the corrected vehicle | with what is left |\n"
-        "|---|---|---|---|---|---|---|---|---|---|---|\n";
+        "| family | robots | better with the diagnosis (95 %) | as good | worse | better, ties half | success as "
+        "shipped "
+        "| trained on with the file | with the corrected vehicle |\n"
+        "|---|---|---|---|---|---|---|---|---|\n";
     Json all = Json::object();
     for (const auto& [family, row] : rows) {
       const std::size_t better = row.better[kCorrected], worse = row.worse[kCorrected];
@@ -268,17 +264,12 @@ class Loop {
         return static_cast<double>(row.succeeded[p]) / static_cast<double>(row.escapes);
       };
       char line[300];
-      std::snprintf(line, sizeof line,
-                    "| %s | %zu | %.3f (%.3f to %.3f) | %zu | %zu | %.3f | %.3f (%zu) | %.3f | %.3f | %.3f | %.3f |\n",
+      std::snprintf(line, sizeof line, "| %s | %zu | %.3f (%.3f to %.3f) | %zu | %zu | %.3f | %.3f | %.3f | %.3f |\n",
                     family.c_str(), row.robots, rate.value, rate.low, rate.high, row.robots - better - worse, worse,
-                    row.ties_half(kCorrected), row.ties_half(kWithResidual), row.with_residual, share(kAsShipped),
-                    share(kFile), share(kCorrected), share(kWithResidual));
+                    row.ties_half(kCorrected), share(kAsShipped), share(kFile), share(kCorrected));
       text += line;
-      all[family] = {{"robots", row.robots},
-                     {"better", better},
-                     {"worse", worse},
-                     {"ties_half", row.ties_half(kCorrected)},
-                     {"ties_half_with_residual", row.ties_half(kWithResidual)}};
+      all[family] = {
+          {"robots", row.robots}, {"better", better}, {"worse", worse}, {"ties_half", row.ties_half(kCorrected)}};
       for (int p = 0; p < kPolicies; ++p) all[family][kNames[p]] = share(static_cast<Policy>(p));
     }
     text += "\nleft out, for they do not hover at the goal for three seconds without a policy:";

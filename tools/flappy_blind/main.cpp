@@ -244,8 +244,6 @@ int main(int argc, char** argv) {
   score.option("--out", scored.out, "folder for score.md and score.csv; none: the first of those");
   score.flag("--proposals", scored.proposals,
              "fly what undecided diagnoses of part singles propose, changes to the robot included");
-  score.flag("--residual", scored.residual,
-             "make corrected vehicles with what is left as a smooth load, too, for the loop");
   io::Command plan = program.app().command("plan", "before scoring: what plans expect of the diagnoses of each case");
   benchmark::BenchQuestions foreseen;
   blind::add_question_options(plan, foreseen);

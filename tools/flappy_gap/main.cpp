@@ -192,8 +192,6 @@ int main(int argc, char** argv) {
   std::string software;
   diagnose.option("--flown", software,
                   "what flappy-export wrote, or a run folder: diagnose only if the robot flew it in all flights");
-  diagnose.flag("--residual", command.settings.residual,
-                "give the corrected vehicle what is left, as a smooth load without a cause");
   diagnose.option("--out", command.out, "folder for diagnosis.json and the corrected vehicle");
   diagnose.option("--threads", command.settings.threads, "0: one for each processor").range(0, 1024);
   io::Command mcap =

@@ -2,7 +2,6 @@
 
 #include "benchmark/predict/best_rmse.hpp"
 #include "flappy/vehicle_file.hpp"
-#include "gap/diagnose/corrected_vehicle.hpp"
 #include "gap/diagnose/diagnose.hpp"
 
 namespace flappy::benchmark {
@@ -31,7 +30,6 @@ Prediction predict(const Question& q) {
   settings.verdict = q.verdict;
   settings.sessions = q.sessions;
   settings.withheld = q.withheld;
-  settings.residual = q.residual;
   settings.experiments = q.experiments;
   settings.threads = 1;
   const gap::DiagnosisRequest request = read_request(settings);
@@ -39,11 +37,6 @@ Prediction predict(const Question& q) {
   if (!q.experiments.empty() && abstains(d.result.verdict)) propose_experiment(request, d);
   Prediction p;
   if (d.corrected) {
-    if (d.inference.residual && d.inference.residual->helps) {
-      p.with_residual = text_of(*std::move(d.corrected));
-      d.inference.residual.reset();
-      d.corrected = gap::corrected_vehicle(request.vehicle, d.inference, request.uncertain);
-    }
     p.corrected = text_of(*std::move(d.corrected));
     if (q.baseline) p.best_rmse = best_rmse(tests_of(d.flights), d.inference);
   }

@@ -23,7 +23,6 @@ struct Prediction {
   gap::Diagnosis diagnosis;
   std::optional<Baseline> best_rmse;  ///< none: not asked for, or the logs are faulty
   std::string corrected;              ///< text of the corrected vehicle file; empty if the logs are faulty
-  std::string with_residual;          ///< the same with what is left as a smooth load; empty if that does not help
   bool crashed = false;               ///< the robot crashed in the proposed flight, so nothing was predicted
 };
 
@@ -36,7 +35,6 @@ struct Question {
   /// TOML files. All but the vehicle may be empty: gap::DiagnosisSettings.
   std::filesystem::path vehicle, priors, discrepancy, verdict, sessions;
   std::vector<std::string> withheld;  ///< effects to leave out of the catalogue
-  bool residual = false;              ///< make a second corrected vehicle, which has what is left as a smooth load
   bool baseline = true;               ///< also compute Prediction::best_rmse
   /// Folder of manoeuvres (*.toml), one of which is proposed if the verdict abstains; empty: none.
   std::filesystem::path experiments;

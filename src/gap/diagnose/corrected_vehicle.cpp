@@ -1,6 +1,5 @@
 #include "gap/diagnose/corrected_vehicle.hpp"
 
-#include "gap/diagnose/residual_load.hpp"
 #include "model/posterior.hpp"
 
 namespace flappy::gap {
@@ -9,21 +8,15 @@ model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Inference&
                                  sim::Randomisation uncertain) {
   uncertain.set_minors(inference.corrected.minors);
   const ScoredHypothesis& best = inference.predicting();
-  const ResidualLoad* load = inference.residual && inference.residual->helps ? &*inference.residual : nullptr;
-  const Hypothesis h(uncertain, load != nullptr ? load->effects : inference.corrected.effects);
+  const Hypothesis h(uncertain, inference.corrected.effects);
   const Fit& fit = best.kind == HypothesisKind::effect ? best.fit : inference.parameters;
   model::Vehicle corrected = vehicle;
-  if (best.kind != HypothesisKind::none || load != nullptr) {
-    const Eigen::VectorXd& mean = load != nullptr ? load->at : inference.corrected.at;
+  if (best.kind != HypothesisKind::none) {
+    const Eigen::VectorXd& mean = inference.corrected.at;
     Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(h.size(), h.size());
     const Eigen::MatrixXd known = fit.covariance();
     covariance.topLeftCorner(known.rows(), known.cols()) = known;
-    if (load != nullptr)
-      covariance.bottomRightCorner(load->covariance.rows(), load->covariance.cols()) = load->covariance;
-    const auto at = [&](const Eigen::VectorXd& coordinates) {
-      model::Vehicle there = h.vehicle(h.bounded(coordinates)).vehicle;
-      return load != nullptr ? with_limits(std::move(there), *load) : there;
-    };
+    const auto at = [&](const Eigen::VectorXd& coordinates) { return h.vehicle(h.bounded(coordinates)).vehicle; };
     std::vector<std::vector<double>> rows;
     for (const auto& row : covariance.rowwise()) rows.emplace_back(row.begin(), row.end());
     corrected = at(mean);

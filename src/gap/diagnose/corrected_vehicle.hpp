@@ -7,8 +7,7 @@
 namespace flappy::gap {
 
 /// The vehicle with the parameters and effects of inference.predicting(): the conclusion's, and perhaps further effects.
-/// Its posterior has their uncertainty. The conclusion none leaves the vehicle as it is, except for its name;
-/// but if a residual load helps, it has the fitted parameters and the load.
+/// Its posterior has their uncertainty. The conclusion none leaves the vehicle as it is, except for its name.
 /// The minor draws of `inference` shift parameters and do not enter the posterior.
 model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Inference& inference,
                                  sim::Randomisation uncertain);

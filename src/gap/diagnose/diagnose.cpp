@@ -117,9 +117,6 @@ DiagnosisRequest read_request(const DiagnosisSettings& settings) {
     options.max_effects = kMaxBeatAveragedEffects;
   }
   options.withheld = s.withheld;
-  options.residual = s.residual;
-  if (s.residual && beat_averaged)
-    throw io::InputError("--residual: is not for a beat-averaged vehicle; accepted: a vehicle with wings");
   const bool contrast = !s.reference.empty();
   // what a beat-averaged model gets wrong counts as noise, but in a contrast it cancels
   options.discrepancy = read_model_discrepancy(
@@ -187,8 +184,6 @@ Diagnosed diagnose_flights(const DiagnosisRequest& request, const std::vector<st
   d.result = result_of(tests, d.flights, *d.uncertain, d.inference);
   d.result.reference = request.settings.reference;
   if (references > 0) d.result.warnings = contrast_warnings(headers, d.flights);
-  if (options.residual && tests.size() < 2)
-    d.result.warnings.emplace_back("--residual: no load is given, because one flight leaves none to judge it by");
   if (d.inference.complete) d.corrected = corrected_vehicle(request.vehicle, d.inference, request.uncertain);
   return d;
 }

@@ -23,7 +23,6 @@ struct DiagnosisSettings {
   /// Empty: the files of configs/gap, or of configs/gap/beat_averaged for a beat-averaged vehicle.
   std::string priors, discrepancy, verdict, sessions;
   std::vector<std::string> withheld;  ///< effects to leave out of the catalogue
-  bool residual = false;              ///< give the corrected vehicle what is left as a smooth load
   /// For a beat-averaged vehicle, the only channels that count; empty: all that it compares.
   std::vector<std::string> channels;
   /// flappy-fly configuration of the flights. Empty: simulations follow the recorded paths with the controller of

@@ -6,7 +6,6 @@
 
 #include "gap/diagnose/effect_fits.hpp"
 #include "gap/diagnose/held_out.hpp"
-#include "gap/diagnose/residual_load.hpp"
 #include "gap/diagnose/verdict.hpp"
 #include "io/parallel.hpp"
 #include "model/effects/registry.hpp"
@@ -259,7 +258,6 @@ Inference infer(const Flights& flights, const sim::Randomisation& uncertain, Inf
                   ? robot.sensors(fitter, Hypothesis(robot.uncertain(), predicting.effects), predicting.fit)
                   : robot.sensors(fitter, robot.no_effects(), d.parameters);
   d.corrected = correct(robot, fitter, reference, d);
-  if (options.residual && d.complete) d.residual = fit_residual_load(robot, fitter, flights, threads, d);
   if (robot.evidence().policy().validate && reference == nullptr)
     d.validation = validate(fitter, robot.uncertain(), flights, d, threads);
   keep_tests(references_of(flights).size(), d);

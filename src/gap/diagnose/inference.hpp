@@ -2,7 +2,6 @@
 #pragma once
 
 #include <functional>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -49,17 +48,6 @@ struct CorrectedParameters {
   std::vector<double> minors;        ///< variates for sim::Randomisation::set_minors
 };
 
-/// A smooth load on the torso that describes what is left (gap/diagnose/residual_load.hpp).
-struct ResidualLoad {
-  std::vector<std::string> effects;      ///< those of CorrectedParameters, and the load
-  Eigen::VectorXd at;                    ///< coordinates of the corrected vehicle, the load's last
-  Eigen::MatrixXd covariance;            ///< posterior covariance of the load's coordinates
-  std::map<std::string, double> limits;  ///< largest flown velocity or rate, by name of the load's limit
-  /// Mean losses in held-out flights of the corrected vehicle without the load and with it; none: a single flight.
-  std::optional<double> loss_without, loss;
-  bool helps = false;  ///< whether it predicts flights held out better; else the corrected vehicle does without it
-};
-
 /// Log evidence of a hypothesis that is refuted, or whose vehicle cannot be simulated.
 inline constexpr double kRefuted = -1e9;
 
@@ -68,7 +56,6 @@ struct InferenceOptions {
   int max_finalists = 8;                                                ///< effects that are fitted by simulation
   int max_effects = 3;                                                  ///< largest number of effects in a hypothesis
   std::vector<std::string> withheld;                                    ///< effects to leave out of the catalogue
-  bool residual = false;                                                ///< fit a ResidualLoad
   std::function<bool(double share, const std::string& what)> progress;  ///< returns false to fit no further effect
   ModelDiscrepancy discrepancy = read_model_discrepancy();
   VerdictRule rule = read_verdict_rule();
@@ -84,7 +71,6 @@ struct Inference {
   CorrectedParameters corrected;
   std::vector<double> minors;          ///< variates for sim::Randomisation::set_minors, at which hypotheses are fitted
   std::vector<SensorFinding> sensors;  ///< errors of declared sensors, given the conclusion
-  std::optional<ResidualLoad> residual;  ///< only if asked for
   std::optional<Validation> validation;  ///< only for a beat-averaged vehicle (DiagnosisPolicy::validate)
   Residuals nominal;                     ///< residuals of the vehicle file
   Residuals refit;                       ///< residuals with parameters fitted to the other flights, without effects

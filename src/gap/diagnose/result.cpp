@@ -111,8 +111,6 @@ Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flig
   const RowContext context = row_context_of(tests_of(flights), inference.noise_sd);
   add_hypotheses(context, uncertain, inference, r);
   r.suspects = suspects_of(r.hypotheses);
-  if (inference.residual)
-    r.loss_without_residual = inference.residual->loss_without, r.residual_loss = inference.residual->loss;
 
   const ScoredHypothesis& concluded = inference.conclusion();
   const ScoredHypothesis& unknown =

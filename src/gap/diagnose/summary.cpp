@@ -223,10 +223,6 @@ std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::strin
                                100 * diagnosis.closure->value, 100 * diagnosis.closure->low,
                                100 * diagnosis.closure->high));
   else lines.push_back("how much of that an effect closes cannot be told from noise");
-  if (diagnosis.loss_without_residual && diagnosis.residual_loss)
-    lines.push_back("mean loss in flights held out of the corrected vehicle: without its residual load " +
-                    loss(diagnosis.loss_without_residual) + ", with it " + loss(diagnosis.residual_loss) +
-                    (*diagnosis.residual_loss < *diagnosis.loss_without_residual ? "" : "; it is left out"));
   if (!diagnosis.moved_parameters.empty() && diagnosis.verdict.kind != VerdictKind::none) {
     lines.push_back("parameters that moved most, in standard deviations of what was believed:");
     for (std::size_t i = 0; i < diagnosis.moved_parameters.size() && i < kMoved; ++i)

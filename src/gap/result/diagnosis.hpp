@@ -167,11 +167,8 @@ struct Diagnosis {
   std::optional<double> nominal_loss, refit_loss, effect_loss;  ///< mean losses in held-out flights
   double noise_floor = 0;                                       ///< loss of noise alone
   std::optional<Closure> closure;                               ///< closure of the most probable fitted hypothesis
-  /// Mean losses in held-out flights of the corrected vehicle without its residual load and with it; none: not fitted,
-  /// or to a single flight.
-  std::optional<double> loss_without_residual, residual_loss;
-  std::vector<std::string> untestable;   ///< effects that cannot show in these logs
-  std::optional<Validation> validation;  ///< only for a beat-averaged vehicle
+  std::vector<std::string> untestable;                          ///< effects that cannot show in these logs
+  std::optional<Validation> validation;                         ///< only for a beat-averaged vehicle
   std::vector<ClosedLoop> closed_loop;
   /// None for a beat-averaged vehicle, a stopped diagnosis, no safe manoeuvre, or fewer than two probable hypotheses.
   std::optional<NextExperiment> next;

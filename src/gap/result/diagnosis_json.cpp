@@ -223,10 +223,6 @@ Diagnosis read(const Json& json) {
   d.effect_loss = optional_of(gap.at("effect"));
   d.noise_floor = gap.at("noise_floor");
   d.closure = closure_of(gap.at("closure"));
-  if (const auto residual = json.find("residual"); residual != json.end()) {
-    d.loss_without_residual = optional_of(residual->at("loss_without"));
-    d.residual_loss = optional_of(residual->at("loss"));
-  }
   d.untestable = json.at("untestable");
   for (const Json& s : json.value("suspects", Json::array()))
     d.suspects.push_back({s.at("effect"), s.at("probability"), closure_of(s.at("closure"))});
@@ -261,39 +257,36 @@ Json to_json(const Diagnosis& d) {
                            {"corrected", finite(c.corrected)}});
   Json sets = Json::object();
   for (const NamedDiagnosis& s : d.sets) sets[s.name] = to_json(s.diagnosis);
-  Json json = {{"schema", kDiagnosisSchema},
-               {"flights", d.flights},
-               {"reference", d.reference},
-               {"warnings", d.warnings},
-               {"data_faults", faults},
-               {"complete", d.complete},
-               {"verdict",
-                {{"kind", name_of(d.verdict.kind)},
-                 {"effects", d.verdict.effects},
-                 {"remainder", d.verdict.remainder},
-                 {"probability", d.verdict.probability}}},
-               {"hypotheses", hypotheses},
-               {"suspects", suspects},
-               {"unexplained", {{"jointly_with", d.jointly_with}, {"terms", terms}}},
-               {"other_law", d.other_law ? to_json(*d.other_law) : Json(nullptr)},
-               {"background", to_json(d.background)},
-               {"sensors", to_json(d.sensors)},
-               {"moved_parameters", moved},
-               {"gap",
-                {{"nominal", optional(d.nominal_loss)},
-                 {"refit", optional(d.refit_loss)},
-                 {"effect", optional(d.effect_loss)},
-                 {"noise_floor", d.noise_floor},
-                 {"closure", to_json(d.closure)}}},
-               {"closed_loop", closed_loop},
-               {"next_experiment", d.next ? to_json(*d.next) : Json(nullptr)},
-               {"untestable", d.untestable},
-               {"validation", d.validation ? to_json(*d.validation) : Json(nullptr)},
-               {"locations", locations},
-               {"sets", sets}};
-  if (d.residual_loss)
-    json["residual"] = {{"loss_without", optional(d.loss_without_residual)}, {"loss", optional(d.residual_loss)}};
-  return json;
+  return {{"schema", kDiagnosisSchema},
+          {"flights", d.flights},
+          {"reference", d.reference},
+          {"warnings", d.warnings},
+          {"data_faults", faults},
+          {"complete", d.complete},
+          {"verdict",
+           {{"kind", name_of(d.verdict.kind)},
+            {"effects", d.verdict.effects},
+            {"remainder", d.verdict.remainder},
+            {"probability", d.verdict.probability}}},
+          {"hypotheses", hypotheses},
+          {"suspects", suspects},
+          {"unexplained", {{"jointly_with", d.jointly_with}, {"terms", terms}}},
+          {"other_law", d.other_law ? to_json(*d.other_law) : Json(nullptr)},
+          {"background", to_json(d.background)},
+          {"sensors", to_json(d.sensors)},
+          {"moved_parameters", moved},
+          {"gap",
+           {{"nominal", optional(d.nominal_loss)},
+            {"refit", optional(d.refit_loss)},
+            {"effect", optional(d.effect_loss)},
+            {"noise_floor", d.noise_floor},
+            {"closure", to_json(d.closure)}}},
+          {"closed_loop", closed_loop},
+          {"next_experiment", d.next ? to_json(*d.next) : Json(nullptr)},
+          {"untestable", d.untestable},
+          {"validation", d.validation ? to_json(*d.validation) : Json(nullptr)},
+          {"locations", locations},
+          {"sets", sets}};
 }
 
 void write_diagnosis(const std::filesystem::path& folder, const Diagnosis& diagnosis) {

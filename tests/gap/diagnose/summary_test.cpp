@@ -80,12 +80,6 @@ TEST(Summary, SaysWhatToDoInThirtyLines) {
   EXPECT_NE(all().find("to tell wind from tether, swap the wings, then fly swapped_wings of "
                        "configs/gap/experiments/interventions.toml ("),
             std::string::npos);
-  r.loss_without_residual = 2;
-  r.residual_loss = 1;
-  EXPECT_NE(all().find("without its residual load 2, with it 1\n"), std::string::npos);
-  r.residual_loss = 3;
-  EXPECT_NE(all().find("without its residual load 2, with it 3; it is left out\n"), std::string::npos);
-  r.residual_loss.reset();
   EXPECT_NE(all().find("mean_bias_V recorded 1, by the vehicle's file 0, by the corrected one 0.9"), std::string::npos);
   for (const auto& [kind, begin] : {std::pair{VerdictKind::none, "No gap beyond noise"},
                                     {VerdictKind::parameters, "Nothing is missing"},
