@@ -31,8 +31,9 @@ inline Flights flown(const std::string& vehicle, const std::vector<std::string>&
   std::vector<std::string> all = {"vehicle=../vehicles/" + vehicle + ".toml", "flight.duration_s=8"};
   all.insert(all.end(), overrides.begin(), overrides.end());
   rollout::fly(rollout::read_fly_config(kTestConfigs + "fly/identify_multisine.toml", all), options);
-  return {std::make_shared<ResetPrediction>(
-      Recording(options.log_folder, flightlog::read_flight_log(options.log_folder), nominal_vehicle()))};
+  return {{},
+          {std::make_shared<ResetPrediction>(
+              Recording(options.log_folder, flightlog::read_flight_log(options.log_folder), nominal_vehicle()))}};
 }
 
 /// Rms of a group over the beats that it covers.

@@ -6,7 +6,7 @@ namespace flappy::benchmark {
 namespace {
 
 /// Sum of squares of all rows, in units of the noise variance.
-double energy(const gap::Flights& flights, const std::vector<double>& noise_sd, const gap::Residuals& residual) {
+double energy(const gap::FlightList& flights, const std::vector<double>& noise_sd, const gap::Residuals& residual) {
   std::vector<double> sums(gap::kGroups, 0);
   for (std::size_t f = 0; f < flights.size(); ++f)
     for (std::size_t j = 0; j < flights[f]->beats(); ++j)
@@ -26,10 +26,10 @@ double energy(const gap::Flights& flights, const std::vector<double>& noise_sd, 
 }  // namespace
 
 Baseline best_rmse(const gap::Flights& flights, const gap::Inference& d) {
-  const bool contrast = d.parameters.residual.size() > flights.size();
+  const bool contrast = flights.contrast();
   std::vector<std::pair<double, std::vector<std::string>>> left;
   for (const gap::ScoredHypothesis& a : d.hypotheses)
-    if (a.fitted()) left.emplace_back(energy(flights, d.noise_sd, contrast ? a.held_out : a.fit.residual), a.effects);
+    if (a.fitted()) left.emplace_back(energy(flights.tests, d.noise_sd, contrast ? a.held_out : a.fit.residual), a.effects);
   std::ranges::stable_sort(left, {}, [](const auto& h) { return h.first; });
   Baseline b;
   for (const auto& [sum, effects] : left)

@@ -38,7 +38,7 @@ Prediction predict(const Question& q) {
   Prediction p;
   if (d.corrected) {
     p.corrected = text_of(*std::move(d.corrected));
-    if (q.baseline) p.best_rmse = best_rmse(tests_of(d.flights), d.inference);
+    if (q.baseline) p.best_rmse = best_rmse(d.flights, d.inference);
   }
   p.diagnosis = std::move(d.result);
   return p;

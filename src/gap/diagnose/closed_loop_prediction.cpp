@@ -226,7 +226,7 @@ Quantities predict(const Sortie& sortie, const Recording& r, model::Vehicle vehi
 
 }  // namespace
 
-std::vector<ClosedLoop> predict_closed_loop(const Flights& flights, const model::Vehicle& nominal,
+std::vector<ClosedLoop> predict_closed_loop(const FlightList& flights, const model::Vehicle& nominal,
                                             const model::Vehicle& corrected, const rollout::FlyConfig& pilot,
                                             const ClosedLoopOptions& options) {
   const model::Vehicle* const vehicles[] = {&nominal, &corrected};

@@ -30,7 +30,7 @@ struct ClosedLoopOptions {
 
 /// The quantities above of each flight. Predictions are means over copies with different noise. The vehicle of `pilot`
 /// is not used.
-std::vector<ClosedLoop> predict_closed_loop(const Flights& flights, const model::Vehicle& nominal,
+std::vector<ClosedLoop> predict_closed_loop(const FlightList& flights, const model::Vehicle& nominal,
                                             const model::Vehicle& corrected, const rollout::FlyConfig& pilot,
                                             const ClosedLoopOptions& options = {});
 

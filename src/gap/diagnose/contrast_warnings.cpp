@@ -13,7 +13,7 @@ constexpr double kShortest_s = 9;
 /// A regime counts as not covered if more than this share of the beats of the tests is beyond the references'.
 constexpr double kMaxBeyond = 0.2;
 
-double duration_s(const Flights& flights) {
+double duration_s(const FlightList& flights) {
   double sum = 0;
   for (const auto& f : flights) sum += static_cast<double>(f->beats()) / f->beats_Hz();
   return sum;
@@ -41,7 +41,7 @@ void check_same_streams(const std::vector<flightlog::FlightLog>& logs, const std
 std::vector<std::string> contrast_warnings(const std::vector<flightlog::FlightHeader>& headers,
                                            const Flights& flights) {
   std::vector<std::string> lines;
-  const Flights references = references_of(flights), tests = tests_of(flights);
+  const auto& [references, tests] = flights;
   const auto differs = [&](const auto& same) {
     return !std::ranges::all_of(headers, [&](const auto& h) { return same(h, headers.front()); });
   };

@@ -143,7 +143,7 @@ namespace {
 
 /// Reference flights and their fit, for all sets that are compared with them.
 struct Reference {
-  Flights flights;
+  FlightList flights;
   std::unique_ptr<const ReferenceFit> fit;
 };
 
@@ -165,13 +165,11 @@ Diagnosed diagnose_flights(const DiagnosisRequest& request, const std::vector<st
   }
   while (reference.flights.size() < references) {
     const std::size_t f = reference.flights.size();
-    const auto flight = prediction_of(request.vehicle, folders[f], std::move(logs[f]), request.channels);
-    flight->set_reference();
-    reference.flights.push_back(flight);
+    reference.flights.push_back(prediction_of(request.vehicle, folders[f], std::move(logs[f]), request.channels));
   }
-  d.flights = reference.flights;
+  d.flights.references = reference.flights;
   for (std::size_t f = references; f < logs.size(); ++f)
-    d.flights.push_back(prediction_of(request.vehicle, folders[f], std::move(logs[f]), request.channels));
+    d.flights.tests.push_back(prediction_of(request.vehicle, folders[f], std::move(logs[f]), request.channels));
   InferenceOptions options = request.options;
   options.progress = progress;
   if (references > 0 && !reference.fit) {
@@ -210,7 +208,7 @@ void fly_closed_loop(const DiagnosisRequest& request, Diagnosed& d) {
   ClosedLoopOptions options;
   options.own_path = !request.settings.manoeuvre.empty();
   options.threads = request.settings.threads;
-  d.result.closed_loop = predict_closed_loop(d.flights, request.vehicle, *d.corrected, request.pilot, options);
+  d.result.closed_loop = predict_closed_loop(d.flights.tests, request.vehicle, *d.corrected, request.pilot, options);
 }
 
 void propose_experiment(const DiagnosisRequest& request, Diagnosed& d) {
@@ -218,7 +216,7 @@ void propose_experiment(const DiagnosisRequest& request, Diagnosed& d) {
   if (d.inference.hypotheses.size() < 2 || d.inference.hypotheses[1].probability < kMinRival) return;
   NextOptions options;
   options.threads = request.settings.threads;
-  options.references = references_of(d.flights);
+  options.references = d.flights.references;
   options.discrepancy = request.options.discrepancy;
   options.rule = request.options.rule;
   const std::vector<NextExperiment> ranked = rank_experiments(d.inference, *d.uncertain, request.manoeuvres, options);

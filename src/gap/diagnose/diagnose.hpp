@@ -63,7 +63,7 @@ struct Diagnosed {
   Diagnosis result;
   std::optional<model::Vehicle> corrected;  ///< none: the data are faulty, or the diagnosis was stopped
   // empty if the data are faulty:
-  Flights flights;                              ///< references first
+  Flights flights;
   std::optional<sim::Randomisation> uncertain;  ///< with the minor draws at their estimates
   Inference inference;
 };

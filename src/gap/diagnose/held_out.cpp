@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
+#include <numeric>
 #include <random>
 
 #include "io/statistics.hpp"
@@ -13,8 +14,6 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Fold of a flight that is never held out.
-constexpr int kNever = -1;
 /// Length of a block of rows that is resampled; number of resamples; number of shifted copies.
 constexpr double kBlock_s = 2;
 constexpr int kDraws = 1000, kCopies = 20;
@@ -32,14 +31,14 @@ std::string type_of(std::string name) {
 
 /// Calls use(flight, beat, row) for the mean row of each covered beat of a channel.
 template <class Use>
-void for_rows(const Flights& flights, int channel, const Use& use) {
+void for_rows(const FlightList& flights, int channel, const Use& use) {
   for (std::size_t f = 0; f < flights.size(); ++f)
     for (std::size_t j = 0; j < flights[f]->beats(); ++j)
       if (flights[f]->covers(j, channel))
         use(f, j, j * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients);
 }
 
-double rms_of(const Flights& flights, const Residuals& left, int channel) {
+double rms_of(const FlightList& flights, const Residuals& left, int channel) {
   double sum = 0, n = 0;
   for_rows(flights, channel, [&](std::size_t f, std::size_t, std::size_t row) {
     if (left[f].empty()) return;
@@ -49,14 +48,14 @@ double rms_of(const Flights& flights, const Residuals& left, int channel) {
   return n > 0 ? std::sqrt(sum / n) : 0;
 }
 
-std::vector<int> channels_of(const Flights& flights) {
+std::vector<int> channels_of(const FlightList& flights) {
   std::vector<int> list;
   for (int channel = 0; channel < kChannels; ++channel)
     if (flights.front()->has_rows(channel, 0)) list.push_back(channel);
   return list;
 }
 
-HeldOutError error_of(const Flights& flights, const Residuals& each, const Residuals& by_type, int channel) {
+HeldOutError error_of(const FlightList& flights, const Residuals& each, const Residuals& by_type, int channel) {
   HeldOutError e{channel_name(channel), rms_of(flights, each, channel), 0, 0, rms_of(flights, by_type, channel)};
   std::vector<double> sums, counts;
   std::vector<std::size_t> first;  // block of each flight
@@ -126,9 +125,9 @@ void control(const Flights& flights, const FittedHypothesis& all, const VectorXd
   for (std::size_t e = 0; e + 1 < vehicles.size(); ++e) {
     if (left[0].empty() || left[e + 1].empty()) continue;
     Validation::Control best{all.hypothesis.effects()[e], "", 0, 0};
-    for (const int channel : channels_of(flights)) {
+    for (const int channel : channels_of(flights.tests)) {
       std::vector<std::vector<double>> y(flights.size()), x(flights.size());
-      for_rows(flights, channel, [&](std::size_t f, std::size_t, std::size_t row) {
+      for_rows(flights.tests, channel, [&](std::size_t f, std::size_t, std::size_t row) {
         y[f].push_back(left[e + 1][f][row]);
         x[f].push_back(left[e + 1][f][row] - left[0][f][row]);
       });
@@ -188,19 +187,21 @@ void agree(const Fitter& fitter, const Flights& flights, const FittedHypothesis&
 std::vector<Residuals> held_out(const Fitter& fitter, const Flights& flights, const std::vector<FittedHypothesis>& fits,
                                 const std::vector<int>& fold, int threads) {
   const std::size_t folds = static_cast<std::size_t>(*std::ranges::max_element(fold)) + 1;
+  const std::size_t first = flights.references.size(), tests = flights.tests.size();
   const Evidence& evidence = fitter.evidence();
-  std::vector<Residuals> left(fits.size(), Residuals(flights.size()));
+  std::vector<Residuals> left(fits.size(), Residuals(tests));
   std::vector<VehicleHypothesis> vehicles;
   std::vector<BasisCoefficients> nuisances;
   for (std::size_t i = 0; i < fits.size(); ++i)
     for (std::size_t k = 0; k < folds; ++k) {
       const FittedHypothesis& fit = fits[i];
       std::vector<char> others(flights.size(), 1);
-      for (std::size_t f = 0; folds > 1 && f < flights.size(); ++f) others[f] = fold[f] != static_cast<int>(k) ? 1 : 0;
+      for (std::size_t f = 0; folds > 1 && f < tests; ++f) others[first + f] = fold[f] != static_cast<int>(k) ? 1 : 0;
       if (evidence.contrasts()) {  // references hold the parameters where they were linearised
         const BasisCoefficients explained = fitter.explained(*fit.fit, others);
-        for (std::size_t f = 0; f < flights.size(); ++f)
-          if (fold[f] == static_cast<int>(k)) left[i][f] = evidence.without(f, fit.fit->residual[f], explained);
+        for (std::size_t f = 0; f < tests; ++f)
+          if (fold[f] == static_cast<int>(k))
+            left[i][f] = evidence.without(first + f, fit.fit->residual[first + f], explained);
         continue;
       }
       Fitter::JointFit joint = fitter.joint_fit(fit.hypothesis, *fit.fit, others);
@@ -210,13 +211,12 @@ std::vector<Residuals> held_out(const Fitter& fitter, const Flights& flights, co
   if (evidence.contrasts()) return left;
   std::vector<Residuals> rows = residuals(flights, vehicles, threads);
   for (std::size_t i = 0; i < fits.size(); ++i)
-    for (std::size_t f = 0; f < flights.size(); ++f) {
-      if (fold[f] == kNever) continue;
+    for (std::size_t f = 0; f < tests; ++f) {
       const std::size_t k = i * folds + static_cast<std::size_t>(fold[f]);
-      Residuals& s = rows[k];
-      if (s.empty()) continue;
-      left[i][f] =
-          evidence.policy().nuisances_are_noise ? evidence.without(f, std::move(s[f]), nuisances[k]) : std::move(s[f]);
+      if (rows[k].empty()) continue;
+      Rows& s = rows[k][first + f];
+      left[i][f] = evidence.policy().nuisances_are_noise ? evidence.without(first + f, std::move(s), nuisances[k])
+                                                         : std::move(s);
     }
   return left;
 }
@@ -230,17 +230,20 @@ void hold_out(const Fitter& fitter, const sim::Randomisation& uncertain, const F
       fits.push_back({Hypothesis(uncertain, a.effects), &a.fit});
       of.push_back(&a.held_out);
     }
-  std::vector<int> each;  // references are never held out
-  int next = 0;
-  for (const auto& f : flights) each.push_back(f->is_reference() ? kNever : next++);
+  std::vector<int> each(flights.tests.size());
+  std::iota(each.begin(), each.end(), 0);
   std::vector<Residuals> left = held_out(fitter, flights, fits, each, threads);
   for (std::size_t i = 0; i < of.size(); ++i) *of[i] = std::move(left[i]);
 }
 
 Residuals smoothed_away(const Evidence& evidence, const Flights& flights, const Residuals& residual) {
   const RegimeBasis& basis = evidence.basis();
+  const FlightList& tests = flights.tests;
+  const auto values = [&](std::size_t f, std::size_t j) {
+    return basis.values(flights.references.size() + f).row(static_cast<Index>(j));
+  };
   Residuals left = residual;
-  for (const int channel : channels_of(flights)) {
+  for (const int channel : channels_of(tests)) {
     struct Sums {
       Eigen::MatrixXd normal;
       VectorXd right;
@@ -248,34 +251,34 @@ Residuals smoothed_away(const Evidence& evidence, const Flights& flights, const 
       void operator+=(const Sums& o) { normal += o.normal, right += o.right, n += o.n; }
     };
     const Sums none{Eigen::MatrixXd::Zero(basis.size(), basis.size()), VectorXd::Zero(basis.size())};
-    std::vector<Sums> of(flights.size(), none);
-    for_rows(flights, channel, [&](std::size_t f, std::size_t j, std::size_t row) {
+    std::vector<Sums> of(tests.size(), none);
+    for_rows(tests, channel, [&](std::size_t f, std::size_t j, std::size_t row) {
       if (residual[f].empty()) return;
-      const auto b = basis.values(f).row(static_cast<Index>(j));
+      const auto b = values(f, j);
       of[f].normal.noalias() += b.transpose() * b;
       of[f].right += residual[f][row] * b.transpose();
       of[f].n += 1;
     });
     std::vector<VectorXd> fits;
-    for (std::size_t out = 0; out < flights.size(); ++out) {
+    for (std::size_t out = 0; out < tests.size(); ++out) {
       Sums others = none;
-      for (std::size_t f = 0; f < flights.size(); ++f)
-        if (f != out || flights.size() == 1) others += of[f];
+      for (std::size_t f = 0; f < tests.size(); ++f)
+        if (f != out || tests.size() == 1) others += of[f];
       others.normal.diagonal().array() += kRidge * others.n;
       fits.push_back(others.normal.ldlt().solve(others.right));
     }
-    for_rows(flights, channel, [&](std::size_t f, std::size_t j, std::size_t row) {
-      if (!left[f].empty()) left[f][row] -= basis.values(f).row(static_cast<Index>(j)).dot(fits[f]);
+    for_rows(tests, channel, [&](std::size_t f, std::size_t j, std::size_t row) {
+      if (!left[f].empty()) left[f][row] -= values(f, j).dot(fits[f]);
     });
   }
   return left;
 }
 
-double mean_square(const Evidence& evidence, const Flights& flights, const Residuals& residual) {
+double mean_square(const Evidence& evidence, const FlightList& tests, const Residuals& residual) {
   double sum = 0, n = 0;
-  for (const int channel : channels_of(flights)) {
+  for (const int channel : channels_of(tests)) {
     const double noise = evidence.noise_sd(channel * kCoefficients);
-    for_rows(flights, channel, [&](std::size_t f, std::size_t, std::size_t row) {
+    for_rows(tests, channel, [&](std::size_t f, std::size_t, std::size_t row) {
       if (!residual[f].empty()) sum += std::pow(residual[f][row] / noise, 2), n += 1;
     });
   }
@@ -299,8 +302,8 @@ Validation validate(const Fitter& fitter, const sim::Randomisation& uncertain, c
   }
   std::vector<int> type;
   std::vector<std::string> types;
-  for (std::size_t f = 0; f < flights.size(); ++f) {
-    const std::string name = type_of(flights[f]->name());
+  for (const auto& flight : flights.tests) {
+    const std::string name = type_of(flight->name());
     if (!std::ranges::count(types, name)) types.push_back(name);
     type.push_back(static_cast<int>(std::ranges::find(types, name) - types.begin()));
   }
@@ -310,8 +313,8 @@ Validation validate(const Fitter& fitter, const sim::Randomisation& uncertain, c
     for (const Residuals* each : left) by_type.push_back(*each);  // holding out the only type leaves no flight
   const auto rung = [&](const std::string& added, const Residuals& each, const Residuals& by_types) {
     v.ladder.push_back({added, {}});
-    for (const int channel : channels_of(flights))
-      v.ladder.back().errors.push_back(error_of(flights, each, by_types, channel));
+    for (const int channel : channels_of(flights.tests))
+      v.ladder.back().errors.push_back(error_of(flights.tests, each, by_types, channel));
   };
   rung("file", d.nominal, d.nominal);
   for (std::size_t i = 0; i < fits.size(); ++i)

@@ -180,20 +180,6 @@ const ScoredHypothesis& Inference::predicting() const {
   });
 }
 
-namespace {
-
-/// Drops the residuals of reference flights, which are no part of the answer.
-void keep_tests(std::size_t references, Inference& d) {
-  const auto keep = [&](Residuals& r) {
-    r.erase(r.begin(), r.begin() + static_cast<std::ptrdiff_t>(std::min(references, r.size())));
-  };
-  keep(d.nominal);
-  keep(d.refit);
-  for (ScoredHypothesis& a : d.hypotheses) keep(a.held_out);
-}
-
-}  // namespace
-
 VerdictRule rule_for(const RobotFit& robot, VerdictRule rule) {
   if (!robot.evidence().contrasts() || robot.evidence().basis().covers_all()) return rule;
   rule.gain.outside_by_chance_nats = rule.gain.by_chance_nats;
@@ -204,14 +190,14 @@ VerdictRule rule_for(const RobotFit& robot, VerdictRule rule) {
   return rule;
 }
 
-ReferenceFit::ReferenceFit(const Flights& flights, const sim::Randomisation& uncertain, const InferenceOptions& options)
-    : fit(RobotFit::of_references(flights, uncertain, options.discrepancy, options.withheld, options.threads)),
+ReferenceFit::ReferenceFit(const FlightList& references, const sim::Randomisation& uncertain,
+                           const InferenceOptions& options)
+    : flights{references, {}},
+      fit(RobotFit::of_references(flights, uncertain, options.discrepancy, options.withheld, options.threads)),
       corrected{{}, fit.parameters().at, fit.uncertain().minors()} {
   if (uncertain.nominal().beat_averaged) return;
-  // A contrast needs no description of what the model gets wrong, but a corrected vehicle does. In flights that are no
-  // references, effects act.
-  Flights alone;
-  for (const auto& flight : flights) alone.push_back(flight->corrected({}));
+  // a contrast needs no description of what the model gets wrong, but a corrected vehicle does; effects act in it
+  const Flights alone{{}, references};
   const RobotFit robot(alone, uncertain, options.discrepancy, options.withheld, options.threads);
   corrected = corrected_parameters(robot, robot.fitter(), robot.no_effects(), robot.parameters());
 }
@@ -242,7 +228,7 @@ Inference infer(const Flights& flights, const sim::Randomisation& uncertain, Inf
   d.untestable = catalogue.untestable;
   d.parameters = robot.parameters();
   d.minors = robot.uncertain().minors();
-  d.nominal = robot.nominal().residual;
+  d.nominal = tests_of(flights, robot.nominal().residual);
   for (int g = 0; g < kGroups; ++g) d.noise_sd.push_back(robot.evidence().noise_sd(g));
   d.hypotheses = {baselines.none, baselines.parameters, baselines.unknown};
   for (auto* part : {&sets.hypotheses, &remainders})
@@ -260,7 +246,6 @@ Inference infer(const Flights& flights, const sim::Randomisation& uncertain, Inf
   d.corrected = correct(robot, fitter, reference, d);
   if (robot.evidence().policy().validate && reference == nullptr)
     d.validation = validate(fitter, robot.uncertain(), flights, d, threads);
-  keep_tests(references_of(flights).size(), d);
   return d;
 }
 

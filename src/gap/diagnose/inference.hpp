@@ -31,7 +31,7 @@ struct ScoredHypothesis {
   Fit fit;                                ///< effects and parameters; without a residual if fitted only linearly
   /// The largest deviation of an effect by the place from the catalogue's law. None: the law factor does not exceed 1.
   std::optional<FreeBlock> other_law;
-  Residuals held_out;  ///< [flight], fitted to the others, a lone one to itself; empty if not fitted by simulation
+  Residuals held_out;  ///< [test flight], fitted to the others, a lone one to itself; empty if not fitted by simulation
   /// Effects of another hypothesis whose fit predicts for this one: its own effects and further ones, whose gain may be
   /// due to chance. Empty: its own fit predicts.
   std::vector<std::string> predicted_with;
@@ -72,8 +72,9 @@ struct Inference {
   std::vector<double> minors;          ///< variates for sim::Randomisation::set_minors, at which hypotheses are fitted
   std::vector<SensorFinding> sensors;  ///< errors of declared sensors, given the conclusion
   std::optional<Validation> validation;  ///< only for a beat-averaged vehicle (DiagnosisPolicy::validate)
-  Residuals nominal;                     ///< residuals of the vehicle file
-  Residuals refit;                       ///< residuals with parameters fitted to the other flights, without effects
+  Residuals nominal;                     ///< [test flight] residuals of the vehicle file
+  /// [test flight] Residuals with parameters fitted to the other flights, without effects.
+  Residuals refit;
   std::vector<double> noise_sd;  ///< [channel and coefficient of the beat] standard deviation of the noise of a row
 
   const ScoredHypothesis& conclusion() const { return hypotheses[concluded]; }
@@ -83,8 +84,8 @@ struct Inference {
 
 /// What a contrast takes from its reference flights.
 struct ReferenceFit {
-  /// Keeps a reference to `flights`.
-  ReferenceFit(const Flights& flights, const sim::Randomisation& uncertain, const InferenceOptions& options);
+  ReferenceFit(const FlightList& references, const sim::Randomisation& uncertain, const InferenceOptions& options);
+  Flights flights;                ///< the references, without tests
   RobotFit fit;                   ///< as RobotFit::of_references
   CorrectedParameters corrected;  ///< without effects
 };
@@ -93,7 +94,7 @@ struct ReferenceFit {
 VerdictRule rule_for(const RobotFit& robot, VerdictRule rule);
 
 /// Runs all stages on the flights of one robot. After a stop it decides among the hypotheses fitted by then.
-/// `reference`: of the reference flights among them; null: there are none.
+/// `reference`: of its references; null: there are none.
 Inference infer(const Flights& flights, const sim::Randomisation& uncertain, InferenceOptions options,
                 const ReferenceFit* reference = nullptr);
 

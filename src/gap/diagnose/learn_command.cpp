@@ -24,13 +24,11 @@ std::vector<fs::path> flights_of(const fs::path& robot) {
   return flights;
 }
 
-/// Appends the flights in a folder.
-void read_flights(const std::string& from, const model::Vehicle& vehicle, bool reference, Flights& to) {
-  for (const fs::path& folder : flights_of(from)) {
-    const auto flight = prediction_of(vehicle, folder, flightlog::read_faultless_log(folder));
-    if (reference) flight->set_reference();
-    to.push_back(flight);
-  }
+FlightList read_flights(const std::string& from, const model::Vehicle& vehicle) {
+  FlightList list;
+  for (const fs::path& folder : flights_of(from))
+    list.push_back(prediction_of(vehicle, folder, flightlog::read_faultless_log(folder)));
+  return list;
 }
 
 std::string learnt_from(std::size_t count, const char* of) {
@@ -54,10 +52,7 @@ void run_learn_discrepancy(const LearnCommand& command) {
   if (!command.robots.empty() && !command.pairs.empty())
     throw io::InputError("--robots and --pairs: are both given; accepted: one of them");
   std::vector<Flights> robots;
-  for (const std::string& robot : command.robots) {
-    robots.emplace_back();
-    read_flights(robot, vehicle, false, robots.back());
-  }
+  for (const std::string& robot : command.robots) robots.push_back({{}, read_flights(robot, vehicle)});
   std::vector<SessionPair> pairs;
   for (const std::string& pair : command.pairs) {
     std::vector<std::string> parts(1);
@@ -68,9 +63,7 @@ void run_learn_discrepancy(const LearnCommand& command) {
     if (parts.size() < 2 || parts.size() > 3)
       throw io::InputError("--pairs " + pair +
                            ": accepted: REFERENCE:TEST, two folders of flights, or REFERENCE:TEST:EFFECT");
-    pairs.emplace_back();
-    read_flights(parts[0], vehicle, true, pairs.back().flights);
-    read_flights(parts[1], vehicle, false, pairs.back().flights);
+    pairs.push_back({{read_flights(parts[0], vehicle), read_flights(parts[1], vehicle)}, ""});
     if (parts.size() < 3) continue;
     if (model::find_effect(vehicle, parts[2]) == nullptr)
       throw io::InputError("--pairs " + pair + ": no effect " + parts[2] +

@@ -78,7 +78,7 @@ VehicleTopics topics_of(const std::string& name, const std::shared_ptr<const Pre
   topics.name = name;
   for (const ImuResidual& r : seen->imu_residuals(h))
     topics.imu.push_back({r.sample, array_of(r.force_m_s2), array_of(r.rate_rad_s)});
-  const Residuals left = residuals({flight}, {h}, 1).front();
+  const Residuals left = residuals({{}, {flight}}, {h}, 1).front();
   if (topics.imu.empty() || left.empty())
     io::refuse(file, "its simulation of this flight diverges, or no part of the flight can be replayed",
                "a vehicle that flies what was flown");

@@ -243,9 +243,9 @@ std::optional<NextExperiment> expected_information(const Manoeuvre& m, const std
     flown.push_back(fly(rivals[i]));
     if (flown.back().lost || !flown.back().log) return {};
   }
-  Flights flights = options.references;
-  flights.push_back(
-      std::make_shared<ResetPrediction>(Recording(m.name, *flown.front().log, rivals.front().vehicle().vehicle)));
+  const Flights flights{options.references,
+                        {std::make_shared<ResetPrediction>(
+                            Recording(m.name, *flown.front().log, rivals.front().vehicle().vehicle))}};
   const Fitter fitter(flights, std::make_shared<const Evidence>(flights, options.discrepancy, 1), 1);
   const Evidence& evidence = fitter.evidence();
   std::vector<std::optional<Expected>> expected(rivals.size());

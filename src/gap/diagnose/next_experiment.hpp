@@ -46,7 +46,7 @@ std::vector<Manoeuvre> read_manoeuvres(const std::filesystem::path& folder,
 struct NextOptions {
   int threads = 0;
   double least_probability = 0.01;  ///< least probability of a rival
-  Flights references;               ///< reference flights of a contrast; empty: no contrast
+  FlightList references;            ///< reference flights of a contrast; empty: no contrast
   ModelDiscrepancy discrepancy = read_model_discrepancy();
   VerdictRule rule = read_verdict_rule();
 };

@@ -108,7 +108,7 @@ Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flig
   r.verdict = inference.verdict;
   r.validation = inference.validation;
   r.untestable = inference.untestable;
-  const RowContext context = row_context_of(tests_of(flights), inference.noise_sd);
+  const RowContext context = row_context_of(flights.tests, inference.noise_sd);
   add_hypotheses(context, uncertain, inference, r);
   r.suspects = suspects_of(r.hypotheses);
 

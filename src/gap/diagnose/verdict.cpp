@@ -23,13 +23,13 @@ const ScoredHypothesis& parameters_alone(const std::vector<ScoredHypothesis>& al
 
 /// Refutes hypotheses that explain too little of what depends on the regime in held-out flights, however probable.
 void refute(const Evidence& evidence, const Flights& flights, double min_share, Inference& d) {
-  const double refit = mean_square(evidence, flights, d.refit);
-  const double explainable = refit - mean_square(evidence, flights, smoothed_away(evidence, flights, d.refit));
+  const double refit = mean_square(evidence, flights.tests, d.refit);
+  const double explainable = refit - mean_square(evidence, flights.tests, smoothed_away(evidence, flights, d.refit));
   if (!(explainable > kMinExplainable * refit)) return;
   for (ScoredHypothesis& a : d.hypotheses) {
     if (a.kind == HypothesisKind::unknown) continue;
-    const double left = a.kind == HypothesisKind::none ? mean_square(evidence, flights, d.nominal)
-                        : a.fitted()                   ? mean_square(evidence, flights, a.held_out)
+    const double left = a.kind == HypothesisKind::none ? mean_square(evidence, flights.tests, d.nominal)
+                        : a.fitted()                   ? mean_square(evidence, flights.tests, a.held_out)
                                                        : refit;
     const double share = (refit - left) / explainable;
     if (share < min_share) a.log_evidence = kRefuted;
@@ -37,8 +37,8 @@ void refute(const Evidence& evidence, const Flights& flights, double min_share, 
 }
 
 /// Refutes hypotheses with an effect that does not lower the loss of flights held out.
-void refute_idle_effects(const Flights& flights, Inference& d) {
-  const RowContext context = row_context_of(flights, d.noise_sd);
+void refute_idle_effects(const FlightList& tests, Inference& d) {
+  const RowContext context = row_context_of(tests, d.noise_sd);
   const std::optional<double> alone = losses_of(context, d.refit).mean();
   std::vector<ScoredHypothesis>& all = d.hypotheses;
   std::vector<std::optional<double>> losses;
@@ -238,7 +238,7 @@ void decide(const RobotFit& robot, const Fitter& fitter, const Flights& flights,
   if (rule.refutation.min_share > 0) refute(robot.evidence(), flights, rule.refutation.min_share, d);
   if (policy.discrepancy_scales && !robot.evidence().contrasts())
     share_backgrounds(robot, fitter.scales(), rule.unknown.penalty_nats, d.hypotheses);
-  if (!robot.evidence().contrasts()) refute_idle_effects(flights, d);
+  if (!robot.evidence().contrasts()) refute_idle_effects(flights.tests, d);
   set_probabilities(d.hypotheses, rule);
   conclude(rule, d, robot.evidence().contrasts());
   if (policy.discrepancy_scales) predict_with_the_likeliest(d);

@@ -62,13 +62,13 @@ Evidence::Evidence(const Flights& flights, ModelDiscrepancy discrepancy, int thr
       threads_(threads),
       basis_(std::make_shared<const RegimeBasis>(flights)),
       groups_(kGroups) {
-  for (const auto& f : flights) weights_.emplace_back(f->beats() * kRowsPerBeat, 1.0);
+  for (const auto& f : flights.all()) weights_.emplace_back(f->beats() * kRowsPerBeat, 1.0);
   for (int channel = 0; channel < kChannels; ++channel) {
     double all = 0;
     for (int c = 0; c < kCoefficients; ++c) {
       const int g = channel * kCoefficients + c;
       double sum = 0, n = 0;
-      for (const auto& f : flights)
+      for (const auto& f : flights.all())
         for (std::size_t j = 0; j < f->beats(); ++j)
           if (f->covers(j, channel) && has_rows(g))
             sum += f->signal()[row_of(j, g)] * f->signal()[row_of(j, g)], n += 1;
@@ -157,12 +157,12 @@ VectorXd Evidence::session_means(const Residuals& residual, int group) const {
     double sum = 0, n = 0;
     for (std::size_t f = 0; f < flights_->size(); ++f)
       for_rows(f, group / kCoefficients, [&](std::size_t j, bool) {
-        if (flight(f).is_reference() == references) sum += residual[f][row_of(j, group)], n += 1;
+        if (flights_->is_reference(f) == references) sum += residual[f][row_of(j, group)], n += 1;
       });
     return n > 0 ? sum / n : 0;
   };
   const bool contrast = contrasts();
-  delta[0] = mean_of(contrast || flight(0).is_reference());
+  delta[0] = mean_of(contrast || flights_->is_reference(0));
   for (int i = 0; contrast && i < basis().size(); ++i)
     if (basis().of_tests(i) && basis().kind(i) == BasisFunction::constant) delta[i] = mean_of(false) - delta[0];
   return delta;

@@ -143,7 +143,7 @@ class Evidence {
   /// Whether test flights are compared with references.
   bool contrasts() const { return basis_->contrasts(); }
   const ModelDiscrepancy& discrepancy() const { return discrepancy_; }
-  const DiagnosisPolicy& policy() const { return flights_->front()->policy(); }
+  const DiagnosisPolicy& policy() const { return flight(0).policy(!flights_->references.empty()); }
 
   /// Coefficients of rows on the basis, by least squares. Simulated differences are rough, as a small change moves the
   /// step in which a wing meets its stop; what is not smooth in the regime is noise under every hypothesis.

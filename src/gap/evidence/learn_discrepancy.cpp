@@ -292,15 +292,17 @@ SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim
     line.show(done / count, io::format("fitting pair %.0f", done + 1));
     done += 1;
   };
-  const auto of_references = [&](const SessionPair& p) {
-    return RobotFit::of_references(references_of(p.flights), uncertain, start, {}, threads);
+  const auto fit = [&](const SessionPair& p) {
+    const Flights references{p.flights.references, {}};
+    return std::make_unique<const RobotFit>(RobotFit::of_references(references, uncertain, start, {}, threads),
+                                            p.flights);
   };
   Robots harmless;
   for (const SessionPair& p : pairs) {
     if (!p.effect.empty()) continue;
     go_on();
-    harmless.push_back(std::make_unique<const RobotFit>(of_references(p), p.flights));
-    for (const auto& f : p.flights) f->forget();
+    harmless.push_back(fit(p));
+    for (const auto& f : p.flights.all()) f->forget();
   }
   ModelDiscrepancy now = start;
   for (int n = 1; n <= kIterations && !harmless.empty(); ++n) {
@@ -320,9 +322,8 @@ SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim
   for (const SessionPair& p : pairs) {
     if (p.effect.empty()) continue;
     go_on();
-    const RobotFit robot(of_references(p), p.flights);
-    if (const auto error = law_error(robot, p.effect, now)) errors.emplace_back(p.effect, *error);
-    for (const auto& f : p.flights) f->forget();
+    if (const auto error = law_error(*fit(p), p.effect, now)) errors.emplace_back(p.effect, *error);
+    for (const auto& f : p.flights.all()) f->forget();
   }
   heed();
   const auto asked = std::ranges::count_if(pairs, [](const SessionPair& p) { return !p.effect.empty(); });

@@ -17,7 +17,7 @@ ModelDiscrepancy learn_discrepancy(const std::vector<Flights>& flights, const si
 
 /// Two sessions of a robot.
 struct SessionPair {
-  Flights flights;     ///< references and then test flights
+  Flights flights;
   std::string effect;  ///< effect of the catalogue that appeared between them; empty: none
 };
 

@@ -15,7 +15,7 @@ void RegimeBasis::append_functions(const Flights& flights) {
   values_.resize(flights.size());
   std::vector<std::vector<RegimeFunction>> functions;
   std::vector<Eigen::VectorXd> column;
-  for (const auto& f : flights) {
+  for (const auto& f : flights.all()) {
     functions.push_back(f->functions());
     column.push_back(Eigen::VectorXd::Ones(static_cast<Eigen::Index>(f->beats())));
   }
@@ -35,18 +35,19 @@ void RegimeBasis::append_functions(const Flights& flights) {
     functions_.push_back({name, quantity, kind});
   };
   append("1", "always", BasisFunction::constant);
-  if (flights.empty()) return;
+  if (flights.size() == 0) return;
   for (std::size_t f = 1; f < flights.size(); ++f)
     if (!std::ranges::equal(functions[f], functions.front(), {}, &RegimeFunction::name, &RegimeFunction::name))
-      throw io::InputError(flights[f]->name() + ": has other streams than " + flights.front()->name() +
+      throw io::InputError(flights[f]->name() + ": has other streams than " + flights[0]->name() +
                            "; accepted: flights with the same streams");
   for (std::size_t i = 0; i < functions.front().size(); ++i) {
     for (std::size_t f = 0; f < flights.size(); ++f) column[f] = functions[f][i].values;
     append(functions.front()[i].name, functions.front()[i].quantity, functions.front()[i].kind);
   }
   // an offset for each flight would otherwise look like an influence of that flight's height
-  for (std::size_t offset = 1; offset < flights.size() && flights.front()->policy().flight_offsets; ++offset) {
-    if (flights[offset]->is_reference() != flights[offset - 1]->is_reference()) continue;  // the first of the tests
+  const bool offsets = flights[0]->policy(!flights.references.empty()).flight_offsets;
+  for (std::size_t offset = 1; offset < flights.size() && offsets; ++offset) {
+    if (flights.is_reference(offset) != flights.is_reference(offset - 1)) continue;  // the first of the tests
     for (std::size_t f = 0; f < flights.size(); ++f) column[f].setConstant(f == offset ? 1 : 0);
     append("flight " + flights[offset]->name(), "flight", BasisFunction::flight);
   }
@@ -54,7 +55,7 @@ void RegimeBasis::append_functions(const Flights& flights) {
   const auto index = [&](const std::string& name) {
     return static_cast<int>(std::ranges::find(functions_, name, &Function::name) - functions_.begin());
   };
-  const std::vector<std::pair<std::string, std::string>> products = flights.front()->products();
+  const std::vector<std::pair<std::string, std::string>> products = flights[0]->products();
   if (std::ranges::any_of(products, [&](const auto& p) { return std::max(index(p.first), index(p.second)) >= size(); }))
     return;
   for (const auto& [a, b] : products) {
@@ -65,12 +66,12 @@ void RegimeBasis::append_functions(const Flights& flights) {
 }
 
 void RegimeBasis::append_of_tests(const Flights& flights) {
-  if (references_of(flights).empty()) return;
+  if (!flights.contrast()) return;
   const int once = size();
   for (int i = 0; i < once; ++i) {
     if (kind(i) == BasisFunction::flight) continue;
     for (std::size_t f = 0; f < flights.size(); ++f) {
-      const Eigen::VectorXd column = (flights[f]->is_reference() ? 0.0 : 1.0) * values_[f].col(i);
+      const Eigen::VectorXd column = (flights.is_reference(f) ? 0.0 : 1.0) * values_[f].col(i);
       values_[f].conservativeResize(column.size(), values_[f].cols() + 1);
       values_[f].rightCols(1) = column;
     }
@@ -91,7 +92,7 @@ void RegimeBasis::append_of_tests(const Flights& flights) {
     const double elsewhere =
         std::ranges::min_element(values_, {}, [&](const auto& v) { return v(0, i); })->operator()(0, i);
     in_tests_(i, once) = elsewhere;
-    if (flights[static_cast<std::size_t>(largest - values_.begin())]->is_reference()) continue;
+    if (flights.is_reference(static_cast<std::size_t>(largest - values_.begin()))) continue;
     in_tests_(i, i) = 1;
     in_tests_(i, 0) = -elsewhere;
   }
@@ -100,18 +101,17 @@ void RegimeBasis::append_of_tests(const Flights& flights) {
 /// By the mean over a class's functions of their variance in the references over that in the tests, at most 1 each.
 void RegimeBasis::find_covered(const Flights& flights) {
   constexpr double kCovered = 0.5;
-  const Flights references = references_of(flights);
   const auto variance = [&](int i, bool of_reference) {
     double sum = 0, squares = 0, n = 0;
     for (std::size_t f = 0; f < flights.size(); ++f) {
-      if (flights[f]->is_reference() != of_reference) continue;
+      if (flights.is_reference(f) != of_reference) continue;
       const auto v = values_[f].col(i);
       sum += v.sum(), squares += v.squaredNorm(), n += static_cast<double>(v.size());
     }
     return squares / n - sum * sum / (n * n);
   };
   std::array<double, static_cast<std::size_t>(Regimes::count)> shares{}, counts{};
-  for (int i = 1; !references.empty() && i < size() && !of_tests(i); ++i) {
+  for (int i = 1; flights.contrast() && i < size() && !of_tests(i); ++i) {
     if (kind(i) == BasisFunction::flight) continue;
     const auto c = static_cast<std::size_t>(regimes_of(kind(i)));
     const double in_tests = variance(i, false);

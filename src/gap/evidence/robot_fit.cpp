@@ -39,7 +39,7 @@ bool of_sides(const model::CatalogueEffect& effect) {
 
 /// `withheld`, and tether unless each flight in which effects act has a ground: it would hang down to nowhere.
 std::vector<std::string> without_idle(std::vector<std::string> withheld, const Flights& flights) {
-  if (!std::ranges::all_of(tests_of(flights), [](const auto& flight) { return flight->has_ground(); }))
+  if (!std::ranges::all_of(flights.tests, [](const auto& flight) { return flight->has_ground(); }))
     withheld.emplace_back(model::Tether::kInfo.id);
   return withheld;
 }

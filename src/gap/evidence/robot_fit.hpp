@@ -18,14 +18,13 @@ class RobotFit {
   /// Fits; keeps a reference to `flights`. `withheld`: effects to leave out; `threads`: as for io::parallel_for.
   RobotFit(const Flights& flights, const sim::Randomisation& uncertain, const ModelDiscrepancy& discrepancy,
            std::vector<std::string> withheld, int threads);
-  /// Fits the parameters alone, to reference flights: what a model of this robot gets wrong cancels in a contrast, so it
+  /// Fits the parameters alone, to flights without tests: what a model of this robot gets wrong cancels in a contrast, so it
   /// needs no further description.
   static RobotFit of_references(const Flights& flights, const sim::Randomisation& uncertain,
                                 const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads);
-  /// A contrast: `flights` are those of `reference`, set_reference(), and test flights of the same robot. Linearises
-  /// around the parameters of `reference`; an effect's magnitude acts in the test flights alone.
+  /// A contrast: `flights` has the references of `reference`, and test flights of the same robot. Linearises around the parameters of `reference`; an effect's magnitude acts in the test flights alone.
   RobotFit(const RobotFit& reference, const Flights& flights);
-  /// For flights like those that are planned, references first: fits nothing, and takes the declared noise and the
+  /// For flights like those that are planned: fits nothing, and takes the declared noise and the
   /// prior scales of what models get wrong.
   static RobotFit planned(const Flights& flights, const sim::Randomisation& uncertain,
                           const ModelDiscrepancy& discrepancy, int threads);

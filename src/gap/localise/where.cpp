@@ -214,7 +214,7 @@ class ChannelRows {
 
 }  // namespace
 
-RowContext row_context_of(const Flights& flights, std::vector<double> noise_sd) {
+RowContext row_context_of(const FlightList& flights, std::vector<double> noise_sd) {
   RowContext s;
   s.noise_sd = std::move(noise_sd);
   for (const auto& f : flights) {

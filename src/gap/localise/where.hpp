@@ -43,7 +43,7 @@ struct RowContext {
     return covered[flight][beat * kChannels + static_cast<std::size_t>(channel)] != 0;
   }
 };
-RowContext row_context_of(const Flights& flights, std::vector<double> noise_sd);
+RowContext row_context_of(const FlightList& flights, std::vector<double> noise_sd);
 
 /// All rows of the table for one stage. `residual`: [flight], empty where the simulation diverged. In the test of an
 /// input, `gap` and `noise_floor` are the rms of the part proportional to it.

@@ -138,20 +138,18 @@ class Planner {
     return all;
   }
 
-  /// Flights of the vehicle as the file has it, references first; empty if it cannot fly them.
+  /// Flights of the vehicle as the file has it; none if it cannot fly them.
   Flights fly(const Session& session) const {
     Flights flights;
     if (session.manoeuvre == nullptr) {
-      const auto add = [&](const std::vector<std::string>& folders, bool reference) {
-        for (const std::string& folder : folders) {
-          const auto flight =
-              std::make_shared<ResetPrediction>(Recording(folder, flightlog::read_faultless_log(folder), vehicle_));
-          if (reference) flight->set_reference();
-          flights.push_back(flight);
-        }
+      const auto add = [&](const std::vector<std::string>& folders, FlightList& to) {
+        for (const std::string& folder : folders)
+          to.push_back(
+              std::make_shared<ResetPrediction>(Recording(folder, flightlog::read_faultless_log(folder), vehicle_)));
       };
-      if (session.reference) add(settings_.like_reference.empty() ? settings_.like : settings_.like_reference, true);
-      add(settings_.like, false);
+      if (session.reference)
+        add(settings_.like_reference.empty() ? settings_.like : settings_.like_reference, flights.references);
+      add(settings_.like, flights.tests);
       return flights;
     }
     const auto fly = [&](rollout::FlyConfig config, std::size_t count) {
@@ -166,10 +164,9 @@ class Planner {
       std::ranges::move(fly(session.further->config, session.flights), std::back_inserter(flown));
     for (std::size_t i = 0; i < flown.size(); ++i) {
       if (flown[i].lost || !flown[i].log) return {};
-      const auto flight =
-          std::make_shared<ResetPrediction>(Recording(session.manoeuvre->name, std::move(*flown[i].log), vehicle_));
-      if (session.reference && i < session.flights) flight->set_reference();
-      flights.push_back(flight);
+      (session.reference && i < session.flights ? flights.references : flights.tests)
+          .push_back(
+              std::make_shared<ResetPrediction>(Recording(session.manoeuvre->name, std::move(*flown[i].log), vehicle_)));
     }
     return flights;
   }
@@ -185,7 +182,7 @@ class Planner {
 
   std::optional<Separation> separation(const Session& session, bool sure) const {
     const Flights flights = fly(session);
-    if (flights.empty()) return {};
+    if (flights.tests.empty()) return {};
     ModelDiscrepancy discrepancy = discrepancy_;
     if (session.reference)
       discrepancy.session = read_session_variation(file(settings_.sessions, "gap/session_variation.toml"));

@@ -49,8 +49,8 @@ class BeatAveragedPrediction final : public PredictedFlight {
   std::vector<std::pair<std::string, std::string>> products() const override { return {}; }
   std::vector<RegimeQuantity> regimes() const override;
   std::vector<RegimeQuantity> inputs() const override;
-  const DiagnosisPolicy& policy() const override {
-    return is_reference() ? kBeatAveragedContrastPolicy : kBeatAveragedPolicy;
+  const DiagnosisPolicy& policy(bool with_references) const override {
+    return with_references ? kBeatAveragedContrastPolicy : kBeatAveragedPolicy;
   }
 
  private:

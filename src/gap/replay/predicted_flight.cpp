@@ -1,7 +1,5 @@
 #include "gap/replay/predicted_flight.hpp"
 
-#include <algorithm>
-
 namespace flappy::gap {
 
 const char* channel_name(int channel) {
@@ -20,13 +18,10 @@ const char* channel_unit(int channel) {
   return channel < kTurnX ? "m/s^2" : "rad/s";
 }
 
-Flights tests_of(const Flights& flights) {
-  return {flights.begin() + static_cast<std::ptrdiff_t>(references_of(flights).size()), flights.end()};
-}
-
-Flights references_of(const Flights& flights) {
-  const auto tests = std::ranges::find_if(flights, [](const auto& f) { return !f->is_reference(); });
-  return tests == flights.end() ? Flights() : Flights(flights.begin(), tests);
+FlightList Flights::all() const {
+  FlightList list = references;
+  list.insert(list.end(), tests.begin(), tests.end());
+  return list;
 }
 
 }  // namespace flappy::gap

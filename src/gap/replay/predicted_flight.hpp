@@ -85,15 +85,10 @@ struct RegimeQuantity {
 class PredictedFlight {
  public:
   virtual ~PredictedFlight() = default;
-  /// Whether the flight is a reference: the robot is believed to have been free of the effects asked about.
-  bool is_reference() const { return memo_ != nullptr; }
-  void set_reference() { memo_ = std::make_shared<ResidualMemo>(); }
-  /// Only of a reference.
+  /// Residuals without the effects of a vehicle, which hypotheses share if the flight is a reference.
   ResidualMemo& memo() const { return *memo_; }
   /// Frees what is kept to be faster: hundreds of megabytes.
-  virtual void forget() const {
-    if (memo_) memo_->clear();
-  }
+  virtual void forget() const { memo_->clear(); }
   virtual const std::string& name() const = 0;
   virtual bool has_ground() const = 0;    ///< whether the log declares a ground
   virtual std::size_t beats() const = 0;  ///< number of beats; of a beat-averaged vehicle, number of rows in time
@@ -122,8 +117,9 @@ class PredictedFlight {
   virtual std::vector<std::pair<std::string, std::string>> products() const = 0;
   virtual std::vector<RegimeQuantity> regimes() const = 0;
   virtual std::vector<RegimeQuantity> inputs() const = 0;
-  /// Rules of the diagnosis for this kind of vehicle. Those of a diagnosis' first flight hold for all of its flights.
-  virtual const DiagnosisPolicy& policy() const = 0;
+  /// Rules of the diagnosis for this kind of vehicle, with reference flights or without. Those of a diagnosis' first
+  /// flight hold for all of its flights.
+  virtual const DiagnosisPolicy& policy(bool with_references) const = 0;
   /// Null for beat-averaged vehicles.
   virtual const Recording* recording() const { return nullptr; }
   /// The same beats with another log. Null for beat-averaged vehicles.
@@ -133,14 +129,23 @@ class PredictedFlight {
   virtual std::shared_ptr<const PredictedFlight> corrected(const EffectValues& /*sensors*/) const { return nullptr; }
 
  private:
-  std::shared_ptr<ResidualMemo> memo_;
+  std::shared_ptr<ResidualMemo> memo_ = std::make_shared<ResidualMemo>();
 };
 
-/// The flights of one robot; in a contrast, references and then test flights.
-using Flights = std::vector<std::shared_ptr<const PredictedFlight>>;
-/// The references; none if there are no test flights to compare with them.
-Flights references_of(const Flights& flights);
-/// The flights that are no references_of().
-Flights tests_of(const Flights& flights);
+using FlightList = std::vector<std::shared_ptr<const PredictedFlight>>;
+
+/// The flights of one robot. Where all are counted, references come first.
+struct Flights {
+  FlightList references;  ///< from before the change that is asked about: the robot is believed to have had no effects
+  FlightList tests;       ///< the flights asked about
+  std::size_t size() const { return references.size() + tests.size(); }
+  bool is_reference(std::size_t flight) const { return flight < references.size(); }
+  /// Whether test flights are compared with references.
+  bool contrast() const { return !references.empty() && !tests.empty(); }
+  const std::shared_ptr<const PredictedFlight>& operator[](std::size_t flight) const {
+    return is_reference(flight) ? references[flight] : tests[flight - references.size()];
+  }
+  FlightList all() const;
+};
 
 }  // namespace flappy::gap

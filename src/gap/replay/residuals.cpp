@@ -11,7 +11,7 @@ namespace flappy::gap {
 namespace {
 
 /// [vehicle][flight].
-std::vector<Residuals> predict_all(const Flights& flights, const std::vector<const VehicleHypothesis*>& vehicles,
+std::vector<Residuals> predict_all(const FlightList& flights, const std::vector<const VehicleHypothesis*>& vehicles,
                                    int threads) {
   const std::size_t blocks = (vehicles.size() + kVehicles - 1) / kVehicles;
   std::vector<Residuals> result(vehicles.size(), Residuals(flights.size()));
@@ -33,13 +33,13 @@ EffectValues sensors_of(const VehicleHypothesis& h) {
 }
 
 /// With the effects of a vehicle in reference flights, too.
-std::vector<Residuals> residuals_with_effects(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles,
+std::vector<Residuals> residuals_with_effects(const FlightList& flights, const std::vector<VehicleHypothesis>& vehicles,
                                               int threads) {
   // vehicles with the same errors of sensors share a corrected log
   std::map<EffectValues, std::vector<std::size_t>> by_sensors;
   for (std::size_t i = 0; i < vehicles.size(); ++i) by_sensors[sensors_of(vehicles[i])].push_back(i);
   std::vector<Residuals> list(vehicles.size());
-  const auto compare = [&](const Flights& seen, const std::vector<std::size_t>& which, int at_once) {
+  const auto compare = [&](const FlightList& seen, const std::vector<std::size_t>& which, int at_once) {
     std::vector<const VehicleHypothesis*> group;
     for (const std::size_t i : which) group.push_back(&vehicles[i]);
     std::vector<Residuals> predicted = predict_all(seen, group, at_once);
@@ -60,7 +60,7 @@ std::vector<Residuals> residuals_with_effects(const Flights& flights, const std:
   const int at_once =
       std::max(1, io::thread_count(threads) / static_cast<int>(std::max<std::size_t>(1, corrected.size())));
   io::parallel_for(corrected.size(), threads, [&](std::size_t k) {
-    Flights seen(flights.size());
+    FlightList seen(flights.size());
     io::parallel_for(flights.size(), at_once,
                      [&](std::size_t f) { seen[f] = flights[f]->corrected(corrected[k].first); });
     compare(seen, corrected[k].second, at_once);
@@ -69,7 +69,7 @@ std::vector<Residuals> residuals_with_effects(const Flights& flights, const std:
 }
 
 /// Residuals without the effects of the vehicles; those that are not known are computed and kept.
-std::vector<Residuals> residuals_of_references(const Flights& references,
+std::vector<Residuals> residuals_of_references(const FlightList& references,
                                                const std::vector<VehicleHypothesis>& vehicles, int threads) {
   std::map<ResidualMemo::Key, Residuals> by_key;  // empty rows: not known, or a simulation that diverges
   std::vector<VehicleHypothesis> open;
@@ -101,17 +101,20 @@ std::vector<Residuals> residuals_of_references(const Flights& references,
 }  // namespace
 
 std::vector<Residuals> residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads) {
-  const auto first = std::ranges::find_if(flights, [](const auto& f) { return !f->is_reference(); });
-  const Flights references(flights.begin(), first), tests(first, flights.end());
-  if (references.empty()) return residuals_with_effects(tests, vehicles, threads);
-  std::vector<Residuals> list = residuals_of_references(references, vehicles, threads);
-  if (tests.empty()) return list;
-  std::vector<Residuals> of_tests = residuals_with_effects(tests, vehicles, threads);
+  if (flights.references.empty()) return residuals_with_effects(flights.tests, vehicles, threads);
+  std::vector<Residuals> list = residuals_of_references(flights.references, vehicles, threads);
+  if (flights.tests.empty()) return list;
+  std::vector<Residuals> of_tests = residuals_with_effects(flights.tests, vehicles, threads);
   for (std::size_t i = 0; i < list.size(); ++i) {
     if (of_tests[i].empty()) list[i].clear();
     if (!list[i].empty()) std::ranges::move(of_tests[i], std::back_inserter(list[i]));
   }
   return list;
+}
+
+Residuals tests_of(const Flights& flights, Residuals residual) {
+  residual.erase(residual.begin(), residual.begin() + static_cast<std::ptrdiff_t>(flights.references.size()));
+  return residual;
 }
 
 }  // namespace flappy::gap

@@ -81,13 +81,11 @@ flightlog::FlightLog fly(const Robot& r, std::uint64_t seed) {
 Inference contrast(const Robot& before, const Robot& after, std::vector<std::string> withheld = {}) {
   model::Vehicle vehicle = model::read_any_vehicle(test::source_path("configs/vehicles/crazyflie_sd.toml"));
   for (model::BeatAveraged::Input& i : vehicle.beat_averaged->inputs) i.high = 1.5;  // room for a heavy robot
-  Flights references, flights;
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    const auto flight = std::make_shared<BeatAveragedPrediction>("flight_" + std::to_string(seed),
-                                                                 fly(seed <= 2 ? before : after, seed), vehicle);
-    if (seed <= 2) flight->set_reference(), references.push_back(flight);
-    flights.push_back(flight);
-  }
+  Flights flights;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed)
+    (seed <= 2 ? flights.references : flights.tests)
+        .push_back(std::make_shared<BeatAveragedPrediction>("flight_" + std::to_string(seed),
+                                                            fly(seed <= 2 ? before : after, seed), vehicle));
   const std::string configs = test::source_path("configs/gap/");
   const sim::Randomisation uncertain =
       sim::read_randomisation(vehicle, io::Config::load(configs + "beat_averaged/priors.toml").root());
@@ -98,7 +96,7 @@ Inference contrast(const Robot& before, const Robot& after, std::vector<std::str
                            .discrepancy = read_model_discrepancy(configs + "beat_averaged/contrast_discrepancy.toml"),
                            .rule = read_verdict_rule(configs + "contrast_verdict.toml")};
   options.discrepancy.session = read_session_variation(configs + "beat_averaged/session_variation.toml");
-  const ReferenceFit fit(references, uncertain, options);
+  const ReferenceFit fit(flights.references, uncertain, options);
   return infer(flights, uncertain, std::move(options), &fit);
 }
 

@@ -109,7 +109,7 @@ Inference diagnose_robot(const Robot& r, std::vector<std::string> withheld = {},
     const std::filesystem::path folder = testing::TempDir() + "/flight_" + std::to_string(seed);
     const flightlog::FlightLog log = fly(r, seed);
     if (vehicle.beat_averaged->predicted) simulate(log, folder);
-    flights.push_back(std::make_shared<BeatAveragedPrediction>(folder, log, vehicle));
+    flights.tests.push_back(std::make_shared<BeatAveragedPrediction>(folder, log, vehicle));
   }
   const std::string configs = test::source_path("configs/gap/beat_averaged/");
   return infer(flights, sim::read_randomisation(vehicle, io::Config::load(configs + "priors.toml").root()),

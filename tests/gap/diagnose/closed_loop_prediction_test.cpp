@@ -49,7 +49,7 @@ constexpr double kTrim_V = 0.04, kTrimSplit = 0.002;
 
 TEST(ClosedLoop, TheVehicleThatFlewPredictsItsOwnHover) {
   const model::Vehicle truth = heavy_in_front();
-  Flights flights;
+  FlightList flights;
   flights.push_back(flown(hover(), truth, 4));
   const auto list = predict_closed_loop(flights, nominal(), truth, hover());
   EXPECT_EQ(list.front().quantity, "mean_amplitude_V");
@@ -75,7 +75,7 @@ TEST(ClosedLoop, AVehicleFliesTheRecordedPath) {
       rollout::read_fly_config(source_path("configs/fly/waypoints.toml"),
                                {"vehicle=../vehicles/hummingbird_nominal.toml", "flight.duration_s=14"});
   const model::Vehicle truth = heavy_in_front();
-  Flights flights;
+  FlightList flights;
   flights.push_back(flown(path, truth, 4));
   auto rows = by_quantity(predict_closed_loop(flights, nominal(), truth, hover()));
   EXPECT_NEAR(rows["mean_bias_V"].corrected, rows["mean_bias_V"].recorded, kTrim_V);
@@ -94,7 +94,7 @@ TEST(ClosedLoop, AConfigurationFliesItsOwnPathAndExcitation) {
   rollout::FlyConfig shaken =
       rollout::read_fly_config(source_path("configs/fly/identify_multisine.toml"),
                                {"vehicle=../vehicles/hummingbird_nominal.toml", "flight.duration_s=9"});
-  Flights flights;
+  FlightList flights;
   flights.push_back(flown(shaken, nominal(), 0));
   shaken.fleet.seed = 7;  // other noise
   auto own = by_quantity(predict_closed_loop(flights, heavy_in_front(), nominal(), shaken, {.own_path = true}));
@@ -108,7 +108,7 @@ TEST(ClosedLoop, AConfigurationFliesItsOwnPathAndExcitation) {
 TEST(ClosedLoop, HeadingCountsWholeTurns) {
   const rollout::FlyConfig turn =
       rollout::read_fly_config(source_path("configs/gap/experiments/yaw_turn.toml"), {"flight.duration_s=5.9"});
-  Flights flights;
+  FlightList flights;
   flights.push_back(flown(turn, nominal(), 2));
   auto rows = by_quantity(predict_closed_loop(flights, nominal(), nominal(), hover()));
   // the last second is nearly once round
@@ -120,7 +120,7 @@ TEST(ClosedLoop, WhatCannotFlyIsNoNumber) {
   rollout::FlyConfig high = hover();  // nothing below: it falls for as long as it is asked to hover
   high.fleet.batch.world.ground_z_m = -1000;
   high.fleet.task.start.kind = sim::Start::flying;
-  Flights flights;
+  FlightList flights;
   flights.push_back(flown(high, nominal(), 4));
   model::Vehicle lead = nominal();
   lead.torso.mass_kg *= 3;
@@ -131,7 +131,7 @@ TEST(ClosedLoop, WhatCannotFlyIsNoNumber) {
 }
 
 TEST(ClosedLoop, IsTheSameForAnyNumberOfThreads) {
-  Flights flights;
+  FlightList flights;
   flights.push_back(flown(hover(), nominal(), 5));
   const auto one = predict_closed_loop(flights, nominal(), heavy_in_front(), hover(), {.threads = 1});
   const auto two = predict_closed_loop(flights, nominal(), heavy_in_front(), hover(), {.threads = 2});

@@ -162,7 +162,6 @@ double expected_with_reference(const sim::Randomisation& prior, const char* mano
   const rollout::FlyConfig flown = library({manoeuvre})[0].config;
   const auto reference = std::make_shared<ResetPrediction>(
       Recording(manoeuvre, std::move(*simulate(flown, vehicle, 1, flown.settle_s)[0].log), vehicle));
-  reference->set_reference();
   NextOptions options;
   options.references = {reference};
   return rank_experiments(diagnosis(prior, {hypothesis(prior, {"body_drag"}, {0.05}, 0.5, 0.01),

@@ -75,7 +75,7 @@ TEST_F(Fits, KnowsWhereAVehicleComesApart) {
         if (value_of(h, "wind", "x_m_s") > 0.01) rows.clear();
         else synthetic_law(f, h, rows);
       });
-  const Flights flights = {fragile};
+  const Flights flights{{}, {fragile}};
   const Fitter fitter(flights, std::make_shared<const Evidence>(flights, read_model_discrepancy(), 1), 1);
   const Hypothesis wind(priors_, {"wind"});
   const Fit fit = fitter.linearise(wind, wind.start(), Fitter::axes(wind));

@@ -19,7 +19,7 @@ TEST(LearnDiscrepancy, FindsHowFarModelsAreOff) {
     const auto flight = std::make_shared<SyntheticFlight>("robot", static_cast<std::uint64_t>(r + 1), synthetic_law);
     flight->fly({synthetic_vehicle()});
     flight->add_measured(kForceZ, 0, off * flight->velocity);
-    robots.push_back({flight});
+    robots.push_back({{}, {flight}});
   }
   ModelDiscrepancy start = read_model_discrepancy();
   start.nuisances.clear();
@@ -48,8 +48,7 @@ TEST(LearnSessions, FindsHowMuchLessSessionsDiffer) {
           std::make_shared<SyntheticFlight>("robot", static_cast<std::uint64_t>(2 * r + f + 1), synthetic_law);
       flight->fly({synthetic_vehicle()});
       flight->add_measured(kForceZ, 0, (off + f * changed) * flight->velocity);
-      if (f == 0) flight->set_reference();
-      pairs.back().flights.push_back(flight);
+      (f == 0 ? pairs.back().flights.references : pairs.back().flights.tests).push_back(flight);
     }
   }
   ModelDiscrepancy start = read_model_discrepancy();

@@ -148,8 +148,7 @@ TEST_F(RobotFits, ReportsTheLagAndErrorsOfSensors) {
 TEST(Residuals, OfReferencesAreWithoutEffects) {
   const sim::Randomisation priors = synthetic_priors();
   const auto made = synthetic_flights(3, synthetic_law);
-  for (std::size_t f = 0; f < 2; ++f) made[f]->set_reference();
-  const Flights flights = as_flights(made);
+  const Flights flights = as_flights(made, 2);
   const Hypothesis wind(priors, {"wind"});
   Eigen::VectorXd at = wind.start(), windy = at;
   windy[2] = 1;
@@ -175,16 +174,14 @@ TEST(Contrast, TellsWhatAppearedFromWhatWasAlwaysOff) {
       at[2] = f < 2 ? 0 : appears;
       made[f]->fly(wind.vehicle(at));
       made[f]->add_measured(kForceX, 0, 0.3 * made[f]->velocity);
-      if (f < 2) made[f]->set_reference();
     }
     return made;
   };
   const auto gain = [&](double appears) {
     const auto made = flown(appears);
-    const Flights flights = as_flights(made);
+    const Flights flights = as_flights(made, 2), references{flights.references, {}};
     ModelDiscrepancy discrepancy = read_model_discrepancy();
     discrepancy.session = read_session_variation();
-    const Flights references = references_of(flights);
     const RobotFit robot(RobotFit::of_references(references, priors, discrepancy, {}, 2), flights);
     const Hypothesis h(robot.uncertain(), {"wind"});
     const Fit fit = robot.fitter().fit_effects(h, h.start(), robot.parameters());
@@ -206,12 +203,10 @@ TEST(Contrast, CallsUnknownOnlyWhatReferencesWouldHaveShown) {
       if (f < 2) made[f]->velocity *= calm;
       made[f]->fly(Hypothesis(priors, {}).vehicle(Hypothesis(priors, {}).start()));
       if (f >= 2) made[f]->add_measured(kTorqueY, 1, made[f]->velocity);
-      if (f < 2) made[f]->set_reference();
     }
-    const Flights flights = as_flights(made);
+    const Flights flights = as_flights(made, 2), references{flights.references, {}};
     ModelDiscrepancy discrepancy = read_model_discrepancy();
     discrepancy.session = read_session_variation();
-    const Flights references = references_of(flights);
     const RobotFit robot(RobotFit::of_references(references, priors, discrepancy, {}, 2), flights);
     EXPECT_EQ(robot.fitter().place_of(std::string(kModelOf) + "body_drag") >= 0, calm < 1)
         << "errors of the model do not cancel";

@@ -87,7 +87,7 @@ class SyntheticFlight final : public PredictedFlight {
   }
   std::vector<RegimeQuantity> regimes() const override { return {}; }
   std::vector<RegimeQuantity> inputs() const override { return {}; }
-  const DiagnosisPolicy& policy() const override { return kWingPolicy; }
+  const DiagnosisPolicy& policy(bool /*with_references*/) const override { return kWingPolicy; }
   std::shared_ptr<const PredictedFlight> corrected(const EffectValues& /*sensors*/) const override {
     return std::make_shared<SyntheticFlight>(*this);
   }
@@ -138,8 +138,10 @@ inline std::vector<std::shared_ptr<SyntheticFlight>> synthetic_flights(std::size
     flights.push_back(std::make_shared<SyntheticFlight>("flight_" + std::to_string(f + 1), f + 1, law));
   return flights;
 }
-inline Flights as_flights(const std::vector<std::shared_ptr<SyntheticFlight>>& flights) {
-  return {flights.begin(), flights.end()};
+/// The first `references` are references.
+inline Flights as_flights(const std::vector<std::shared_ptr<SyntheticFlight>>& flights, std::size_t references = 0) {
+  const auto first = flights.begin() + static_cast<std::ptrdiff_t>(references);
+  return {{flights.begin(), first}, {first, flights.end()}};
 }
 
 /// The mass moves the mean vertical force with the amplitude; the centre of mass the pitch torque; wind the forward force with the velocity; the

@@ -9,7 +9,7 @@ namespace {
 /// Statistics of a residual that is a smooth function and nothing else.
 SufficientStatistics statistics_of(const Evidence& evidence, const Flights& flights, const BasisCoefficients& delta) {
   Residuals zero;
-  for (const auto& f : flights) zero.emplace_back(f->beats() * kRowsPerBeat, 0.0);
+  for (const auto& f : flights.all()) zero.emplace_back(f->beats() * kRowsPerBeat, 0.0);
   SufficientStatistics s = evidence.statistics(zero);
   evidence.add(1, delta, s);
   return s;
@@ -126,7 +126,7 @@ TEST_F(Weigh, CostsNothingWhereAllScalesAreOne) {
 TEST(WeighFlights, WhatChangesFromFlightToFlightIsNoPlace) {
   Flights flights;
   for (int f = 0; f < 3; ++f)
-    flights.push_back(std::make_shared<SyntheticFlight>("f" + std::to_string(f), f + 1, synthetic_law, f == 1 ? 3 : 0));
+    flights.tests.push_back(std::make_shared<SyntheticFlight>("f" + std::to_string(f), f + 1, synthetic_law, f == 1 ? 3 : 0));
   const Evidence evidence(flights, read_model_discrepancy(), 1);
   const std::size_t group = static_cast<std::size_t>(group_index(kForceX, 1));
   Residuals residual;

@@ -27,7 +27,7 @@ Flights tour(const model::Vehicle& vehicle) {
   rollout::FlyConfig config = std::ranges::find(all, "tour", &Manoeuvre::name)->config;
   config.duration_s = config.settle_s + 5;
   auto flown = simulate(config, vehicle, 1, config.settle_s);
-  return {std::make_shared<ResetPrediction>(Recording("tour", std::move(*flown[0].log), nominal_vehicle()))};
+  return {{}, {std::make_shared<ResetPrediction>(Recording("tour", std::move(*flown[0].log), nominal_vehicle()))}};
 }
 
 model::Vehicle with(const std::string& effect, double times) {
@@ -106,7 +106,8 @@ TEST(Changes, ArePredictedInTheFlightsBeforeWhichTheyWereMade) {
     flightlog::FlightLog log = std::move(*simulate(config, robot, 1, config.settle_s)[0].log);
     EXPECT_EQ(log.header.changes.swapped_wings, swapped);
     log.header.changes.swapped_wings = declared;
-    const Flights flight = {std::make_shared<ResetPrediction>(Recording("tour", std::move(log), nominal_vehicle()))};
+    const Flights flight{
+        {}, {std::make_shared<ResetPrediction>(Recording("tour", std::move(log), nominal_vehicle()))}};
     const std::vector<Residuals> r = residuals(flight, {VehicleHypothesis{.vehicle = robot}}, 1);
     return rms(*flight[0], r[0][0], kTorqueX * kCoefficients);
   };
