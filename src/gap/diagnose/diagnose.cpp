@@ -1,6 +1,7 @@
 #include "gap/diagnose/diagnose.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 #include "flappy/vehicle_file.hpp"
 #include "flightlog/check/data_faults.hpp"
@@ -141,47 +142,82 @@ DiagnosisRequest read_request(const DiagnosisSettings& settings) {
 
 namespace {
 
+/// The logs of one set of flights, until predictions are made of them.
+struct CheckedLogs {
+  std::vector<std::string> folders;
+  std::vector<flightlog::FlightLog> logs;
+  std::vector<flightlog::FlightHeader> headers;
+  std::vector<flightlog::DataFault> faults;
+};
+
+/// Reads and checks the references, then each set of flights; all are of one robot, so they are checked together.
+std::vector<CheckedLogs> read_sets(const DiagnosisRequest& request) {
+  std::vector<CheckedLogs> sets = {{request.settings.reference, {}, {}, {}}, {request.settings.flights, {}, {}, {}}};
+  for (const NamedFlights& other : request.others) sets.push_back({other.flights, {}, {}, {}});
+  std::vector<std::string> folders;
+  std::vector<flightlog::FlightLog> logs;
+  for (const CheckedLogs& set : sets)
+    for (const std::string& folder : set.folders) {
+      folders.push_back(folder);
+      logs.push_back(flightlog::read_flight_log(folder));
+    }
+  if (!request.settings.reference.empty()) check_same_streams(logs, folders);
+  const std::vector<flightlog::CheckReport> reports = flightlog::check_flights(logs);
+  std::size_t next = 0;
+  for (CheckedLogs& set : sets)
+    for (std::size_t i = 0; i < set.folders.size(); ++i, ++next) {
+      std::ranges::move(flightlog::data_faults(logs[next], reports[next], folders[next]),
+                        std::back_inserter(set.faults));
+      set.headers.push_back(logs[next].header);
+      set.logs.push_back(std::move(logs[next]));
+    }
+  return sets;
+}
+
+/// Takes the logs of the set.
+FlightList predictions_of(const DiagnosisRequest& request, CheckedLogs& set) {
+  FlightList list;
+  for (std::size_t i = 0; i < set.logs.size(); ++i)
+    list.push_back(prediction_of(request.vehicle, set.folders[i], std::move(set.logs[i]), request.channels));
+  set.logs.clear();
+  return list;
+}
+
 /// Reference flights and their fit, for all sets that are compared with them.
 struct Reference {
+  CheckedLogs read;
   FlightList flights;
   std::unique_ptr<const ReferenceFit> fit;
 };
 
-Diagnosed diagnose_flights(const DiagnosisRequest& request, const std::vector<std::string>& tests, Reference& reference,
-                           const std::function<bool(double share, const std::string& what)>& progress) {
-  const std::size_t references = request.settings.reference.size();
-  std::vector<std::string> folders = request.settings.reference;
-  folders.insert(folders.end(), tests.begin(), tests.end());
-  std::vector<flightlog::FlightLog> logs;
-  for (const std::string& folder : folders) logs.push_back(flightlog::read_flight_log(folder));
-  std::vector<flightlog::FlightHeader> headers;
-  for (const flightlog::FlightLog& log : logs) headers.push_back(log.header);
-  if (references > 0) check_same_streams(logs, folders);
+Diagnosed diagnose_set(const DiagnosisRequest& request, CheckedLogs& tests, Reference& reference,
+                       const std::function<bool(double share, const std::string& what)>& progress) {
+  std::vector<flightlog::DataFault> faults = reference.read.faults;
+  faults.insert(faults.end(), tests.faults.begin(), tests.faults.end());
   Diagnosed d;
-  if (std::vector<flightlog::DataFault> faults = data_faults(logs, folders); !faults.empty()) {
-    d.result = result_of(tests, std::move(faults));
+  if (!faults.empty()) {
+    d.result = result_of(tests.folders, std::move(faults));
     d.result.reference = request.settings.reference;
     return d;
   }
-  while (reference.flights.size() < references) {
-    const std::size_t f = reference.flights.size();
-    reference.flights.push_back(prediction_of(request.vehicle, folders[f], std::move(logs[f]), request.channels));
-  }
-  d.flights.references = reference.flights;
-  for (std::size_t f = references; f < logs.size(); ++f)
-    d.flights.tests.push_back(prediction_of(request.vehicle, folders[f], std::move(logs[f]), request.channels));
+  if (reference.flights.empty()) reference.flights = predictions_of(request, reference.read);
+  d.flights = {reference.flights, predictions_of(request, tests)};
   InferenceOptions options = request.options;
   options.progress = progress;
-  if (references > 0 && !reference.fit) {
+  if (!reference.flights.empty() && !reference.fit) {
     if (progress) progress(0, "fitting the reference");
     reference.fit = std::make_unique<const ReferenceFit>(reference.flights, request.uncertain, options);
   }
   d.inference = infer(d.flights, request.uncertain, options, reference.fit.get());
   d.uncertain = request.uncertain;
   d.uncertain->set_minors(d.inference.minors);
-  d.result = result_of(tests, d.flights, *d.uncertain, d.inference);
+  d.result = result_of(tests.folders, d.flights, *d.uncertain, d.inference);
   d.result.reference = request.settings.reference;
-  if (references > 0) d.result.warnings = contrast_warnings(headers, d.flights);
+  if (!reference.flights.empty()) {
+    std::vector<flightlog::FlightHeader> headers = reference.read.headers;
+    headers.insert(headers.end(), tests.headers.begin(), tests.headers.end());
+    d.result.warnings = contrast_warnings(headers, d.flights);
+  }
   if (d.inference.complete) d.corrected = corrected_vehicle(request.vehicle, d.inference, request.uncertain);
   return d;
 }
@@ -190,15 +226,16 @@ Diagnosed diagnose_flights(const DiagnosisRequest& request, const std::vector<st
 
 Diagnosed diagnose(const DiagnosisRequest& request,
                    const std::function<bool(double share, const std::string& what)>& progress) {
-  Reference reference;
-  Diagnosed d = diagnose_flights(request, request.settings.flights, reference, progress);
+  std::vector<CheckedLogs> sets = read_sets(request);
+  Reference reference{std::move(sets[0]), {}, {}};
+  Diagnosed d = diagnose_set(request, sets[1], reference, progress);
   bool goes_on = d.result.complete;
-  for (const NamedFlights& other : request.others) {
+  for (std::size_t i = 0; i < request.others.size(); ++i) {
     Diagnosis of_set;
     of_set.complete = false;
-    if (goes_on) of_set = diagnose_flights(request, other.flights, reference, progress).result;
+    if (goes_on) of_set = diagnose_set(request, sets[2 + i], reference, progress).result;
     goes_on = of_set.complete;
-    d.result.sets.push_back({other.name, std::move(of_set)});
+    d.result.sets.push_back({request.others[i].name, std::move(of_set)});
   }
   return d;
 }
