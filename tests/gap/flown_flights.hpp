@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "gap/diagnose/inference.hpp"
 #include "gap/replay/reset_prediction.hpp"
 #include "io/config.hpp"
 #include "rollout/fly.hpp"
@@ -21,6 +22,13 @@ inline model::Vehicle nominal_vehicle() {
 
 inline sim::Randomisation shipped_priors() {
   return sim::read_randomisation(nominal_vehicle(), io::Config::load(kTestConfigs + "gap/priors.toml", {}).root());
+}
+
+inline InferenceOptions shipped_options() {
+  InferenceOptions options;
+  options.discrepancy = read_model_discrepancy();
+  options.rule = read_verdict_rule();
+  return options;
 }
 
 /// Eight seconds: take-off and hover, the last five under multisines.

@@ -57,8 +57,8 @@ struct InferenceOptions {
   int max_effects = 3;                                                  ///< largest number of effects in a hypothesis
   std::vector<std::string> withheld;                                    ///< effects to leave out of the catalogue
   std::function<bool(double share, const std::string& what)> progress;  ///< returns false to fit no further effect
-  ModelDiscrepancy discrepancy = read_model_discrepancy();
-  VerdictRule rule = read_verdict_rule();
+  ModelDiscrepancy discrepancy;
+  VerdictRule rule;
 };
 
 struct Inference {

@@ -47,14 +47,14 @@ struct NextOptions {
   int threads = 0;
   double least_probability = 0.01;  ///< least probability of a rival
   FlightList references;            ///< reference flights of a contrast; empty: no contrast
-  ModelDiscrepancy discrepancy = read_model_discrepancy();
-  VerdictRule rule = read_verdict_rule();
+  ModelDiscrepancy discrepancy;
+  VerdictRule rule;
 };
 
 /// The most informative manoeuvre first; empty with fewer than two rivals. Hypotheses with an unknown cause or a
 /// remainder are no rivals: no vehicle simulates them. Leaves out manoeuvres in which one of the four most probable
 /// rivals crashes.
 std::vector<NextExperiment> rank_experiments(const Inference& inference, const sim::Randomisation& uncertain,
-                                             const std::vector<Manoeuvre>& manoeuvres, const NextOptions& options = {});
+                                             const std::vector<Manoeuvre>& manoeuvres, const NextOptions& options);
 
 }  // namespace flappy::gap

@@ -14,7 +14,7 @@ namespace flappy::gap {
 struct VerdictRule {
   struct Prior {
     double none, parameters, effect, unknown, further_effect, remainder;
-  } prior;
+  } prior{};
   struct Gain {
     double by_chance_nats, further_screened_nats, vanished_magnitude;
     double outside_by_chance_nats;  ///< replaces by_chance_nats for effects in `outside`
@@ -28,23 +28,23 @@ struct VerdictRule {
     double chance_of(const std::string& effect) const {
       return std::ranges::count(outside, effect) > 0 ? outside_by_chance_nats : by_chance_nats;
     }
-  } gain;
+  } gain{};
   struct UnknownCause {
     double penalty_nats;
-  } unknown;
+  } unknown{};
   struct Refutation {
     double min_share;  ///< 0: no hypothesis is refuted
-  } refutation;
+  } refutation{};
   struct Interval {
     double sd_factor, magnitude_error;
-  } interval;
+  } interval{};
   struct Tempering {
     double nats, freedom;
-  } tempering;
+  } tempering{};
   struct Naming {
     double of_all, of_pool, member_of_pool;
     double least;  ///< effects are named if they, alone or with others, are at least this probable
-  } naming;
+  } naming{};
 };
 
 /// io::InputError with file and line.

@@ -85,7 +85,7 @@ TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
 TEST(Diagnose, StopsWithWhatItHas) {
   if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const Flights flights = flown("hummingbird_nominal");
-  InferenceOptions options;
+  InferenceOptions options = shipped_options();
   options.threads = 2;
   options.progress = [](double, const std::string&) { return false; };
   const Inference d = infer(flights, shipped_priors(), options);
@@ -132,7 +132,7 @@ TEST(Diagnose, NamesNoEffectForWhatAnyRobotMayHave) {
   Flights flights =
       flown("hummingbird_nominal", {"vehicle.effects.spring_hardening.per_rad2=-0.015", "flight.duration_s=5"});
   flights.tests[0] = flights[0]->with_log(without({{"imu_clock", {{"rate", -6e-5}}}}, flights[0]->recording()->log));
-  InferenceOptions options;
+  InferenceOptions options = shipped_options();
   options.threads = 2;
   options.discrepancy.background["spring_hardening"] = 0.08;
   const Inference d = infer(flights, shipped_priors(), options);

@@ -62,6 +62,18 @@ std::vector<Manoeuvre> library(const std::vector<std::string>& names) {
   return list;
 }
 
+NextOptions shipped() {
+  NextOptions options;
+  options.discrepancy = read_model_discrepancy();
+  options.rule = read_verdict_rule();
+  return options;
+}
+
+std::vector<NextExperiment> rank_experiments(const Inference& d, const sim::Randomisation& prior,
+                                             const std::vector<Manoeuvre>& choice) {
+  return gap::rank_experiments(d, prior, choice, shipped());
+}
+
 TEST(NextExperiment, FliesWhereTheRivalsDiffer) {
   const sim::Randomisation prior = uncertain();
   const auto choice = library({"ceiling_steps", "dash", "ground_steps", "wall_approach"});
@@ -162,9 +174,9 @@ double expected_with_reference(const sim::Randomisation& prior, const char* mano
   const rollout::FlyConfig flown = library({manoeuvre})[0].config;
   const auto reference = std::make_shared<ResetPrediction>(
       Recording(manoeuvre, std::move(*simulate(flown, vehicle, 1, flown.settle_s)[0].log), vehicle));
-  NextOptions options;
+  NextOptions options = shipped();
   options.references = {reference};
-  return rank_experiments(diagnosis(prior, {hypothesis(prior, {"body_drag"}, {0.05}, 0.5, 0.01),
+  return gap::rank_experiments(diagnosis(prior, {hypothesis(prior, {"body_drag"}, {0.05}, 0.5, 0.01),
                                             hypothesis(prior, {}, {}, 0.4, 0.01), unchanged(0.1)}),
                           prior, library({"dash"}), options)[0]
       .expected_nats;
