@@ -14,7 +14,7 @@
 #include "benchmark/score_bench.hpp"
 #include "full.hpp"
 #include "gap/diagnose/next_experiment.hpp"
-#include "gap/diagnose/verdict_rule.hpp"
+#include "gap/question/verdict_rule.hpp"
 #include "io/files.hpp"
 #include "io/sha256.hpp"
 #include "model/effects/registry.hpp"

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "gap/diagnose/inference.hpp"
+#include "gap/question/question.hpp"
 #include "gap/replay/reset_prediction.hpp"
 #include "io/config.hpp"
 #include "rollout/fly.hpp"

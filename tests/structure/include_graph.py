@@ -12,7 +12,7 @@ from self_test import misjudged, run
 BASE = {"io", "model", "sim"}
 FLIGHT = BASE | {"policy", "flight"}
 ROLLOUT = FLIGHT | {"flightlog", "flightlog/check", "flightlog/ros", "rollout"}
-GAP = ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/localise", "gap/diagnose", "gap/plan"}
+GAP = ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/localise", "gap/question", "gap/diagnose", "gap/learn", "gap/plan"}
 # What a room may include besides itself. A folder is a room; a folder in it that is named here is a room of its own.
 ROOMS = {
     "io": set(),
@@ -37,8 +37,10 @@ ROOMS = {
     "gap/replay": BASE | {"flight", "flightlog"},
     "gap/evidence": BASE | {"flightlog", "gap/replay"},
     "gap/localise": BASE | {"flightlog", "gap/result", "gap/replay", "gap/evidence"},
-    "gap/diagnose": ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/localise"},
-    "gap/plan": ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/diagnose"},
+    "gap/question": BASE | {"flightlog", "gap/result", "gap/replay", "gap/evidence", "gap/localise"},
+    "gap/diagnose": ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/localise", "gap/question", "gap/learn"},
+    "gap/learn": BASE | {"flightlog", "gap/replay", "gap/evidence", "gap/question"},
+    "gap/plan": ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/question", "gap/diagnose"},
     "server": set(),  # what several of its rooms share
     "server/dds": {"io", "flightlog", "flightlog/ros"},
     "server/telemetry": ROLLOUT | {"server/dds"},

@@ -26,10 +26,11 @@ double energy(const gap::FlightList& flights, const std::vector<double>& noise_s
 }  // namespace
 
 Baseline best_rmse(const gap::Flights& flights, const gap::Inference& d) {
-  const bool contrast = flights.contrast();
+  const bool contrast = !flights.references.empty();
   std::vector<std::pair<double, std::vector<std::string>>> left;
   for (const gap::ScoredHypothesis& a : d.hypotheses)
-    if (a.fitted()) left.emplace_back(energy(flights.tests, d.noise_sd, contrast ? a.held_out : a.fit.residual), a.effects);
+    if (a.fitted())
+      left.emplace_back(energy(flights.tests, d.noise_sd, contrast ? a.held_out : a.fit.residual), a.effects);
   std::ranges::stable_sort(left, {}, [](const auto& h) { return h.first; });
   Baseline b;
   for (const auto& [sum, effects] : left)

@@ -16,7 +16,6 @@ using Eigen::VectorXd;
 
 /// Number of hypotheses tried with a remainder, and of single effects with which the parameters are fitted again.
 constexpr std::size_t kMaxRemainders = 3, kMaxMoved = 3;
-constexpr int kFitIterations = 6;
 
 ScoredHypothesis baseline(HypothesisKind kind, double log_evidence, double prior) {
   ScoredHypothesis a;
@@ -97,15 +96,12 @@ std::vector<std::string> untestable(const RobotFit& robot, const std::vector<std
 
 }  // namespace
 
-Baselines weigh_baselines(const RobotFit& robot, const VerdictRule& rule) {
+Baselines weigh_baselines(const Question& question, const RobotFit& robot, const VerdictRule& rule) {
   const Hypothesis& h = robot.no_effects();
   const Scales& scales = robot.fitter().scales();
   const double penalty = rule.unknown.penalty_nats;
   Baselines b;
-  b.none = baseline(HypothesisKind::none,
-                    robot.evidence().contrasts() ? robot.log_evidence_unchanged()
-                                                 : robot.weigh(h, robot.nominal(), scales).posterior.log_evidence,
-                    rule.prior.none);
+  b.none = baseline(HypothesisKind::none, question.log_evidence_of_none(robot), rule.prior.none);
   b.parameters = baseline(HypothesisKind::parameters, robot.weigh(h, robot.parameters(), scales).posterior.log_evidence,
                           rule.prior.parameters);
   const ScaledEvidence unknown = weigh_freely(robot, h, robot.parameters(), scales, nullptr, penalty);
@@ -129,8 +125,10 @@ ScreenedCatalogue screen_catalogue(const RobotFit& robot, const InferenceOptions
   return c;
 }
 
-EffectFits::EffectFits(const RobotFit& robot, const Baselines& baselines, const InferenceOptions& options, int threads)
-    : robot_(robot),
+EffectFits::EffectFits(const Question& question, const RobotFit& robot, const Baselines& baselines,
+                       const InferenceOptions& options, int threads)
+    : question_(question),
+      robot_(robot),
       baselines_(baselines),
       options_(options),
       rule_(options.rule),
@@ -155,10 +153,6 @@ VectorXd EffectFits::start(const Hypothesis& h, const std::vector<ScreenedEffect
   return h.bounded(at);
 }
 
-Fit EffectFits::fit_jointly(const Hypothesis& h, const std::vector<ScreenedEffect>& set, const Fitter& fitter) const {
-  return fitter.fit_given(h, start(h, set), robot_.parameters(), kFitIterations);
-}
-
 ScoredHypothesis EffectFits::fitted(const std::vector<ScreenedEffect>& set, const Fitter& fitter) const {
   ScoredHypothesis a;
   a.kind = HypothesisKind::effect;
@@ -168,19 +162,16 @@ ScoredHypothesis EffectFits::fitted(const std::vector<ScreenedEffect>& set, cons
   a.log_prior = log_prior_of_one();
   for (std::size_t i = 1; i < set.size(); ++i)
     a.log_prior += std::log(rule_.prior.further_effect / static_cast<double>(catalogue_size_));
-  const bool effects_first = robot_.evidence().policy().move_parameters;
-  take(h, effects_first ? fitter.fit_effects(h, start(h, set), robot_.parameters()) : fit_jointly(h, set, fitter),
-       fitter.scales(), a);
+  take(h, question_.fit_set(fitter, h, start(h, set), robot_.parameters()), fitter.scales(), a);
   return a;
 }
 
-/// Refits the parameters jointly with the effects; keeps a better fit. A beat-averaged vehicle's are joint from the
-/// start.
+/// Refits the parameters jointly with the effects; keeps a better fit.
 void EffectFits::move_parameters(const std::vector<ScreenedEffect>& set, const Fitter& fitter,
                                  ScoredHypothesis& a) const {
-  if (!robot_.evidence().policy().move_parameters || robot_.evidence().contrasts()) return;
   const Hypothesis h(robot_.uncertain(), a.effects);
-  take(h, fit_jointly(h, set, fitter), fitter.scales(), a);
+  if (std::optional<Fit> fit = question_.refit_jointly(fitter, h, start(h, set), robot_.parameters()))
+    take(h, *std::move(fit), fitter.scales(), a);
 }
 
 /// Takes `fit` unless its vehicle could not be simulated or the present fit explains as much.
@@ -293,7 +284,7 @@ void EffectFits::join_further(const std::function<bool(double, const std::string
     std::erase_if(others, [&](const MagnitudeColumn& m) { return std::ranges::count(best.effects, m.effect) > 0; });
     std::vector<ScreenedEffect> further = screen(fitter, best.fit, others);
     std::erase_if(further, [&](const ScreenedEffect& s) { return s.gain < rule_.gain.further_screened_nats; });
-    further.resize(std::min(further.size(), static_cast<std::size_t>(robot_.evidence().policy().max_further)));
+    further.resize(std::min(further.size(), question_.max_further()));
     std::vector<ScoredHypothesis> more(further.size());
     std::vector<std::vector<ScreenedEffect>> starts(further.size(), coordinates(best));
     io::parallel_for(more.size(), threads_, [&](std::size_t i) {

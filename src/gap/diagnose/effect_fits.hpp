@@ -1,7 +1,7 @@
 // The middle stages of a diagnosis: effects are screened, fitted, and combined into hypotheses with several effects.
 #pragma once
 
-#include "gap/diagnose/inference.hpp"
+#include "gap/question/question.hpp"
 
 namespace flappy::gap {
 
@@ -10,7 +10,7 @@ struct Baselines {
   ScoredHypothesis none, parameters, unknown;
   Scales unknown_scales;  ///< scales of the fit with an unknown cause
 };
-Baselines weigh_baselines(const RobotFit& robot, const VerdictRule& rule);
+Baselines weigh_baselines(const Question& question, const RobotFit& robot, const VerdictRule& rule);
 
 /// Effects of the catalogue by falling screened gain: the first options.max_finalists, and the others.
 struct ScreenedCatalogue {
@@ -21,7 +21,8 @@ ScreenedCatalogue screen_catalogue(const RobotFit& robot, const InferenceOptions
 
 class EffectFits {
  public:
-  EffectFits(const RobotFit& robot, const Baselines& baselines, const InferenceOptions& options, int threads);
+  EffectFits(const Question& question, const RobotFit& robot, const Baselines& baselines,
+             const InferenceOptions& options, int threads);
 
   /// A hypothesis for each effect, the best first. Finalists are fitted by simulation if `by_simulation`; others
   /// linearly.
@@ -45,13 +46,13 @@ class EffectFits {
   Eigen::VectorXd start(const Hypothesis& hypothesis, const std::vector<ScreenedEffect>& set) const;
   ScoredHypothesis fitted(const std::vector<ScreenedEffect>& set, const Fitter& fitter) const;
   ScoredHypothesis linear(const ScreenedEffect& effect) const;
-  Fit fit_jointly(const Hypothesis& hypothesis, const std::vector<ScreenedEffect>& set, const Fitter& fitter) const;
   void move_parameters(const std::vector<ScreenedEffect>& set, const Fitter& fitter, ScoredHypothesis& a) const;
   void take(const Hypothesis& hypothesis, Fit fit, const Scales& scales, ScoredHypothesis& a) const;
   bool vanished(const ScoredHypothesis& a) const;
   std::vector<ScreenedEffect> coordinates(const ScoredHypothesis& a) const;
   double gain_by_chance(const ScoredHypothesis& a) const;
 
+  const Question& question_;
   const RobotFit& robot_;
   const Baselines& baselines_;
   const InferenceOptions& options_;

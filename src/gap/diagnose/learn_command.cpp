@@ -5,7 +5,7 @@
 
 #include "flappy/vehicle_file.hpp"
 #include "flightlog/check/data_faults.hpp"
-#include "gap/evidence/learn_discrepancy.hpp"
+#include "gap/learn/learn_discrepancy.hpp"
 #include "gap/replay/prediction.hpp"
 #include "gap/replay/recording.hpp"
 #include "io/config.hpp"

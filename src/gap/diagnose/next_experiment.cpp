@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "gap/diagnose/verdict.hpp"
+#include "gap/question/question.hpp"
 #include "gap/replay/reset_prediction.hpp"
 #include "io/config.hpp"
 #include "io/parallel.hpp"
@@ -17,64 +18,17 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-struct Rival {
-  std::string name;
-  double probability;
-  Hypothesis hypothesis;
-  VectorXd at;
-  Directions directions;
-  MatrixXd covariance;  ///< along the directions
-  bool open;            ///< its effect was fitted only linearly: the vehicle of the parameters, with magnitudes added
-  VehicleHypothesis vehicle() const { return hypothesis.vehicle(at); }
-};
-
-std::string name_of(const ScoredHypothesis& a) {
-  if (a.kind == HypothesisKind::none) return "none";
-  if (a.kind == HypothesisKind::parameters) return "parameters";
-  std::string name;
-  for (const std::string& e : a.effects) name += (name.empty() ? "" : "+") + e;
-  return name;
-}
-
 /// Number of the most probable rivals that have to survive a manoeuvre.
 constexpr std::size_t kSurvive = 4;
 
-/// Coordinates of a rival left open: the fitted parameters, and the root mean square of each magnitude.
-VectorXd open_place(const Hypothesis& h, const Fit& fit, const VectorXd& parameters) {
-  VectorXd at = fit.mean();
-  at.head(h.shared()) = parameters;
-  const MatrixXd covariance = fit.covariance();
-  for (Index i = h.shared(); i < h.size(); ++i)
-    if (h.unknowns()[static_cast<std::size_t>(i)].magnitude)
-      at[i] = std::copysign(std::hypot(at[i], std::sqrt(covariance(i, i))), at[i]);
-  return at;
-}
-
 /// The rivals keep references to `uncertain` and `as_filed`, which has minor draws of 0.
-std::vector<Rival> rivals_of(const Inference& d, const sim::Randomisation& uncertain,
-                             const sim::Randomisation& as_filed, const NextOptions& options) {
-  const bool contrast = !options.references.empty();
+std::vector<Rival> rivals_of(const Question& question, const Inference& d, const sim::Randomisation& uncertain,
+                             const sim::Randomisation& as_filed, double least_probability) {
   std::vector<Rival> rivals;
   for (const ScoredHypothesis& a : d.hypotheses) {
-    if (a.probability < options.least_probability) break;
-    if (a.kind == HypothesisKind::unknown || a.has_remainder()) continue;
-    const bool file = a.kind == HypothesisKind::none && !contrast;
-    const Hypothesis h(file ? as_filed : uncertain, a.effects);
-    if (a.kind == HypothesisKind::none || (contrast && a.kind == HypothesisKind::parameters)) {
-      const VectorXd at = contrast ? d.parameters.at : h.start();
-      rivals.push_back({name_of(a), a.probability, h, at, {MatrixXd(h.size(), 0), VectorXd(0)}, MatrixXd(0, 0), false});
-      continue;
-    }
-    const Fit& fit = a.kind == HypothesisKind::parameters ? d.parameters : a.fit;
-    const bool open = a.kind == HypothesisKind::effect && !a.fitted();
-    VectorXd at = open ? open_place(h, fit, d.parameters.mean()) : fit.mean();
-    MatrixXd covariance = fit.posterior.covariance;
-    if (contrast) {
-      at.head(h.shared()) = d.parameters.at;
-      covariance.topRows(h.shared()).setZero();
-      covariance.leftCols(h.shared()).setZero();
-    }
-    rivals.push_back({name_of(a), a.probability, h, h.bounded(at), fit.directions, std::move(covariance), open});
+    if (a.probability < least_probability) break;
+    if (a.kind != HypothesisKind::unknown && !a.has_remainder())
+      rivals.push_back(question.rival(a, d, uncertain, as_filed));
   }
   return rivals;
 }
@@ -86,31 +40,12 @@ struct Expected {
   BasisCoefficients law_sd;                  ///< standard deviation of the deviations of the laws of its effects
 };
 
-/// Columns along a rival's directions for the shared parameters, from another rival's columns: spares simulations.
-std::vector<BasisCoefficients> turned(const Fit& l, const Directions& directions, Index shared) {
-  std::vector<BasisCoefficients> columns;
-  const MatrixXd turn =
-      l.directions.axes.topLeftCorner(shared, shared).transpose() * directions.axes.topLeftCorner(shared, shared);
-  for (Index d = 0; d < shared; ++d) {
-    BasisCoefficients sum;
-    for (Index i = 0; i < shared; ++i) {
-      const BasisCoefficients& column = l.columns[static_cast<std::size_t>(i)];
-      if (column.size() == 0) continue;
-      if (sum.size() == 0) sum = BasisCoefficients::Zero(column.rows(), column.cols());
-      sum += turn(i, d) * column;
-    }
-    columns.push_back(std::move(sum));
-  }
-  return columns;
-}
-
 /// None if the simulation diverges. `first`: linearisation of the first rival with parameters; its columns serve all.
-std::optional<Expected> expect(const Rival& rival, const Fitter& fitter, std::optional<Fit>& first) {
+std::optional<Expected> expect(const Question& question, const Rival& rival, const Fitter& fitter,
+                               std::optional<Fit>& first) {
   const bool with_parameters = rival.directions.reach.size() > 0;
   std::vector<BasisCoefficients> known;
-  if (with_parameters && fitter.evidence().contrasts())
-    known.resize(static_cast<std::size_t>(rival.hypothesis.shared()));  // the parameters are certain: no columns
-  else if (with_parameters && first) known = turned(*first, rival.directions, rival.hypothesis.shared());
+  if (with_parameters) known = question.known_columns(rival, first);
   const Fit l = fitter.linearise(rival.hypothesis, rival.at, rival.directions, known);
   if (l.residual.empty()) return {};
   if (with_parameters && !first) first = l;
@@ -233,8 +168,8 @@ std::vector<Course> courses_of(const std::vector<std::vector<double>>& first,
   return courses;
 }
 
-std::optional<NextExperiment> expected_information(const Manoeuvre& m, const std::vector<Rival>& rivals,
-                                                   const NextOptions& options) {
+std::optional<NextExperiment> expected_information(const Question& question, const Manoeuvre& m,
+                                                   const std::vector<Rival>& rivals, const NextOptions& options) {
   const auto fly = [&](const Rival& r) {
     return std::move(simulate(m.config, r.vehicle().vehicle, 1, m.config.settle_s)[0]);
   };
@@ -243,15 +178,16 @@ std::optional<NextExperiment> expected_information(const Manoeuvre& m, const std
     flown.push_back(fly(rivals[i]));
     if (flown.back().lost || !flown.back().log) return {};
   }
-  const Flights flights{options.references,
-                        {std::make_shared<ResetPrediction>(
-                            Recording(m.name, *flown.front().log, rivals.front().vehicle().vehicle))}};
-  const Fitter fitter(flights, std::make_shared<const Evidence>(flights, options.discrepancy, 1), 1);
+  const Flights flights{
+      options.references,
+      {std::make_shared<ResetPrediction>(Recording(m.name, *flown.front().log, rivals.front().vehicle().vehicle))}};
+  const Fitter fitter(question, flights, std::make_shared<const Evidence>(question, flights, options.discrepancy, 1),
+                      1);
   const Evidence& evidence = fitter.evidence();
   std::vector<std::optional<Expected>> expected(rivals.size());
   std::optional<Fit> first;
   for (std::size_t i = 0; i < rivals.size(); ++i)
-    if (i < 2 || !rivals[i].open) expected[i] = expect(rivals[i], fitter, first);
+    if (i < 2 || !rivals[i].open) expected[i] = expect(question, rivals[i], fitter, first);
   if (!expected[0] || !expected[1]) return {};
   add_open(rivals, flights, evidence, expected);
   double all = 0;
@@ -319,11 +255,12 @@ std::vector<NextExperiment> rank_experiments(const Inference& inference, const s
                                              const std::vector<Manoeuvre>& manoeuvres, const NextOptions& options) {
   sim::Randomisation as_filed = uncertain;
   as_filed.set_minors(std::vector<double>(uncertain.minors().size(), 0));
-  const std::vector<Rival> rivals = rivals_of(inference, uncertain, as_filed, options);
+  const Question& question = question_beside(options.references);
+  const std::vector<Rival> rivals = rivals_of(question, inference, uncertain, as_filed, options.least_probability);
   if (rivals.size() < 2) return {};
   std::vector<std::optional<NextExperiment>> found(manoeuvres.size());
   io::parallel_for(manoeuvres.size(), options.threads,
-                   [&](std::size_t i) { found[i] = expected_information(manoeuvres[i], rivals, options); });
+                   [&](std::size_t i) { found[i] = expected_information(question, manoeuvres[i], rivals, options); });
   std::vector<NextExperiment> list;
   for (std::optional<NextExperiment>& e : found)
     if (e) list.push_back(std::move(*e));

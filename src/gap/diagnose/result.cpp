@@ -117,7 +117,7 @@ Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flig
       concluded.has_remainder()
           ? concluded
           : *std::ranges::find(inference.hypotheses, HypothesisKind::unknown, &ScoredHypothesis::kind);
-  const RegimeBasis basis(flights);
+  const RegimeBasis basis(question_of(flights), flights);
   for (const FreeBlock& b : unknown.unexplained) r.unexplained.push_back(term_of(b, basis));
   if (concluded.other_law) r.other_law = term_of(*concluded.other_law, basis);
   r.jointly_with = unknown.jointly_with;

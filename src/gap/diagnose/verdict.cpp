@@ -5,8 +5,7 @@
 #include <map>
 #include <set>
 
-#include "gap/diagnose/held_out.hpp"
-#include "gap/localise/closure.hpp"
+#include "gap/question/validation.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::gap {
@@ -16,10 +15,6 @@ using Eigen::VectorXd;
 
 /// Refuted only if the regime explains more than this share of the parameters' residual; less may be chance.
 constexpr double kMinExplainable = 0.15;
-
-const ScoredHypothesis& parameters_alone(const std::vector<ScoredHypothesis>& all) {
-  return *std::ranges::find(all, HypothesisKind::parameters, &ScoredHypothesis::kind);
-}
 
 /// Refutes hypotheses that explain too little of what depends on the regime in held-out flights, however probable.
 void refute(const Evidence& evidence, const Flights& flights, double min_share, Inference& d) {
@@ -36,79 +31,7 @@ void refute(const Evidence& evidence, const Flights& flights, double min_share, 
   }
 }
 
-/// Refutes hypotheses with an effect that does not lower the loss of flights held out.
-void refute_idle_effects(const FlightList& tests, Inference& d) {
-  const RowContext context = row_context_of(tests, d.noise_sd);
-  const std::optional<double> alone = losses_of(context, d.refit).mean();
-  std::vector<ScoredHypothesis>& all = d.hypotheses;
-  std::vector<std::optional<double>> losses;
-  for (const ScoredHypothesis& a : all) losses.push_back(losses_of(context, a.held_out).mean());
-  const auto idle = [&](std::size_t with, const std::optional<double>& without) {
-    if (all[with].held_out.empty() || !without) return false;
-    return !losses[with] || !(*losses[with] < *without);  // none: it diverges
-  };
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (!all[i].fitted()) continue;
-    bool refuted = all[i].effects.size() == 1 && idle(i, alone);
-    for (std::size_t k = 0; k < all.size(); ++k) {
-      const ScoredHypothesis& part = all[k];
-      refuted |= part.fitted() && part.has_remainder() == all[i].has_remainder() &&
-                 part.effects.size() + 1 == all[i].effects.size() && idle(i, losses[k]) &&
-                 std::ranges::all_of(part.effects,
-                                     [&](const std::string& e) { return std::ranges::count(all[i].effects, e) > 0; });
-    }
-    if (refuted) all[i].log_evidence = kRefuted;
-  }
-}
-
-/// A background magnitude acts linearly, while a simulated effect may explain more. So that this is no evidence for the
-/// effect, other hypotheses may have it as background, at the log-prior cost.
-void share_backgrounds(const RobotFit& robot, const Scales& scales, double penalty_nats,
-                       std::vector<ScoredHypothesis>& all) {
-  const double before = parameters_alone(all).log_evidence;
-  for (const ScoredHypothesis& a : all) {
-    if (!a.fitted()) continue;
-    const Hypothesis h(robot.uncertain(), a.effects);
-    // an effect whose law deviates from the catalogue's by more counts as one of larger magnitude
-    const VectorXd mean = std::max(1.0, a.fit.law_factor) * a.fit.mean();
-    std::map<std::string, double> beyond;
-    for (const std::string& e : a.effects) {
-      std::vector<double> magnitudes;
-      for (Eigen::Index i = h.shared(); i < h.size(); ++i) {
-        const Unknown& u = h.unknowns()[static_cast<std::size_t>(i)];
-        if (u.effect == e && u.magnitude) magnitudes.push_back(mean[i]);
-      }
-      beyond[e] = robot.beyond_background(
-          e, Eigen::Map<VectorXd>(magnitudes.data(), static_cast<Eigen::Index>(magnitudes.size())), scales);
-    }
-    for (ScoredHypothesis& b : all) {
-      if (b.kind == HypothesisKind::none || b.has_remainder() != a.has_remainder()) continue;
-      if (b.effects.size() >= a.effects.size() || (b.kind == HypothesisKind::effect && !b.fitted())) continue;
-      double explained = a.explained();
-      std::size_t shared = 0;
-      for (const std::string& e : a.effects)
-        if (std::ranges::count(b.effects, e) > 0) ++shared;
-        else explained -= std::max(beyond[e], 0.0);
-      if (b.kind == HypothesisKind::unknown && !b.has_remainder()) explained -= penalty_nats;
-      if (shared < b.effects.size() || b.log_prior + explained <= b.log_evidence) continue;
-      b.log_evidence = b.log_prior + explained;
-      b.predicted_with = a.predicted_with.empty() ? a.effects : a.predicted_with;
-    }
-  }
-  for (ScoredHypothesis& b : all)
-    if (b.kind == HypothesisKind::effect && !b.fitted()) b.log_evidence += parameters_alone(all).log_evidence - before;
-}
-
 }  // namespace
-
-std::string pool_name(const std::vector<std::string>& effects) {
-  std::vector<std::string> groups;
-  for (const std::string& e : effects) groups.push_back(model::group_of(e));
-  std::ranges::sort(groups);
-  std::string name;
-  for (const std::string& g : groups) name += (name.empty() ? "" : "+") + g;
-  return name;
-}
 
 void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule) {
   const VectorXd mean = fit.mean();
@@ -160,19 +83,15 @@ void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictR
   std::ranges::stable_sort(hypotheses, std::greater{}, &ScoredHypothesis::probability);
 }
 
-void conclude(const VerdictRule& rule, Inference& d, bool contrast) {
+void conclude(const VerdictRule& rule, const PoolOf& pool_of_each, Inference& d) {
   struct Pool {
     double probability = 0;
     std::size_t best = 0;
   };
   const std::vector<ScoredHypothesis>& all = d.hypotheses;
   std::map<std::string, Pool> pools;  // by key: "/" tells other kinds from groups of effects
-  const auto key = [&](const ScoredHypothesis& a) {
-    if (a.kind == HypothesisKind::effect) return pool_name(a.effects);
-    return "/" + std::string(name_of(contrast && a.kind == HypothesisKind::none ? HypothesisKind::parameters : a.kind));
-  };
   for (std::size_t i = 0; i < all.size(); ++i) {
-    const auto [at, fresh] = pools.try_emplace(key(all[i]), Pool{0, i});
+    const auto [at, fresh] = pools.try_emplace(pool_of_each(all[i]), Pool{0, i});
     at->second.probability += all[i].probability;
     if (all[i].probability > all[at->second.best].probability) at->second.best = i;
   }
@@ -215,33 +134,20 @@ void conclude(const VerdictRule& rule, Inference& d, bool contrast) {
   d.verdict.kind = VerdictKind::group;
   d.verdict.probability = pool.probability;
   for (const ScoredHypothesis& a : all) {
-    if (key(a) != name || a.probability < rule.naming.member_of_pool * pool.probability) continue;
+    if (pool_of_each(a) != name || a.probability < rule.naming.member_of_pool * pool.probability) continue;
     for (const std::string& e : a.effects)
       if (!std::ranges::count(d.verdict.effects, e)) d.verdict.effects.push_back(e);
   }
 }
 
-void predict_with_the_likeliest(Inference& d) {
-  ScoredHypothesis& concluded = d.hypotheses[d.concluded];
-  if (concluded.kind == HypothesisKind::none) return;
-  const auto names = [](const ScoredHypothesis& a) { return std::set(a.effects.begin(), a.effects.end()); };
-  double most = concluded.log_evidence;
-  for (const ScoredHypothesis& a : d.hypotheses)
-    if (a.fitted() && a.has_remainder() == concluded.has_remainder() && a.log_evidence > most &&
-        std::ranges::includes(names(a), names(concluded)))
-      most = a.log_evidence, concluded.predicted_with = a.effects;
-}
-
-void decide(const RobotFit& robot, const Fitter& fitter, const Flights& flights, const VerdictRule& rule,
-            Inference& d) {
-  const DiagnosisPolicy& policy = robot.evidence().policy();
+void decide(const Question& question, const RobotFit& robot, const Fitter& fitter, const Flights& flights,
+            const VerdictRule& rule, Inference& d) {
   if (rule.refutation.min_share > 0) refute(robot.evidence(), flights, rule.refutation.min_share, d);
-  if (policy.discrepancy_scales && !robot.evidence().contrasts())
-    share_backgrounds(robot, fitter.scales(), rule.unknown.penalty_nats, d.hypotheses);
-  if (!robot.evidence().contrasts()) refute_idle_effects(flights.tests, d);
+  question.refute(robot, fitter, flights, rule, d);
   set_probabilities(d.hypotheses, rule);
-  conclude(rule, d, robot.evidence().contrasts());
-  if (policy.discrepancy_scales) predict_with_the_likeliest(d);
+  conclude(
+      rule, [&](const ScoredHypothesis& a) { return question.pool(a); }, d);
+  question.choose_predicting(d);
 }
 
 }  // namespace flappy::gap

@@ -1,10 +1,11 @@
 // The last stage of a diagnosis: the probabilities of the hypotheses, and the verdict.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
-#include "gap/diagnose/inference.hpp"
+#include "gap/question/question.hpp"
 
 namespace flappy::gap {
 
@@ -25,22 +26,17 @@ double tempered(double nats, const VerdictRule& rule);
 /// Sets the probabilities, and sorts the hypotheses: the most probable first.
 void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictRule& rule);
 
+/// Name of the pool of a hypothesis; that of a hypothesis without effects begins with "/".
+using PoolOf = std::function<std::string(const ScoredHypothesis&)>;
+
 /// Sets d.verdict and d.concluded. Hypotheses with effects of the same groups (EffectInfo::group) form a pool, as short
 /// flights often cannot tell them apart. The verdict names the most probable hypothesis of the most probable pool if
-/// its share of the whole probability, or of that pool's, is large enough (`naming` of the rule); else it is `group`. In
-/// a contrast, none and parameters form a pool, too: in both, nothing that matters changed.
-void conclude(const VerdictRule& rule, Inference& d, bool contrast = false);
+/// its share of the whole probability, or of that pool's, is large enough (`naming` of the rule); else it is `group`.
+void conclude(const VerdictRule& rule, const PoolOf& pool, Inference& d);
 
-/// Sets predicted_with of the conclusion to the effects of the likeliest hypothesis that contains its own. Further
-/// effects may be due to chance, so they are not named; yet a vehicle with them predicts better.
-void predict_with_the_likeliest(Inference& d);
-
-/// Refutes hypotheses that explain too little of held-out flights, and effects without which these are predicted as well.
-/// Lets hypotheses without an effect have it as background. Then sets the probabilities and concludes.
-/// `fitter`: with the scales of the parameters alone.
-void decide(const RobotFit& robot, const Fitter& fitter, const Flights& flights, const VerdictRule& rule, Inference& d);
-
-/// Sorted groups of the effects, joined by +: "body_drag+world_force". An effect without a group is its own group.
-std::string pool_name(const std::vector<std::string>& effects);
+/// Refutes hypotheses that explain too little of held-out flights, and those that the question refutes. Then sets the
+/// probabilities and concludes. `fitter`: with the scales of the parameters alone.
+void decide(const Question& question, const RobotFit& robot, const Fitter& fitter, const Flights& flights,
+            const VerdictRule& rule, Inference& d);
 
 }  // namespace flappy::gap

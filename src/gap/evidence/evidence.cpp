@@ -56,11 +56,12 @@ void Regressors::add(const BasisCoefficients& column, double prior_mean, int eff
   priors.push_back(prior);
 }
 
-Evidence::Evidence(const Flights& flights, ModelDiscrepancy discrepancy, int threads)
-    : flights_(&flights),
+Evidence::Evidence(const EvidenceRules& rules, const Flights& flights, ModelDiscrepancy discrepancy, int threads)
+    : rules_(&rules),
+      flights_(&flights),
       discrepancy_(std::move(discrepancy)),
       threads_(threads),
-      basis_(std::make_shared<const RegimeBasis>(flights)),
+      basis_(std::make_shared<const RegimeBasis>(rules, flights)),
       groups_(kGroups) {
   for (const auto& f : flights.all()) weights_.emplace_back(f->beats() * kRowsPerBeat, 1.0);
   for (int channel = 0; channel < kChannels; ++channel) {
@@ -161,9 +162,8 @@ VectorXd Evidence::session_means(const Residuals& residual, int group) const {
       });
     return n > 0 ? sum / n : 0;
   };
-  const bool contrast = contrasts();
-  delta[0] = mean_of(contrast || flights_->is_reference(0));
-  for (int i = 0; contrast && i < basis().size(); ++i)
+  delta[0] = mean_of(flights_->is_reference(0));
+  for (int i = 0; i < basis().size(); ++i)
     if (basis().of_tests(i) && basis().kind(i) == BasisFunction::constant) delta[i] = mean_of(false) - delta[0];
   return delta;
 }

@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "gap/evidence/evidence_rules.hpp"
 #include "gap/evidence/model_discrepancy.hpp"
 #include "gap/replay/residuals.hpp"
 
@@ -29,14 +30,13 @@ inline constexpr int kGroups = kChannels * kCoefficients;
 /// function but the offsets of flights follows a second time, as what differs in the test flights: 0 in the references.
 class RegimeBasis {
  public:
-  explicit RegimeBasis(const Flights& flights);
+  RegimeBasis(const EvidenceRules& rules, const Flights& flights);
   int size() const { return static_cast<int>(functions_.size()); }
   const std::string& name(int i) const { return function(i).name; }
   const std::string& quantity(int i) const { return function(i).quantity; }
   BasisFunction kind(int i) const { return function(i).kind; }
   /// Whether a function is 0 in the references. These functions come last; none without references.
   bool of_tests(int i) const { return function(i).of_tests; }
-  bool contrasts() const { return functions_.back().of_tests; }
   /// The same change in the test flights alone. `coefficients`: [group][size()].
   Eigen::MatrixXd in_tests(const Eigen::MatrixXd& coefficients) const { return coefficients * in_tests_; }
   /// A change of the test flights alone, as it would be in all flights.
@@ -53,8 +53,8 @@ class RegimeBasis {
     BasisFunction kind;
     bool of_tests = false;
   };
-  void append_functions(const Flights& flights);
-  void append_of_tests(const Flights& flights);
+  void append_functions(const Flights& flights, const std::vector<std::size_t>& offsets);
+  void append_of_tests(const Flights& flights, const std::vector<std::size_t>& tests);
   void find_covered(const Flights& flights);
   const Function& function(int i) const { return functions_[static_cast<std::size_t>(i)]; }
   std::vector<Function> functions_;
@@ -128,8 +128,8 @@ struct ScaledEvidence {
 /// Rows of flights, whitened by a model of their noise. Immutable: with_... return a changed copy.
 class Evidence {
  public:
-  /// With the noise that the headers declare. Keeps a reference to `flights`.
-  Evidence(const Flights& flights, ModelDiscrepancy discrepancy, int threads);
+  /// With the noise that the headers declare. Keeps references to `rules` and `flights`.
+  Evidence(const EvidenceRules& rules, const Flights& flights, ModelDiscrepancy discrepancy, int threads);
 
   /// Learns standard deviation, autocorrelation and weights of outliers from the residual of a good fit.
   Evidence with_noise(const Residuals& residual) const;
@@ -140,10 +140,7 @@ class Evidence {
   Evidence with_discrepancy(ModelDiscrepancy discrepancy) const;
 
   const RegimeBasis& basis() const { return *basis_; }
-  /// Whether test flights are compared with references.
-  bool contrasts() const { return basis_->contrasts(); }
   const ModelDiscrepancy& discrepancy() const { return discrepancy_; }
-  const DiagnosisPolicy& policy() const { return flight(0).policy(!flights_->references.empty()); }
 
   /// Coefficients of rows on the basis, by least squares. Simulated differences are rough, as a small change moves the
   /// step in which a wing meets its stop; what is not smooth in the regime is noise under every hypothesis.
@@ -192,7 +189,6 @@ class Evidence {
   enum class Learn { declared, weights, noise, rest_as_noise };
   const PredictedFlight& flight(std::size_t f) const { return *(*flights_)[f]; }
   bool has_rows(int group) const { return flight(0).has_rows(group / kCoefficients, group % kCoefficients); }
-  bool may_be_free(std::size_t block) const;
   void sum_basis();
   std::pair<Eigen::MatrixXd, Eigen::VectorXd> sums_of(const SufficientStatistics& residual,
                                                       const std::vector<char>& use, int group) const;
@@ -205,6 +201,7 @@ class Evidence {
   Eigen::VectorXd prior_sd(int group) const;
   static double smooth_square(Eigen::MatrixXd normal, const Eigen::VectorXd& right);
 
+  const EvidenceRules* rules_;
   const Flights* flights_;
   ModelDiscrepancy discrepancy_;
   int threads_;

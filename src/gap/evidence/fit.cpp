@@ -25,8 +25,6 @@ constexpr double kConverged = 0.02;
 constexpr double kMinInformation = 0.05;
 /// Largest distance, in reaches, at which the columns of another point are used.
 constexpr double kMaxDistance = 2;
-/// A change follows a function of the place if its square along it is at least this share of the largest.
-constexpr double kFollows = 0.1;
 constexpr int kMaxEffectSteps = 2;
 
 /// Directions of a fit with a column.
@@ -133,8 +131,8 @@ void Fitter::average(const std::vector<Residuals>& rows, const std::vector<Vecto
     for (VectorXd& sum : flight) sum /= n;
 }
 
-Fitter::Fitter(const Flights& flights, std::shared_ptr<const Evidence> evidence, int threads)
-    : flights_(&flights), evidence_(std::move(evidence)), threads_(threads) {}
+Fitter::Fitter(const FitRules& rules, const Flights& flights, std::shared_ptr<const Evidence> evidence, int threads)
+    : rules_(&rules), flights_(&flights), evidence_(std::move(evidence)), threads_(threads) {}
 
 Fitter Fitter::with_evidence(std::shared_ptr<const Evidence> evidence) const {
   Fitter f = *this;
@@ -230,14 +228,13 @@ Regressors Fitter::unscaled_regressors(const Fit& fit) const {
   return r;
 }
 
-/// Linear change by each effect's magnitudes. Without references, effects of sensors are left out: their errors hide
-/// behind those of the model.
+/// Linear change by those magnitudes of each effect whose law may deviate.
 std::map<std::string, BasisCoefficients> Fitter::changes(const Hypothesis& hypothesis, const Fit& fit) const {
   std::map<std::string, BasisCoefficients> whole;
   for (Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
     const Unknown& u = hypothesis.unknowns()[static_cast<std::size_t>(i)];
     const BasisCoefficients& column = fit.columns[static_cast<std::size_t>(i)];
-    if (!u.magnitude || (u.in_log && !evidence_->contrasts()) || column.size() == 0) continue;
+    if (!u.magnitude || !rules_->law_may_deviate(u) || column.size() == 0) continue;
     BasisCoefficients& change = whole[u.effect];
     if (change.size() == 0) change = BasisCoefficients::Zero(column.rows(), column.cols());
     change += fit.at[i] * column;
@@ -252,67 +249,9 @@ BasisCoefficients Fitter::law_sd(const Hypothesis& hypothesis, const Fit& fit, d
   return squares.cwiseSqrt();
 }
 
-bool Fitter::acts_by_place(const Hypothesis& hypothesis, const Fit& fit) const {
+bool Fitter::law_may_deviate(const Hypothesis& hypothesis, const Fit& fit) const {
   return std::ranges::any_of(changes(hypothesis, fit),
                              [&](const auto& change) { return law_sd_of(change.first, change.second, 1).any(); });
-}
-
-/// The law of an effect by the place (near surfaces, at a tether, in time) may deviate from the catalogue's. An effect
-/// acts by the place if more than half of its change follows functions of the place; along each of these, each load may
-/// deviate by the rms of the loads times the law factor. Elsewhere the factor, which may be large, does not count, or a
-/// heating motor would explain loads that depend on the heading.
-BasisCoefficients Fitter::law_sd_of(const std::string& effect, const BasisCoefficients& change,
-                                    double law_factor) const {
-  const RegimeBasis& basis = evidence_->basis();
-  BasisCoefficients sd = BasisCoefficients::Zero(change.rows(), change.cols());
-  if (!evidence_->policy().discrepancy_scales) return sd;
-  if (evidence_->contrasts())
-    return law_factor * evidence_->discrepancy().session.law_error_of(effect) * spread_of(change);
-  const auto of_place = [&](int i) { return regimes_of(basis.kind(i)) == Regimes::place; };
-  const auto load = [](int g) { return g / kCoefficients <= kForceZ; };
-  VectorXd squares = VectorXd::Zero(change.cols());
-  double groups = 0, place = 0, all = 0, most = 0;
-  for (int g = 0; g < kGroups; ++g) {
-    const double signal = evidence_->signal(g);
-    if (!load(g) || !(signal > 0)) continue;
-    squares += (change.row(g).transpose() / signal).cwiseAbs2();
-    ++groups;
-  }
-  for (int i = 1; i < basis.size(); ++i) {
-    all += squares[i];
-    if (of_place(i)) place += squares[i], most = std::max(most, squares[i]);
-  }
-  if (!(place > all / 2)) return sd;
-  for (int g = 0; g < kGroups; ++g)
-    for (int i = 1; i < basis.size(); ++i)
-      if (load(g) && of_place(i))
-        sd(g, i) =
-            (squares[i] > kFollows * most ? law_factor : 1) * std::sqrt(squares[i] / groups) * evidence_->signal(g);
-  return sd;
-}
-
-/// In a contrast, another law of the same cause changes a coefficient of the tests by a share of the effect's change:
-/// half of the square where the effect changes it, half in other harmonics and axes of channels of the same kind.
-BasisCoefficients Fitter::spread_of(const BasisCoefficients& change) const {
-  const RegimeBasis& basis = evidence_->basis();
-  const auto kind = [](int g) {
-    const int channel = g / kCoefficients;
-    return channel <= kTorqueZ ? 0 : channel <= kForceZ ? 1 : 2;
-  };
-  MatrixXd squares = MatrixXd::Zero(3, basis.size());
-  VectorXd groups = VectorXd::Zero(3);
-  for (int g = 0; g < kGroups; ++g) {
-    if (!(evidence_->signal(g) > 0)) continue;
-    squares.row(kind(g)) += (change.row(g) / evidence_->signal(g)).cwiseAbs2();
-    groups[kind(g)] += 1;
-  }
-  BasisCoefficients spread = BasisCoefficients::Zero(change.rows(), change.cols());
-  for (int g = 0; g < kGroups; ++g)
-    for (int i = 0; i < basis.size(); ++i)
-      if (basis.of_tests(i) && evidence_->signal(g) > 0)
-        spread(g, i) = std::sqrt(0.5 * std::pow(change(g, i), 2) +
-                                 0.5 * std::pow(evidence_->signal(g), 2) * squares(kind(g), i) / groups[kind(g)]);
-  return spread;
 }
 
 Posterior Fitter::posterior(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const {
@@ -431,52 +370,15 @@ Fit Fitter::fit_effects(const Hypothesis& hypothesis, const VectorXd& start, con
         linearise(hypothesis, at, joint_directions(hypothesis, parameters), shared_columns(hypothesis, parameters));
     if (!result.flown()) return result;
     const Regressors r = regressors(result);
-    // in a contrast, what another law of the cause leaves is larger than what sessions differ by
-    const BasisCoefficients sd =
-        evidence_->contrasts() ? discrepancy_sd(hypothesis, result) : evidence_->discrepancy_sd(scales_);
+    const BasisCoefficients sd = rules_->effects_discrepancy_sd(*this, hypothesis, result);
     result.posterior = solve(result, r, evidence_->reduce(result.statistics, r.columns, all_flights(), sd));
     if (n == kMaxEffectSteps) return result;
     VectorXd there = hypothesis.bounded(result.mean());
     there.head(hypothesis.shared()) = at.head(hypothesis.shared());
-    if (evidence_->contrasts()) there = best_on_the_way(hypothesis, result, there, sd);
+    there = rules_->next_effects(*this, hypothesis, result, there, sd);
     if ((there - at).cwiseAbs().maxCoeff() < kFirstReach) return result;
     at = there;
   }
-}
-
-/// Returns the point with the largest evidence among a fit, points from it to `there`, and points from it to no effect.
-/// In a contrast the step of a linear model may lead to where the model does not hold.
-VectorXd Fitter::best_on_the_way(const Hypothesis& hypothesis, const Fit& fit, const VectorXd& there,
-                                 const BasisCoefficients& sd) const {
-  const Index shared = hypothesis.shared(), effects = hypothesis.size() - shared;
-  for (Index i = shared; i < hypothesis.size(); ++i)
-    if (hypothesis.unknowns()[static_cast<std::size_t>(i)].in_log) return there;  // linear
-  constexpr double kShares[] = {1, 0.5, 0.2}, kShrunk[] = {0.5, 0.2};
-  std::vector<VectorXd> tries;
-  for (const double share : kShares) tries.push_back(hypothesis.bounded(fit.at + share * (there - fit.at)));
-  for (const double share : kShrunk) {
-    tries.push_back(fit.at);
-    tries.back().tail(effects) *= share;
-    tries.back() = hypothesis.bounded(tries.back());
-  }
-  std::vector<VehicleHypothesis> vehicles;
-  for (const VectorXd& at : tries) vehicles.push_back(hypothesis.vehicle(at));
-  std::vector<Residuals> left = residuals(*flights_, vehicles, threads_);
-  left.push_back(fit.residual);
-  tries.push_back(fit.at);
-  Fit parameters = fit;
-  parameters.columns.resize(static_cast<std::size_t>(shared));
-  parameters.directions.axes.conservativeResize(Eigen::NoChange, shared);
-  const Regressors r = regressors(parameters);
-  const VectorXd prior_mean = r.prior_mean();
-  std::vector<double> values(tries.size(), -std::numeric_limits<double>::infinity());
-  io::parallel_for(tries.size(), threads_, [&](std::size_t i) {
-    if (left[i].empty()) return;
-    const Reduced reduced = evidence_->reduce(evidence_->statistics(left[i]), r.columns, all_flights(), sd);
-    values[i] = Evidence::posterior(reduced, r.all, prior_mean, false).log_evidence -
-                0.5 * tries[i].tail(effects).squaredNorm();
-  });
-  return tries[static_cast<std::size_t>(std::ranges::max_element(values) - values.begin())];
 }
 
 Fit Fitter::fit_linear(const Hypothesis& hypothesis, const Fit& parameters,
@@ -563,7 +465,7 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, c
         costs[best] = std::numeric_limits<double>::infinity();
         weigh(best, {});
       }
-      improved = costs.back() - costs[best] >= evidence_->policy().min_step_nats;
+      improved = costs.back() - costs[best] >= rules_->min_step_nats();
       if (improved) {
         const VectorXd away = fit.directions.axes.transpose() * (tries[best] - linearised_at);
         if (away.cwiseAbs().cwiseQuotient(fit.directions.reach).maxCoeff() > kMaxDistance) {

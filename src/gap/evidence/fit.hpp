@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "gap/evidence/evidence.hpp"
+#include "gap/evidence/fit_rules.hpp"
 #include "gap/evidence/hypothesis.hpp"
 
 namespace flappy::gap {
@@ -52,8 +53,8 @@ class Fitter {
   /// Columns of magnitudes by [effect, name].
   using LinearMagnitudes = std::map<std::pair<std::string, std::string>, BasisCoefficients>;
 
-  /// Without nuisance regressors; scales are 1. Keeps a reference to `flights`.
-  Fitter(const Flights& flights, std::shared_ptr<const Evidence> evidence, int threads);
+  /// Without nuisance regressors; scales are 1. Keeps references to `rules` and `flights`.
+  Fitter(const FitRules& rules, const Flights& flights, std::shared_ptr<const Evidence> evidence, int threads);
   Fitter with_evidence(std::shared_ptr<const Evidence> evidence) const;
   /// Fits `nuisances`, then background magnitudes, jointly with every hypothesis, even those of effects that it names.
   /// Leaves out regressors on which the flights have no information, given `fit`.
@@ -63,6 +64,9 @@ class Fitter {
   Fitter with_scales(Scales scales) const;
   Fitter without_background() const;
 
+  const FitRules& rules() const { return *rules_; }
+  const Flights& flights() const { return *flights_; }
+  int threads() const { return threads_; }
   const Evidence& evidence() const { return *evidence_; }
   const Scales& scales() const { return scales_; }
   /// Names of Scales::effects.
@@ -106,14 +110,19 @@ class Fitter {
   /// contrast, changes of the parameters, and what the model gets wrong in both sessions or sessions differ by. Effects
   /// follow the laws of the catalogue.
   BasisCoefficients explained(const Fit& fit, const std::vector<char>& use) const;
-  /// Standard deviation, [group][basis], of the deviations of effects that act by the place from the catalogue's laws.
+  /// Standard deviation, [group][basis], of the deviations of effects from the catalogue's laws.
   BasisCoefficients law_sd(const Hypothesis& hypothesis, const Fit& fit) const {
     return law_sd(hypothesis, fit, fit.law_factor);
   }
   BasisCoefficients law_sd(const Hypothesis& hypothesis, const Fit& fit, double law_factor) const;
   /// The same for one effect. `change`: [group][basis] what it adds to the prediction.
-  BasisCoefficients law_sd_of(const std::string& effect, const BasisCoefficients& change, double law_factor) const;
-  bool acts_by_place(const Hypothesis& hypothesis, const Fit& fit) const;
+  BasisCoefficients law_sd_of(const std::string& effect, const BasisCoefficients& change, double law_factor) const {
+    return rules_->law_sd(*evidence_, effect, change, law_factor);
+  }
+  /// Whether the law of an effect may deviate at all.
+  bool law_may_deviate(const Hypothesis& hypothesis, const Fit& fit) const;
+  /// That of the model, with the fitter's scales, and of the laws of the effects.
+  BasisCoefficients discrepancy_sd(const Hypothesis& hypothesis, const Fit& fit) const;
 
   /// A fit without a posterior. `known`: columns of the first directions, which are not simulated again.
   Fit linearise(const Hypothesis& hypothesis, const Eigen::VectorXd& at, Directions directions,
@@ -135,8 +144,6 @@ class Fitter {
 
  private:
   std::map<std::string, BasisCoefficients> changes(const Hypothesis& hypothesis, const Fit& fit) const;
-  BasisCoefficients spread_of(const BasisCoefficients& change) const;
-  BasisCoefficients discrepancy_sd(const Hypothesis& hypothesis, const Fit& fit) const;
   /// Null: the direction is not a linear magnitude.
   const BasisCoefficients* linear_column(const Hypothesis& hypothesis, Eigen::Index direction) const;
   static Directions joint_directions(const Hypothesis& hypothesis, const Fit& parameters);
@@ -147,8 +154,6 @@ class Fitter {
   std::vector<Eigen::VectorXd> around(const Hypothesis& hypothesis, const Eigen::VectorXd& at,
                                       const Directions& directions, const std::vector<BasisCoefficients>& known,
                                       std::vector<VehicleHypothesis>& vehicles) const;
-  Eigen::VectorXd best_on_the_way(const Hypothesis& hypothesis, const Fit& fit, const Eigen::VectorXd& there,
-                                  const BasisCoefficients& sd) const;
   void average(const std::vector<Residuals>& rows, const std::vector<Eigen::VectorXd>& shifts, Fit& fit) const;
   Reduced reduce(const Fit& fit, const Regressors& regressors) const;
   Posterior solve(const Fit& fit, const Regressors& regressors, Reduced reduced, double damping = 0) const;
@@ -166,6 +171,7 @@ class Fitter {
   };
   void add_nuisances(bool scaled, Regressors& to) const;
 
+  const FitRules* rules_;
   const Flights* flights_;
   std::shared_ptr<const Evidence> evidence_;
   int threads_;

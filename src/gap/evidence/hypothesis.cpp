@@ -49,6 +49,10 @@ Hypothesis::Hypothesis(const sim::Randomisation& uncertain, std::vector<std::str
     }
 }
 
+Eigen::Index Hypothesis::first_of(const std::string& effect) const {
+  return std::ranges::find(unknowns_, effect, &Unknown::effect) - unknowns_.begin();
+}
+
 Eigen::VectorXd Hypothesis::start(const model::Vehicle& vehicle) const {
   Eigen::VectorXd at = Eigen::VectorXd::Zero(size());
   const auto& effects = vehicle.effects;

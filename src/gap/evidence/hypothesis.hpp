@@ -45,6 +45,8 @@ class Hypothesis {
   Eigen::Index parameters() const { return static_cast<Eigen::Index>(uncertain_->majors()); }
   Eigen::Index lag() const { return parameters(); }
   Eigen::Index shared() const { return parameters() + 1; }
+  /// Index of the first unknown of an effect.
+  Eigen::Index first_of(const std::string& effect) const;
   /// Coordinates of a vehicle. Effects that it lacks have magnitudes of 0, and shape parameters in mid-prior.
   Eigen::VectorXd start(const model::Vehicle& vehicle) const;
   Eigen::VectorXd start() const { return start(uncertain_->nominal()); }

@@ -5,13 +5,16 @@
 
 namespace flappy::gap {
 
-RegimeBasis::RegimeBasis(const Flights& flights) {
-  append_functions(flights);
-  append_of_tests(flights);
+RegimeBasis::RegimeBasis(const EvidenceRules& rules, const Flights& flights) {
+  covered_.fill(true);
+  append_functions(flights, rules.offsets(flights));
+  const std::vector<std::size_t> apart = rules.apart(flights);
+  if (apart.empty()) return;
+  append_of_tests(flights, apart);
   find_covered(flights);
 }
 
-void RegimeBasis::append_functions(const Flights& flights) {
+void RegimeBasis::append_functions(const Flights& flights, const std::vector<std::size_t>& offsets) {
   values_.resize(flights.size());
   std::vector<std::vector<RegimeFunction>> functions;
   std::vector<Eigen::VectorXd> column;
@@ -45,9 +48,7 @@ void RegimeBasis::append_functions(const Flights& flights) {
     append(functions.front()[i].name, functions.front()[i].quantity, functions.front()[i].kind);
   }
   // an offset for each flight would otherwise look like an influence of that flight's height
-  const bool offsets = flights[0]->policy(!flights.references.empty()).flight_offsets;
-  for (std::size_t offset = 1; offset < flights.size() && offsets; ++offset) {
-    if (flights.is_reference(offset) != flights.is_reference(offset - 1)) continue;  // the first of the tests
+  for (const std::size_t offset : offsets) {
     for (std::size_t f = 0; f < flights.size(); ++f) column[f].setConstant(f == offset ? 1 : 0);
     append("flight " + flights[offset]->name(), "flight", BasisFunction::flight);
   }
@@ -65,13 +66,12 @@ void RegimeBasis::append_functions(const Flights& flights) {
   }
 }
 
-void RegimeBasis::append_of_tests(const Flights& flights) {
-  if (!flights.contrast()) return;
+void RegimeBasis::append_of_tests(const Flights& flights, const std::vector<std::size_t>& tests) {
   const int once = size();
   for (int i = 0; i < once; ++i) {
     if (kind(i) == BasisFunction::flight) continue;
     for (std::size_t f = 0; f < flights.size(); ++f) {
-      const Eigen::VectorXd column = (flights.is_reference(f) ? 0.0 : 1.0) * values_[f].col(i);
+      const Eigen::VectorXd column = (std::ranges::count(tests, f) > 0 ? 1.0 : 0.0) * values_[f].col(i);
       values_[f].conservativeResize(column.size(), values_[f].cols() + 1);
       values_[f].rightCols(1) = column;
     }
@@ -111,7 +111,7 @@ void RegimeBasis::find_covered(const Flights& flights) {
     return squares / n - sum * sum / (n * n);
   };
   std::array<double, static_cast<std::size_t>(Regimes::count)> shares{}, counts{};
-  for (int i = 1; flights.contrast() && i < size() && !of_tests(i); ++i) {
+  for (int i = 1; i < size() && !of_tests(i); ++i) {
     if (kind(i) == BasisFunction::flight) continue;
     const auto c = static_cast<std::size_t>(regimes_of(kind(i)));
     const double in_tests = variance(i, false);

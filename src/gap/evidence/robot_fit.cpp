@@ -24,9 +24,6 @@ constexpr int kRestRounds = 3;
 /// Another round needs this gain and is undone at this loss; smaller changes may be errors of linear models.
 constexpr double kMinGain_nats = 2;
 
-/// Prior of the law factor: standard deviation of its log, and its largest value.
-constexpr double kLawFactorSd = 1, kMaxLawFactor = 32;
-
 constexpr const char* kDelay = "delay_s";
 constexpr const char* kDiverges =
     "the vehicle: its simulation of these flights diverges; accepted: a vehicle that flies what was flown";
@@ -46,13 +43,13 @@ std::vector<std::string> without_idle(std::vector<std::string> withheld, const F
 
 }  // namespace
 
-RobotFit::RobotFit(Stages stages, const Flights& flights, const sim::Randomisation& uncertain,
+RobotFit::RobotFit(Stages stages, const FitRules& rules, const Flights& flights, const sim::Randomisation& uncertain,
                    const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads)
     : flights_(flights),
       uncertain_(uncertain),
       withheld_(without_idle(std::move(withheld), flights)),
       threads_(io::thread_count(threads)),
-      fitter_(flights, std::make_shared<const Evidence>(flights, discrepancy, threads_), threads_),
+      fitter_(rules, flights, std::make_shared<const Evidence>(rules, flights, discrepancy, threads_), threads_),
       no_effects_(uncertain_, {}) {
   if (stages == Stages::planned) {
     parameters_ = nominal_ = fitter_.linearise(no_effects_, no_effects_.start(), Fitter::axes(no_effects_));
@@ -63,27 +60,27 @@ RobotFit::RobotFit(Stages stages, const Flights& flights, const sim::Randomisati
   if (stages == Stages::all) refit_with_nuisances();
 }
 
-RobotFit::RobotFit(const Flights& flights, const sim::Randomisation& uncertain, const ModelDiscrepancy& discrepancy,
-                   std::vector<std::string> withheld, int threads)
-    : RobotFit(Stages::all, flights, uncertain, discrepancy, std::move(withheld), threads) {}
+RobotFit::RobotFit(const FitRules& rules, const Flights& flights, const sim::Randomisation& uncertain,
+                   const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads)
+    : RobotFit(Stages::all, rules, flights, uncertain, discrepancy, std::move(withheld), threads) {}
 
-RobotFit RobotFit::of_references(const Flights& flights, const sim::Randomisation& uncertain,
+RobotFit RobotFit::of_references(const FitRules& rules, const Flights& flights, const sim::Randomisation& uncertain,
                                  const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads) {
-  return RobotFit(Stages::parameters, flights, uncertain, discrepancy, std::move(withheld), threads);
+  return RobotFit(Stages::parameters, rules, flights, uncertain, discrepancy, std::move(withheld), threads);
 }
 
-RobotFit RobotFit::planned(const Flights& flights, const sim::Randomisation& uncertain,
+RobotFit RobotFit::planned(const FitRules& rules, const Flights& flights, const sim::Randomisation& uncertain,
                            const ModelDiscrepancy& discrepancy, int threads) {
-  return RobotFit(Stages::planned, flights, uncertain, discrepancy, {}, threads);
+  return RobotFit(Stages::planned, rules, flights, uncertain, discrepancy, {}, threads);
 }
 
-RobotFit::RobotFit(const RobotFit& reference, const Flights& flights)
+RobotFit::RobotFit(const FitRules& rules, const RobotFit& reference, const Flights& flights)
     : flights_(flights),
       uncertain_(reference.uncertain_),
       withheld_(without_idle(reference.withheld_, flights)),
       threads_(reference.threads_),
-      fitter_(flights, std::make_shared<const Evidence>(flights, reference.evidence().discrepancy(), threads_),
-              threads_),
+      fitter_(rules, flights,
+              std::make_shared<const Evidence>(rules, flights, reference.evidence().discrepancy(), threads_), threads_),
       no_effects_(uncertain_, {}) {
   linearise_around(reference.parameters_);
   find_nuisance_columns();
@@ -97,35 +94,9 @@ RobotFit::RobotFit(const RobotFit& reference, const Flights& flights)
   fitter_ = fitter_.with_scales(scales);
 }
 
-double RobotFit::log_evidence_unchanged() const {
-  constexpr double kNothing = 1e-3;  // changes so many times smaller than those between sessions have no effect
-  ModelDiscrepancy d = evidence().discrepancy();
-  for (auto& channel : d.session.shares)
-    for (auto& harmonic : channel)
-      for (double& share : harmonic) share *= kNothing;
-  for (auto& [effect, sd] : d.session.background) sd *= kNothing;
-  for (auto& [name, sd] : d.session.parameters) sd *= kNothing;
-  const Fitter unchanged = fitter_given(d);
-  return unchanged.evidence()
-      .weigh(parameters_.statistics, unchanged.unscaled_regressors(parameters_), unchanged.all_flights(), {},
-             unchanged.scales())
-      .posterior.log_evidence;
-}
-
 Fitter RobotFit::fitter_given(const ModelDiscrepancy& discrepancy) const {
   return fitter_.with_evidence(std::make_shared<const Evidence>(evidence().with_discrepancy(discrepancy)))
-      .with_nuisances(nuisance_regressors(), all_backgrounds(discrepancy), parameters_);
-}
-
-/// With shapes. In a contrast, what changes between sessions; then, where references do not cover the regimes of the
-/// tests, so that errors of the model do not cancel, what the model gets wrong in both, without shapes.
-std::vector<Background> RobotFit::all_backgrounds(const ModelDiscrepancy& discrepancy) const {
-  if (!evidence().contrasts()) return background(discrepancy, true);
-  std::vector<Background> list = session_changes(discrepancy.session);
-  if (evidence().basis().covers_all()) return list;
-  for (const Background& b : background(discrepancy, false))
-    list.push_back({kModelOf + b.effect, evidence().basis().in_all(b.column)});
-  return list;
+      .with_nuisances(nuisance_regressors(), rules().backgrounds(*this, discrepancy), parameters_);
 }
 
 /// Learns the noise; fits nothing.
@@ -186,8 +157,7 @@ void RobotFit::find_nuisance_columns() {
 
 void RobotFit::refit_with_nuisances() {
   find_nuisance_columns();
-  if (evidence().policy().discrepancy_scales) widen_effects();
-  else learn_rest_as_noise();
+  rules().describe_rest(*this);
   parameters_ = fitter_.refit(no_effects_, parameters_, kRefitIterations);
   take_scales();
   for (int round = 0; round < kMaxRefits && refit_with_minors(); ++round) continue;
@@ -195,7 +165,7 @@ void RobotFit::refit_with_nuisances() {
 
 /// Parameters fitted with small backgrounds compensate for a large one, which no later fit finds; so each may be large
 /// at first.
-void RobotFit::widen_effects() {
+void RobotFit::widen_backgrounds() {
   Scales wide = weigh(no_effects_, parameters_, fitter_.scales()).scales;
   for (std::size_t e = 0; e < wide.effects.size(); ++e)
     wide.effects[e] = kWideScale * wide.prior_scale(evidence().discrepancy().scale_prior(fitter_.effects()[e]));
@@ -278,7 +248,8 @@ std::vector<Background> RobotFit::background(const ModelDiscrepancy& discrepancy
 }
 
 void RobotFit::set_nuisances() {
-  fitter_ = fitter_.with_nuisances(nuisance_regressors(), all_backgrounds(evidence().discrepancy()), parameters_);
+  fitter_ =
+      fitter_.with_nuisances(nuisance_regressors(), rules().backgrounds(*this, evidence().discrepancy()), parameters_);
 }
 
 /// Takes what all magnitudes of the catalogue together leave as noise, under every hypothesis.
@@ -304,9 +275,7 @@ void RobotFit::learn_rest_as_noise() {
 Scales RobotFit::find_scales(const Hypothesis& hypothesis, const Fit& fit, const Scales& start) const {
   ScaledEvidence best = weigh(hypothesis, fit, start);
   // expectation-maximisation stays where blocks explain what a background may explain better, so try larger ones
-  while (evidence().policy().discrepancy_scales) {
-    const std::optional<Scales> larger = larger_effect(hypothesis, fit, best.scales);
-    if (!larger) break;
+  while (const std::optional<Scales> larger = rules().larger_background(*this, hypothesis, fit, best.scales)) {
     ScaledEvidence other = weigh(hypothesis, fit, *larger);
     if (!(other.posterior.log_evidence > best.posterior.log_evidence + kMinGain_nats)) break;
     best = std::move(other);
@@ -316,7 +285,8 @@ Scales RobotFit::find_scales(const Hypothesis& hypothesis, const Fit& fit, const
 
 /// The scales with the largest gain from a larger background of one effect; none if none gains. With posterior mean m
 /// and covariance C, the likelihood of its coefficients is normal with precision C^-1 - 1 and sum C^-1 m.
-std::optional<Scales> RobotFit::larger_effect(const Hypothesis& hypothesis, const Fit& fit, const Scales& now) const {
+std::optional<Scales> RobotFit::larger_background(const Hypothesis& hypothesis, const Fit& fit,
+                                                  const Scales& now) const {
   const Fitter fitter = fitter_.with_scales(now);
   const Regressors r = fitter.regressors(fit);
   const BasisCoefficients law_sd = fitter.law_sd(hypothesis, fit);
@@ -355,14 +325,12 @@ std::optional<Scales> RobotFit::larger_effect(const Hypothesis& hypothesis, cons
 ScaledEvidence RobotFit::weigh(const Hypothesis& hypothesis, const Fit& fit, const Scales& start,
                                std::optional<double> unknown_penalty_nats) const {
   const Regressors regressors = fitter_.unscaled_regressors(fit);
-  const SessionVariation& session = evidence().discrepancy().session;
-  const double spread = evidence().contrasts() ? session.law_spread : kLawFactorSd,
-               most = evidence().contrasts() ? session.law_most : kMaxLawFactor;
+  const LawPrior law = rules().law_prior(evidence().discrepancy());
   const auto with = [&](double law_factor, const Scales& from) {
     ScaledEvidence w = evidence().weigh(fit.statistics, regressors, fitter_.all_flights(),
                                         fitter_.law_sd(hypothesis, fit, law_factor), from, unknown_penalty_nats);
     w.law_factor = law_factor;
-    w.posterior.log_evidence -= 0.5 * std::pow(std::log(law_factor) / spread, 2);
+    w.posterior.log_evidence -= 0.5 * std::pow(std::log(law_factor) / law.spread, 2);
     return w;
   };
   ScaledEvidence best = with(1, start);
@@ -378,9 +346,9 @@ ScaledEvidence RobotFit::weigh(const Hypothesis& hypothesis, const Fit& fit, con
   if (differs)
     if (ScaledEvidence w = with(1, without_background); w.posterior.log_evidence > best.posterior.log_evidence)
       best = std::move(w);
-  if (!fitter_.acts_by_place(hypothesis, fit)) return best;
-  for (const double step : {std::min(2.0, most), 1 / std::min(2.0, most)})
-    for (double law_factor = step; law_factor <= most && law_factor >= 1 / most; law_factor *= step) {
+  if (!fitter_.law_may_deviate(hypothesis, fit)) return best;
+  for (const double step : {std::min(2.0, law.most), 1 / std::min(2.0, law.most)})
+    for (double law_factor = step; law_factor <= law.most && law_factor >= 1 / law.most; law_factor *= step) {
       ScaledEvidence other = with(law_factor, best.scales);
       if (other.posterior.log_evidence < best.posterior.log_evidence) break;
       best = std::move(other);
@@ -409,9 +377,8 @@ BasisCoefficients RobotFit::change(Residuals there, double steps) const {
 }
 
 void RobotFit::find_magnitudes() {
-  const bool contrasts = evidence().contrasts();
   std::vector<MagnitudeStep> steps =
-      magnitude_steps(uncertain_, parameters_.at, withheld_, contrasts ? nullptr : &evidence().discrepancy());
+      magnitude_steps(uncertain_, parameters_.at, withheld_, rules().near_steps(evidence().discrepancy()));
   std::vector<VehicleHypothesis> vehicles;
   for (MagnitudeStep& s : steps) {
     vehicles.push_back(std::move(s.vehicle));
@@ -474,7 +441,7 @@ void RobotFit::find_nuisances() {
       if (other.id == n.id) v.sensors[n.id][other.value] = other.value == n.value ? n.sd : 0;
     vehicles.push_back(std::move(v));
   }
-  const std::size_t minors = evidence().contrasts() ? 0 : uncertain_.draws() - uncertain_.majors();
+  const std::size_t minors = rules().minors(uncertain_);
   for (std::size_t d = uncertain_.majors(); d < uncertain_.majors() + minors; ++d) {
     // a step in the direction in which the vehicle is physical
     VehicleHypothesis v = no_effects_.vehicle(parameters_.at, std::pair{d, 1.0});

@@ -15,18 +15,19 @@ struct SensorFinding {
 
 class RobotFit {
  public:
-  /// Fits; keeps a reference to `flights`. `withheld`: effects to leave out; `threads`: as for io::parallel_for.
-  RobotFit(const Flights& flights, const sim::Randomisation& uncertain, const ModelDiscrepancy& discrepancy,
-           std::vector<std::string> withheld, int threads);
+  /// Fits; keeps references to `rules` and `flights`. `withheld`: effects to leave out; `threads`: as for
+  /// io::parallel_for.
+  RobotFit(const FitRules& rules, const Flights& flights, const sim::Randomisation& uncertain,
+           const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads);
   /// Fits the parameters alone, to flights without tests: what a model of this robot gets wrong cancels in a contrast, so it
   /// needs no further description.
-  static RobotFit of_references(const Flights& flights, const sim::Randomisation& uncertain,
+  static RobotFit of_references(const FitRules& rules, const Flights& flights, const sim::Randomisation& uncertain,
                                 const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads);
   /// A contrast: `flights` has the references of `reference`, and test flights of the same robot. Linearises around the parameters of `reference`; an effect's magnitude acts in the test flights alone.
-  RobotFit(const RobotFit& reference, const Flights& flights);
+  RobotFit(const FitRules& rules, const RobotFit& reference, const Flights& flights);
   /// For flights like those that are planned: fits nothing, and takes the declared noise and the
   /// prior scales of what models get wrong.
-  static RobotFit planned(const Flights& flights, const sim::Randomisation& uncertain,
+  static RobotFit planned(const FitRules& rules, const Flights& flights, const sim::Randomisation& uncertain,
                           const ModelDiscrepancy& discrepancy, int threads);
   RobotFit(const RobotFit&) = delete;
   RobotFit& operator=(const RobotFit&) = delete;
@@ -34,6 +35,7 @@ class RobotFit {
   const Evidence& evidence() const { return fitter_.evidence(); }
   /// With the scales of the fit of the parameters.
   const Fitter& fitter() const { return fitter_; }
+  const FitRules& rules() const { return fitter_.rules(); }
   /// With the minor draws at their estimates.
   const sim::Randomisation& uncertain() const { return uncertain_; }
   const Hypothesis& no_effects() const { return no_effects_; }
@@ -68,27 +70,28 @@ class RobotFit {
                        std::optional<double> unknown_penalty_nats = {}) const;
   /// As fitter(), with the priors of another model discrepancy. Only in a contrast.
   Fitter fitter_given(const ModelDiscrepancy& discrepancy) const;
-  /// Evidence of the parameters if nothing at all changed since the reference. Only in a contrast.
-  double log_evidence_unchanged() const;
   /// Scales given a fit: searched from `start`, then from a larger background of one effect while the evidence grows.
   Scales find_scales(const Hypothesis& hypothesis, const Fit& fit, const Scales& start) const;
+  /// The scales with the largest gain from a larger background of one effect; none if none gains.
+  std::optional<Scales> larger_background(const Hypothesis& hypothesis, const Fit& fit, const Scales& now) const;
+
+  // for FitRules::describe_rest
+  void widen_backgrounds();
+  void learn_rest_as_noise();
 
  private:
   /// planned: fits nothing; parameters: fits them alone; all: fits them with all nuisances.
   enum class Stages { planned, parameters, all };
-  RobotFit(Stages stages, const Flights& flights, const sim::Randomisation& uncertain,
+  RobotFit(Stages stages, const FitRules& rules, const Flights& flights, const sim::Randomisation& uncertain,
            const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads);
   void fit_parameters();
   void linearise_around(const Fit& parameters);
   void find_nuisance_columns();
-  std::vector<Background> all_backgrounds(const ModelDiscrepancy& discrepancy) const;
   void refit_with_nuisances();
-  void learn_rest_as_noise();
   void find_magnitudes();
   void find_linear_magnitudes();
   void find_nuisances();
   void set_nuisances();
-  void widen_effects();
   bool refit_with_minors();
   /// The minor draws moved by the means of their nuisance regressors. `means`: of Fitter::NuisanceMean.
   template <class Means>
@@ -103,7 +106,6 @@ class RobotFit {
   void take_evidence(Evidence evidence) {
     fitter_ = fitter_.with_evidence(std::make_shared<const Evidence>(std::move(evidence)));
   }
-  std::optional<Scales> larger_effect(const Hypothesis& hypothesis, const Fit& fit, const Scales& now) const;
   BasisCoefficients change(Residuals there, double steps) const;
 
   const Flights& flights_;

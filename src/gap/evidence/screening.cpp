@@ -132,7 +132,7 @@ class Screening {
 };
 
 /// Distance of near steps in background standard deviations; the least distance: shorter differences are rough.
-constexpr double kNearSd = 2, kMinReach = 0.05;
+constexpr double kNearSd = 2, kMinNearReach = 0.05;
 
 }  // namespace
 
@@ -146,7 +146,7 @@ std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, 
     if (std::ranges::count(withheld, id)) continue;
     const Hypothesis h(uncertain, {id});
     const double sd = background ? std::max(background->background_sd(id), background->background_sd(id + kOfBoth)) : 0,
-                 reach = std::clamp(kNearSd * sd, kMinReach, kMagnitudeReach);
+                 reach = std::clamp(kNearSd * sd, kMinNearReach, kMagnitudeReach);
     const Index first = at.size();
     VectorXd here = h.start(now);
     here.head(first) = at;

@@ -24,9 +24,6 @@ using Eigen::VectorXd;
 /// Iterations end when they gain less evidence than this.
 constexpr double kSettled_nats = 0.1;
 constexpr double kStrideGrowth = 1.5, kMaxStride = 8;
-/// Blocks of many degrees of freedom hold each other back: in a contrast, blocks and their centres are maximised in
-/// turn until the centres settle, at most so many times an iteration.
-constexpr int kMaxPasses = 100;
 /// Smallest scale of a free block over the scale of the robot.
 constexpr double kMinFree = 2;
 
@@ -60,23 +57,6 @@ double robot_scale(double freedom, double inverses, double sd) {
   return best;
 }
 
-/// All scales of the test flights times the power of two with the largest evidence: single steps are short.
-template <class Value>
-Scales with_best_session(const Scales& from, const Value& log_evidence) {
-  Scales best = from;
-  double most = log_evidence(from);
-  for (const double factor : {2.0, 0.5})
-    for (Scales next = best;;) {
-      next.session *= factor;
-      for (std::size_t b = 0; b < kBlocks; ++b)
-        if (block_of_tests(b) && !next.free[b]) next.blocks[b] *= factor;
-      const double value = log_evidence(next);
-      if (!(value > most)) break;
-      most = value, best = next;
-    }
-  return best;
-}
-
 /// Over-relaxed: `stride` times the step between the logarithms of two sets of scales (Salakhutdinov, Roweis 2003).
 Scales strided(const Scales& from, const Scales& to, double stride) {
   const auto go = [&](double a, double b) { return a * std::pow(b / a, stride); };
@@ -95,13 +75,6 @@ int Evidence::block_of(int group, int function) const {
   const int harmonic = (group % kCoefficients + 1) / 2;
   return (group / kCoefficients * (kHarmonics + 1) + harmonic) * kClasses +
          (basis().of_tests(function) ? kRegimes : 0) + static_cast<int>(regimes_of(basis().kind(function)));
-}
-
-/// Whether an excess is a sign of an unknown cause. Blocks of few degrees of freedom have tails that hold any model
-/// error; in a contrast these errors cancel in the test flights.
-bool Evidence::may_be_free(std::size_t block) const {
-  if (contrasts()) return block_of_tests(block) && basis().covers(regimes_of_block(block));
-  return discrepancy_.freedom_of(regimes_of_block(block)) >= discrepancy_.spread.place_freedom;
 }
 
 double Evidence::scale_cost_nats(double times, ScalePrior prior, const Scales& scales) {
@@ -201,7 +174,7 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
     ScaledEvidence w{posterior(reduced, chosen, prior_mean, covariance), scales, 1, BasisCoefficients::Zero(kGroups, q),
                      BasisCoefficients::Zero(kGroups, q)};
     double log_scales = -0.5 * std::pow(std::log(scales.robot) / discrepancy_.spread.robot_sd, 2);
-    if (contrasts()) log_scales -= 0.5 * std::pow(std::log(scales.session) / discrepancy_.session.scale_sd, 2);
+    log_scales -= 0.5 * std::pow(std::log(scales.session) / discrepancy_.session.scale_sd, 2);
     for (std::size_t b = 0; b < kBlocks; ++b)
       if (counts[b] > 0)
         log_scales += scales.free[b] ? -*unknown_penalty_nats
@@ -213,8 +186,8 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
     w.posterior.log_evidence += log_scales;
     return w;
   };
-  if (contrasts() && now.session == 1 && max_iterations > 1)  // not searched before
-    now = with_best_session(now, [&](const Scales& s) { return evidence_with(s, false).posterior.log_evidence; });
+  if (max_iterations > 1)
+    now = rules_->first_scales(now, [&](const Scales& s) { return evidence_with(s, false).posterior.log_evidence; });
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     ScaledEvidence w = evidence_with(now, true);
     const double gain = w.posterior.log_evidence - best.posterior.log_evidence;
@@ -267,7 +240,7 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
           effects_freedom += nu_e, effects_inverses += nu_e / (next.effects[e] * next.effects[e]);
       }
     }
-    for (int pass = 0; pass < (contrasts() ? kMaxPasses : 1); ++pass) {
+    for (int pass = 0; pass < rules_->max_passes(); ++pass) {
       const double robot = next.robot, session = next.session;
       double freedom = effects_freedom, inverses = effects_inverses, session_freedom = 0, session_inverses = 0;
       for (std::size_t b = 0; b < kBlocks; ++b) {
@@ -276,7 +249,7 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
         const double bound2 = scales_held_ ? 1 : (total[b] + nu[b] * f2) / (n + nu[b]);
         next.blocks[b] = std::sqrt(bound2);
         next.free[b] = 0;
-        if (unknown_penalty_nats && may_be_free(b)) {
+        if (unknown_penalty_nats && rules_->may_be_free(b, basis(), discrepancy_)) {
           const double free2 = std::max(total[b] / n, kMinFree * kMinFree * f2);
           const auto objective = [&](double s2) { return -0.5 * (n * std::log(s2) + total[b] / s2); };
           const double bound = scales_held_ ? 0 : log_prior(std::sqrt(bound2), next.centre(b), nu[b]);
@@ -291,7 +264,8 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
         else freedom += nu[b], inverses += inverse;
       }
       if (!scales_held_) next.robot = robot_scale(freedom, inverses, discrepancy_.spread.robot_sd);
-      if (contrasts()) next.session = robot_scale(session_freedom, session_inverses, discrepancy_.session.scale_sd);
+      if (session_freedom > 0)  // there are blocks of test flights
+        next.session = robot_scale(session_freedom, session_inverses, discrepancy_.session.scale_sd);
       if (next.robot == robot && next.session == session) break;
     }
     now = strided(best.scales, next, stride);

@@ -165,8 +165,8 @@ class Planner {
     for (std::size_t i = 0; i < flown.size(); ++i) {
       if (flown[i].lost || !flown[i].log) return {};
       (session.reference && i < session.flights ? flights.references : flights.tests)
-          .push_back(
-              std::make_shared<ResetPrediction>(Recording(session.manoeuvre->name, std::move(*flown[i].log), vehicle_)));
+          .push_back(std::make_shared<ResetPrediction>(
+              Recording(session.manoeuvre->name, std::move(*flown[i].log), vehicle_)));
     }
     return flights;
   }
@@ -186,8 +186,9 @@ class Planner {
     ModelDiscrepancy discrepancy = discrepancy_;
     if (session.reference)
       discrepancy.session = read_session_variation(file(settings_.sessions, "gap/session_variation.toml"));
-    const RobotFit robot = RobotFit::planned(flights, uncertain_, discrepancy, threads_);
-    const VerdictRule rule = rule_for(robot, rule_of(session));
+    const Question& question = question_of(flights);
+    const RobotFit robot = RobotFit::planned(question, flights, uncertain_, discrepancy, threads_);
+    const VerdictRule rule = question.rule(robot, rule_of(session));
     return separation_of(flights, robot, asked_, rule, threads_, sure);
   }
 

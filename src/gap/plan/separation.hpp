@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "gap/diagnose/verdict_rule.hpp"
+#include "gap/question/verdict_rule.hpp"
 #include "gap/evidence/robot_fit.hpp"
 
 namespace flappy::gap {

@@ -49,9 +49,7 @@ class BeatAveragedPrediction final : public PredictedFlight {
   std::vector<std::pair<std::string, std::string>> products() const override { return {}; }
   std::vector<RegimeQuantity> regimes() const override;
   std::vector<RegimeQuantity> inputs() const override;
-  const DiagnosisPolicy& policy(bool with_references) const override {
-    return with_references ? kBeatAveragedContrastPolicy : kBeatAveragedPolicy;
-  }
+  bool is_averaged() const override { return true; }
 
  private:
   /// [row] An input or column of predicted.csv after delay, lag and low-pass, its rate, and both for its product with

@@ -8,7 +8,6 @@
 
 #include "flappy/vehicle.hpp"
 #include "gap/replay/beat_rows.hpp"
-#include "gap/replay/policy.hpp"
 #include "gap/replay/recording.hpp"
 #include "gap/replay/residual_memo.hpp"
 #include "gap/replay/sensor_correction.hpp"
@@ -117,9 +116,8 @@ class PredictedFlight {
   virtual std::vector<std::pair<std::string, std::string>> products() const = 0;
   virtual std::vector<RegimeQuantity> regimes() const = 0;
   virtual std::vector<RegimeQuantity> inputs() const = 0;
-  /// Rules of the diagnosis for this kind of vehicle, with reference flights or without. Those of a diagnosis' first
-  /// flight hold for all of its flights.
-  virtual const DiagnosisPolicy& policy(bool with_references) const = 0;
+  /// Whether rows are means over beats alone: of a beat-averaged vehicle.
+  virtual bool is_averaged() const = 0;
   /// Null for beat-averaged vehicles.
   virtual const Recording* recording() const { return nullptr; }
   /// The same beats with another log. Null for beat-averaged vehicles.
@@ -140,8 +138,6 @@ struct Flights {
   FlightList tests;       ///< the flights asked about
   std::size_t size() const { return references.size() + tests.size(); }
   bool is_reference(std::size_t flight) const { return flight < references.size(); }
-  /// Whether test flights are compared with references.
-  bool contrast() const { return !references.empty() && !tests.empty(); }
   const std::shared_ptr<const PredictedFlight>& operator[](std::size_t flight) const {
     return is_reference(flight) ? references[flight] : tests[flight - references.size()];
   }

@@ -44,7 +44,7 @@ class ResetPrediction final : public PredictedFlight {
   std::vector<std::pair<std::string, std::string>> products() const override;
   std::vector<RegimeQuantity> regimes() const override;
   std::vector<RegimeQuantity> inputs() const override;
-  const DiagnosisPolicy& policy(bool /*with_references*/) const override { return kWingPolicy; }
+  bool is_averaged() const override { return false; }
   const Recording* recording() const override { return &recording_; }
   std::shared_ptr<const PredictedFlight> with_log(const flightlog::FlightLog& log) const override;
   /// Undoes errors of sensors in the log. Caches the last kMaxCorrected results; several threads may call it.

@@ -93,7 +93,7 @@ std::vector<Residuals> residuals_of_references(const FlightList& references,
   std::vector<Residuals> list;
   for (const VehicleHypothesis& v : vehicles) {
     list.push_back(by_key.at({v.variates, v.lag_s, v.sensors}));
-    if (list.back().front().empty()) list.back().clear();
+    if (std::ranges::any_of(list.back(), &Rows::empty)) list.back().clear();
   }
   return list;
 }
@@ -101,13 +101,12 @@ std::vector<Residuals> residuals_of_references(const FlightList& references,
 }  // namespace
 
 std::vector<Residuals> residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads) {
-  if (flights.references.empty()) return residuals_with_effects(flights.tests, vehicles, threads);
   std::vector<Residuals> list = residuals_of_references(flights.references, vehicles, threads);
-  if (flights.tests.empty()) return list;
   std::vector<Residuals> of_tests = residuals_with_effects(flights.tests, vehicles, threads);
   for (std::size_t i = 0; i < list.size(); ++i) {
-    if (of_tests[i].empty()) list[i].clear();
-    if (!list[i].empty()) std::ranges::move(of_tests[i], std::back_inserter(list[i]));
+    const bool diverged = list[i].size() < flights.references.size() || of_tests[i].size() < flights.tests.size();
+    if (diverged) list[i].clear();
+    else std::ranges::move(of_tests[i], std::back_inserter(list[i]));
   }
   return list;
 }

@@ -39,8 +39,7 @@ TEST(RunDiagnose, ReadsNoTruth) {
   const std::string honest = io::read_text(truth);
   const auto result = [&] {
     std::string bytes = run_diagnose(command).dump();
-    for (const char* file : {"diagnosis.json", "vehicle_corrected.toml"})
-      bytes += io::read_text(folder / "out" / file);
+    for (const char* file : {"diagnosis.json", "vehicle_corrected.toml"}) bytes += io::read_text(folder / "out" / file);
     return bytes;
   };
   const std::string with_truth = result();

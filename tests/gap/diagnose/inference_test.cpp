@@ -22,8 +22,8 @@ TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
   const Flights flights = flown("hummingbird_identified");
   const sim::Randomisation prior = shipped_priors();
   const Hypothesis none(prior, {});
-  Evidence evidence(flights, read_model_discrepancy(), 2);
-  Fitter fitter(flights, std::make_shared<const Evidence>(evidence), 2);
+  Evidence evidence(question_of(flights), flights, read_model_discrepancy(), 2);
+  Fitter fitter(question_of(flights), flights, std::make_shared<const Evidence>(evidence), 2);
   const auto take = [&](Evidence learnt) {
     evidence = std::move(learnt);
     fitter = fitter.with_evidence(std::make_shared<const Evidence>(evidence));
@@ -112,7 +112,8 @@ TEST(RobotFit, FliesMinorDraws) {
   const auto fitted = [&](const std::string& priors) {
     const sim::Randomisation prior =
         sim::read_randomisation(nominal_vehicle(), io::Config::parse(priors, "priors.toml").root());
-    auto robot = std::make_unique<RobotFit>(flights, prior, read_model_discrepancy(), std::vector<std::string>{}, 2);
+    auto robot = std::make_unique<RobotFit>(question_of(flights), flights, prior, read_model_discrepancy(),
+                                            std::vector<std::string>{}, 2);
     return robot;
   };
   const std::size_t minor = text.find("# Minor parameters");
@@ -163,7 +164,7 @@ TEST(Screening, FindsALongDelay) {
   const Flights flights =
       flown("hummingbird_nominal", {"vehicle.effects.command_delay.delay_s=0.013", "flight.duration_s=5"});
   const sim::Randomisation prior = shipped_priors();
-  const RobotFit robot(flights, prior, read_model_discrepancy(), {}, 2);
+  const RobotFit robot(question_of(flights), flights, prior, read_model_discrepancy(), {}, 2);
   const ScreenedEffect first = screen(robot.fitter(), robot.parameters(), robot.magnitudes()).front();
   EXPECT_EQ(first.effect, "command_delay");
   EXPECT_GT(first.gain, 50);

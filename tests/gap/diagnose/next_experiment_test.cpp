@@ -177,8 +177,8 @@ double expected_with_reference(const sim::Randomisation& prior, const char* mano
   NextOptions options = shipped();
   options.references = {reference};
   return gap::rank_experiments(diagnosis(prior, {hypothesis(prior, {"body_drag"}, {0.05}, 0.5, 0.01),
-                                            hypothesis(prior, {}, {}, 0.4, 0.01), unchanged(0.1)}),
-                          prior, library({"dash"}), options)[0]
+                                                 hypothesis(prior, {}, {}, 0.4, 0.01), unchanged(0.1)}),
+                               prior, library({"dash"}), options)[0]
       .expected_nats;
 }
 

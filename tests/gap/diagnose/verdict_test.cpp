@@ -7,6 +7,8 @@
 
 #include "gap/diagnose/diagnose.hpp"
 #include "gap/diagnose/result.hpp"
+#include "gap/question/alone.hpp"
+#include "gap/question/contrast.hpp"
 #include "io/config.hpp"
 #include "io/files.hpp"
 #include "refusal.hpp"
@@ -33,10 +35,12 @@ ScoredHypothesis hypothesis(double probability, HypothesisKind kind) {
   return a;
 }
 
+std::string pool_in_contrast(const ScoredHypothesis& a) { return Contrast(0).pool(a); }
+
 Inference conclude(std::vector<ScoredHypothesis> hypotheses) {
   Inference d;
   d.hypotheses = std::move(hypotheses);
-  gap::conclude(read_verdict_rule(), d);
+  gap::conclude(read_verdict_rule(), pool_of, d);
   return d;
 }
 
@@ -110,9 +114,9 @@ TEST(Verdict, PoolsWhatIsHarmlessInAContrast) {
   Inference d;
   d.hypotheses = {hypothesis(0.4, {"wind"}), hypothesis(0.25, HypothesisKind::parameters),
                   hypothesis(0.2, HypothesisKind::none), hypothesis(0.15, HypothesisKind::unknown)};
-  gap::conclude(read_verdict_rule(), d);
+  gap::conclude(read_verdict_rule(), pool_of, d);
   EXPECT_EQ(d.verdict.kind, VerdictKind::effect);
-  gap::conclude(read_verdict_rule(), d, true);
+  gap::conclude(read_verdict_rule(), pool_in_contrast, d);
   EXPECT_EQ(d.verdict.kind, VerdictKind::parameters);
   EXPECT_DOUBLE_EQ(d.verdict.probability, 0.45);
 }
@@ -123,13 +127,13 @@ TEST(Verdict, NamesOfAContrastWhatIsMoreProbableThanNot) {
   Inference d;
   d.hypotheses = {hypothesis(0.45, {"wind"}), hypothesis(0.3, HypothesisKind::parameters),
                   hypothesis(0.25, HypothesisKind::unknown)};
-  gap::conclude(rule, d, true);
+  gap::conclude(rule, pool_in_contrast, d);
   EXPECT_EQ(d.verdict.kind, VerdictKind::parameters);
   EXPECT_DOUBLE_EQ(d.verdict.probability, 0.3);
   // with another effect or without it
   d.hypotheses = {hypothesis(0.3, {"wind"}), hypothesis(0.25, {"wind", "com_offset"}),
                   hypothesis(0.29, HypothesisKind::parameters), hypothesis(0.16, {"com_offset"})};
-  gap::conclude(rule, d, true);
+  gap::conclude(rule, pool_in_contrast, d);
   EXPECT_EQ(d.verdict.effects, std::vector<std::string>{"wind"});
 }
 

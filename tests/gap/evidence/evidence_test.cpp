@@ -11,7 +11,7 @@ namespace {
 TEST(Evidence, IntegratesOutInClosedForm) {
   const auto made = synthetic_flights(1, synthetic_law);
   const Flights flights = as_flights(made);
-  const Evidence evidence(flights, read_model_discrepancy(), 1);
+  const Evidence evidence(question_of(flights), flights, read_model_discrepancy(), 1);
   const SufficientStatistics s = evidence.statistics({made[0]->measured()}),
                              zero = evidence.statistics({Rows(made[0]->measured().size(), 0)});
   const int group = group_index(kForceX, 1), function = 2;
@@ -46,7 +46,7 @@ TEST(Evidence, IntegratesOutInClosedForm) {
 TEST(Evidence, LearnsTheNoise) {
   const auto made = synthetic_flights(2, synthetic_law);
   const Flights flights = as_flights(made);
-  const Evidence declared(flights, read_model_discrepancy(), 1);
+  const Evidence declared(question_of(flights), flights, read_model_discrepancy(), 1);
   const int group = group_index(kForceZ, 0);
   EXPECT_NEAR(declared.noise_sd(group), SyntheticFlight::kNoise, 0.2 * SyntheticFlight::kNoise);
   Residuals residual;
@@ -73,7 +73,7 @@ TEST(Evidence, LearnsTheNoise) {
 TEST(Evidence, CountsRowsFarOffForLess) {
   const auto made = synthetic_flights(1, synthetic_law);
   const Flights flights = as_flights(made);
-  const Evidence evidence(flights, read_model_discrepancy(), 1);
+  const Evidence evidence(question_of(flights), flights, read_model_discrepancy(), 1);
   Rows spiked = made[0]->noise(5);
   const std::size_t row = 60 * kRowsPerBeat + static_cast<std::size_t>(group_index(kForceX, 0));
   spiked[row] += 100 * SyntheticFlight::kNoise;
@@ -90,7 +90,7 @@ TEST(Evidence, CountsRowsFarOffForLess) {
 TEST(Evidence, FindsTheSmoothPartOfRows) {
   const auto made = synthetic_flights(1, synthetic_law);
   const Flights flights = as_flights(made);
-  const Evidence evidence(flights, read_model_discrepancy(), 1);
+  const Evidence evidence(question_of(flights), flights, read_model_discrepancy(), 1);
   BasisCoefficients smooth = BasisCoefficients::Zero(kGroups, evidence.basis().size());
   smooth(group_index(kForceZ, 1), 3) = 0.4;
   smooth(group_index(kTorqueY, 0), 1) = -2;
@@ -110,7 +110,7 @@ TEST(Evidence, ScalesTheDiscrepancyByBlocks) {
   const auto made = synthetic_flights(1, synthetic_law);
   const Flights flights = as_flights(made);
   const ModelDiscrepancy discrepancy = read_model_discrepancy();
-  const Evidence evidence(flights, discrepancy, 1);
+  const Evidence evidence(question_of(flights), flights, discrepancy, 1);
   const int group = group_index(kForceZ, 0);
   const BasisCoefficients sd = evidence.discrepancy_sd({});
   EXPECT_DOUBLE_EQ(sd(group, 1), evidence.signal(group) * discrepancy.share(kForceZ, 0, BasisFunction::input));

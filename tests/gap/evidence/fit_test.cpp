@@ -19,8 +19,9 @@ class Fits : public testing::Test {
   const sim::Randomisation priors_ = synthetic_priors();
   std::vector<std::shared_ptr<SyntheticFlight>> made_ = synthetic_flights(2, synthetic_law);
   Flights flights_ = as_flights(made_);
-  std::shared_ptr<const Evidence> evidence_ = std::make_shared<const Evidence>(flights_, read_model_discrepancy(), 1);
-  Fitter fitter_{flights_, evidence_, 1};
+  std::shared_ptr<const Evidence> evidence_ =
+      std::make_shared<const Evidence>(question_of(flights_), flights_, read_model_discrepancy(), 1);
+  Fitter fitter_{question_of(flights_), flights_, evidence_, 1};
 };
 
 // Rows of noise 0.01, 240 of which show a unit of mass as 0.1 amplitude: an sd of 0.01 / (0.1 sqrt(240)) = 0.0065 by noise alone, and what the
@@ -76,7 +77,8 @@ TEST_F(Fits, KnowsWhereAVehicleComesApart) {
         else synthetic_law(f, h, rows);
       });
   const Flights flights{{}, {fragile}};
-  const Fitter fitter(flights, std::make_shared<const Evidence>(flights, read_model_discrepancy(), 1), 1);
+  const Fitter fitter(question_of(flights), flights,
+                      std::make_shared<const Evidence>(question_of(flights), flights, read_model_discrepancy(), 1), 1);
   const Hypothesis wind(priors_, {"wind"});
   const Fit fit = fitter.linearise(wind, wind.start(), Fitter::axes(wind));
   ASSERT_TRUE(fit.flown());
@@ -140,7 +142,7 @@ TEST_F(Fits, LawsOfWhatActsByThePlaceMayDeviate) {
   // a twenty-fifth of the square, as by chance
   fit.columns[static_cast<std::size_t>(ground.shared())](group_index(kForceZ, 0), time) =
       0.2 * 0.3 * evidence_->signal(group_index(kForceZ, 0));
-  ASSERT_TRUE(fitter_.acts_by_place(ground, fit));
+  ASSERT_TRUE(fitter_.law_may_deviate(ground, fit));
   // groups of loads with a signal: six, of which three channels have a mean and a harmonic
   double loads = 0;
   for (int g = 0; g < group_index(kForceZ, kCoefficients); ++g) loads += evidence_->signal(g) > 0 ? 1 : 0;
@@ -154,12 +156,12 @@ TEST_F(Fits, LawsOfWhatActsByThePlaceMayDeviate) {
     }
     EXPECT_EQ(sd.bottomRows(kGroups - group_index(kForceZ, kCoefficients)).maxCoeff(), 0) << "strokes, motion capture";
   }
-  EXPECT_FALSE(fitter_.acts_by_place(ground, change(amplitude)));
+  EXPECT_FALSE(fitter_.law_may_deviate(ground, change(amplitude)));
   const Hypothesis tilt(priors_, {"mocap_tilt"});
   Fit turned;
   turned.at = Eigen::VectorXd::Ones(tilt.size());
   turned.columns.assign(static_cast<std::size_t>(tilt.size()), fit.columns[static_cast<std::size_t>(ground.shared())]);
-  EXPECT_FALSE(fitter_.acts_by_place(tilt, turned));
+  EXPECT_FALSE(fitter_.law_may_deviate(tilt, turned));
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ class RobotFits : public testing::Test {
     truth.vehicle.torso.com_m.x += 0.0015;
     for (const auto& f : *made_) f->fly(truth);
     flights_ = new Flights(as_flights(*made_));
-    robot_ = new RobotFit(*flights_, *priors_, read_model_discrepancy(), {"tether"}, 2);
+    robot_ = new RobotFit(question_of(*flights_), *flights_, *priors_, read_model_discrepancy(), {"tether"}, 2);
   }
   static void TearDownTestSuite() {
     delete robot_;
@@ -49,7 +49,7 @@ TEST_F(RobotFits, FitsParametersAndMinorDraws) {
 
 // A joint fit also moves the minor draws, so a corrected vehicle needs both.
 TEST_F(RobotFits, GivesMinorDrawsOfAJointFit) {
-  const RobotFit robot = RobotFit::planned(*flights_, *priors_, read_model_discrepancy(), 2);
+  const RobotFit robot = RobotFit::planned(question_of(*flights_), *flights_, *priors_, read_model_discrepancy(), 2);
   const Hypothesis& h = robot.no_effects();
   const Fitter without = robot.fitter().without_background();
   const Fitter::JointFit joint =
@@ -182,7 +182,9 @@ TEST(Contrast, TellsWhatAppearedFromWhatWasAlwaysOff) {
     const Flights flights = as_flights(made, 2), references{flights.references, {}};
     ModelDiscrepancy discrepancy = read_model_discrepancy();
     discrepancy.session = read_session_variation();
-    const RobotFit robot(RobotFit::of_references(references, priors, discrepancy, {}, 2), flights);
+    const RobotFit robot(question_of(flights),
+                         RobotFit::of_references(question_of(references), references, priors, discrepancy, {}, 2),
+                         flights);
     const Hypothesis h(robot.uncertain(), {"wind"});
     const Fit fit = robot.fitter().fit_effects(h, h.start(), robot.parameters());
     if (appears != 0) EXPECT_NEAR(fit.mean()[2], appears, 4 * std::sqrt(fit.covariance()(2, 2)));
@@ -207,7 +209,9 @@ TEST(Contrast, CallsUnknownOnlyWhatReferencesWouldHaveShown) {
     const Flights flights = as_flights(made, 2), references{flights.references, {}};
     ModelDiscrepancy discrepancy = read_model_discrepancy();
     discrepancy.session = read_session_variation();
-    const RobotFit robot(RobotFit::of_references(references, priors, discrepancy, {}, 2), flights);
+    const RobotFit robot(question_of(flights),
+                         RobotFit::of_references(question_of(references), references, priors, discrepancy, {}, 2),
+                         flights);
     EXPECT_EQ(robot.fitter().place_of(std::string(kModelOf) + "body_drag") >= 0, calm < 1)
         << "errors of the model do not cancel";
     const ScaledEvidence w = robot.weigh(robot.no_effects(), robot.parameters(), robot.fitter().scales(), 10);

@@ -39,8 +39,8 @@ TEST(Screening, RanksEffectsByTheirEvidence) {
   const sim::Randomisation priors = synthetic_priors();
   const auto made = synthetic_flights(1, synthetic_law);
   const Flights flights = as_flights(made);
-  const auto evidence = std::make_shared<const Evidence>(flights, read_model_discrepancy(), 1);
-  const Fitter fitter(flights, evidence, 1);
+  const auto evidence = std::make_shared<const Evidence>(question_of(flights), flights, read_model_discrepancy(), 1);
+  const Fitter fitter(question_of(flights), flights, evidence, 1);
   const int velocity = 2, height = 3, large = group_index(kForceX, 0), lift = group_index(kForceZ, 0);
   BasisCoefficients wind = BasisCoefficients::Zero(kGroups, evidence->basis().size()), ground = wind, drag = wind;
   wind(large, velocity) = SyntheticFlight::kSignal;
@@ -79,8 +79,8 @@ TEST(Screening, FindsALargeMagnitude) {
   const sim::Randomisation priors = synthetic_priors();
   const auto made = synthetic_flights(1, synthetic_law);
   const Flights flights = as_flights(made);
-  const auto evidence = std::make_shared<const Evidence>(flights, read_model_discrepancy(), 1);
-  const Fitter fitter(flights, evidence, 1);
+  const auto evidence = std::make_shared<const Evidence>(question_of(flights), flights, read_model_discrepancy(), 1);
+  const Fitter fitter(question_of(flights), flights, evidence, 1);
   BasisCoefficients unit = BasisCoefficients::Zero(kGroups, evidence->basis().size());
   unit(group_index(kForceX, 0), 2) = SyntheticFlight::kSignal;
   Fit fit;

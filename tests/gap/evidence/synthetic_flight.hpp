@@ -8,6 +8,7 @@
 
 #include "flappy/vehicle_file.hpp"
 #include "gap/evidence/robot_fit.hpp"
+#include "gap/question/question.hpp"
 #include "io/config.hpp"
 
 namespace flappy::gap {
@@ -87,7 +88,7 @@ class SyntheticFlight final : public PredictedFlight {
   }
   std::vector<RegimeQuantity> regimes() const override { return {}; }
   std::vector<RegimeQuantity> inputs() const override { return {}; }
-  const DiagnosisPolicy& policy(bool /*with_references*/) const override { return kWingPolicy; }
+  bool is_averaged() const override { return false; }
   std::shared_ptr<const PredictedFlight> corrected(const EffectValues& /*sensors*/) const override {
     return std::make_shared<SyntheticFlight>(*this);
   }

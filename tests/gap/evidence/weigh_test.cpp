@@ -26,7 +26,7 @@ class Weigh : public testing::Test {
 TEST_F(Weigh, FindsHowFarModelsOfARobotAreOff) {
   ModelDiscrepancy discrepancy = read_model_discrepancy();
   discrepancy.spread.place_freedom = discrepancy.spread.block_freedom;
-  const Evidence evidence(flights_, discrepancy, 1);
+  const Evidence evidence(question_of(flights_), flights_, discrepancy, 1);
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
   const int freed = evidence.block_of(group_index(kForceZ, 0), 1);
@@ -62,7 +62,7 @@ TEST_F(Weigh, FindsHowFarModelsOfARobotAreOff) {
 //   log N(20; 0, t^2) + nu / 2 (2 log(f / t) + 1 - f^2 / t^2)      at t^2 = (20^2 + nu f^2) / (1 + nu)
 // and costs the second term.
 TEST_F(Weigh, FindsALargeBackgroundMagnitude) {
-  const Evidence evidence(flights_, read_model_discrepancy(), 1);
+  const Evidence evidence(question_of(flights_), flights_, read_model_discrepancy(), 1);
   const int group = group_index(kForceX, 0);
   BasisCoefficients column = BasisCoefficients::Zero(kGroups, evidence.basis().size());
   column(group, 0) = 1;
@@ -94,7 +94,7 @@ TEST_F(Weigh, FindsALargeBackgroundMagnitude) {
 
 // What the laws of effects get wrong takes part in the variance, and no scale changes it.
 TEST_F(Weigh, TakesWhatLawsGetWrong) {
-  const Evidence evidence(flights_, read_model_discrepancy(), 1);
+  const Evidence evidence(question_of(flights_), flights_, read_model_discrepancy(), 1);
   const int group = group_index(kForceZ, 0);
   BasisCoefficients delta = BasisCoefficients::Zero(kGroups, evidence.basis().size());
   delta(group, 3) = 30 * evidence.discrepancy_sd({})(group, 3);
@@ -108,7 +108,7 @@ TEST_F(Weigh, TakesWhatLawsGetWrong) {
 
 // With all scales 1 the evidence is that of the closed form, and the prior of the scales costs nothing.
 TEST_F(Weigh, CostsNothingWhereAllScalesAreOne) {
-  const Evidence evidence(flights_, read_model_discrepancy(), 1);
+  const Evidence evidence(question_of(flights_), flights_, read_model_discrepancy(), 1);
   BasisCoefficients unit = BasisCoefficients::Zero(kGroups, evidence.basis().size());
   unit(group_index(kForceX, 1), 2) = 1;
   Regressors one;
@@ -126,8 +126,9 @@ TEST_F(Weigh, CostsNothingWhereAllScalesAreOne) {
 TEST(WeighFlights, WhatChangesFromFlightToFlightIsNoPlace) {
   Flights flights;
   for (int f = 0; f < 3; ++f)
-    flights.tests.push_back(std::make_shared<SyntheticFlight>("f" + std::to_string(f), f + 1, synthetic_law, f == 1 ? 3 : 0));
-  const Evidence evidence(flights, read_model_discrepancy(), 1);
+    flights.tests.push_back(
+        std::make_shared<SyntheticFlight>("f" + std::to_string(f), f + 1, synthetic_law, f == 1 ? 3 : 0));
+  const Evidence evidence(question_of(flights), flights, read_model_discrepancy(), 1);
   const std::size_t group = static_cast<std::size_t>(group_index(kForceX, 1));
   Residuals residual;
   for (std::size_t f = 0; f < flights.size(); ++f) {

@@ -44,7 +44,7 @@ class SeparationOfTour : public testing::Test {
   static void SetUpTestSuite() {
     flights_ = new Flights(tour(nominal_vehicle()));
     prior_ = new sim::Randomisation(shipped_priors());
-    robot_ = new RobotFit(RobotFit::planned(*flights_, *prior_, read_model_discrepancy(), 2));
+    robot_ = new RobotFit(RobotFit::planned(question_of(*flights_), *flights_, *prior_, read_model_discrepancy(), 2));
   }
   static void TearDownTestSuite() { delete robot_, delete prior_, delete flights_; }
   static Separation of(const std::map<std::string, double>& asked) {
@@ -63,7 +63,7 @@ TEST_F(SeparationOfTour, ExpectsWhatScreeningFinds) {
   const Separation s = of({{"spring_hardening", 1}, {"mocap_delay", 1}});
   for (const std::string effect : {"spring_hardening", "mocap_delay"}) {
     const Flights flown = tour(with(effect, 1));
-    const RobotFit there = RobotFit::planned(flown, *prior_, read_model_discrepancy(), 2);
+    const RobotFit there = RobotFit::planned(question_of(flown), flown, *prior_, read_model_discrepancy(), 2);
     const std::vector<ScreenedEffect> found = screen(there.fitter(), there.parameters(), there.magnitudes());
     EXPECT_EQ(found.front().effect, effect);
     const std::size_t at = place(s, effect);
@@ -106,8 +106,7 @@ TEST(Changes, ArePredictedInTheFlightsBeforeWhichTheyWereMade) {
     flightlog::FlightLog log = std::move(*simulate(config, robot, 1, config.settle_s)[0].log);
     EXPECT_EQ(log.header.changes.swapped_wings, swapped);
     log.header.changes.swapped_wings = declared;
-    const Flights flight{
-        {}, {std::make_shared<ResetPrediction>(Recording("tour", std::move(log), nominal_vehicle()))}};
+    const Flights flight{{}, {std::make_shared<ResetPrediction>(Recording("tour", std::move(log), nominal_vehicle()))}};
     const std::vector<Residuals> r = residuals(flight, {VehicleHypothesis{.vehicle = robot}}, 1);
     return rms(*flight[0], r[0][0], kTorqueX * kCoefficients);
   };

@@ -1,4 +1,4 @@
-#include "gap/diagnose/verdict_rule.hpp"
+#include "gap/question/verdict_rule.hpp"
 
 #include <cmath>
 

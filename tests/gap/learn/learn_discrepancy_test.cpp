@@ -1,4 +1,4 @@
-#include "gap/evidence/learn_discrepancy.hpp"
+#include "gap/learn/learn_discrepancy.hpp"
 
 #include <gtest/gtest.h>
 

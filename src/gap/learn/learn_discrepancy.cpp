@@ -1,4 +1,4 @@
-#include "gap/evidence/learn_discrepancy.hpp"
+#include "gap/learn/learn_discrepancy.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "gap/question/question.hpp"
 #include "io/files.hpp"
 #include "io/log.hpp"
 #include "io/progress.hpp"
@@ -259,8 +260,8 @@ ModelDiscrepancy learn_discrepancy(const std::vector<Flights>& flights, const si
   Robots robots;
   for (std::size_t i = 0; i < flights.size() && !io::interrupted(); ++i) {
     line.show(static_cast<double>(i) / static_cast<double>(flights.size()), "fitting robot " + std::to_string(i + 1));
-    robots.push_back(
-        std::make_unique<const RobotFit>(flights[i], uncertain, start, std::vector<std::string>(), threads));
+    robots.push_back(std::make_unique<const RobotFit>(question_of(flights[i]), flights[i], uncertain, start,
+                                                      std::vector<std::string>(), threads));
   }
   if (io::interrupted()) throw io::InputError("stopped: nothing was learnt; accepted: all robots");
   ModelDiscrepancy now = start;
@@ -294,8 +295,9 @@ SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim
   };
   const auto fit = [&](const SessionPair& p) {
     const Flights references{p.flights.references, {}};
-    return std::make_unique<const RobotFit>(RobotFit::of_references(references, uncertain, start, {}, threads),
-                                            p.flights);
+    return std::make_unique<const RobotFit>(
+        question_of(p.flights),
+        RobotFit::of_references(question_of(references), references, uncertain, start, {}, threads), p.flights);
   };
   Robots harmless;
   for (const SessionPair& p : pairs) {

@@ -1,9 +1,8 @@
-#include "gap/diagnose/held_out.hpp"
+#include "gap/question/validation.hpp"
 
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
-#include <numeric>
 #include <random>
 
 #include "io/statistics.hpp"
@@ -16,7 +15,7 @@ using Eigen::VectorXd;
 
 /// Length of a block of rows that is resampled; number of resamples; number of shifted copies.
 constexpr double kBlock_s = 2;
-constexpr int kDraws = 1000, kCopies = 20;
+constexpr int kResamples = 1000, kCopies = 20;
 /// Ridge on functions of rms 1, for functions may be nearly the same.
 constexpr double kRidge = 0.01;
 
@@ -74,7 +73,7 @@ HeldOutError error_of(const FlightList& flights, const Residuals& each, const Re
   }
   std::mt19937_64 random(1);
   std::vector<double> draws;
-  for (int k = 0; k < kDraws; ++k) {
+  for (int k = 0; k < kResamples; ++k) {
     double sum = 0, n = 0;
     for (std::size_t i = 0; i < sums.size(); ++i) {
       const std::size_t b = random() % sums.size();
@@ -184,58 +183,6 @@ void agree(const Fitter& fitter, const Flights& flights, const FittedHypothesis&
 
 }  // namespace
 
-std::vector<Residuals> held_out(const Fitter& fitter, const Flights& flights, const std::vector<FittedHypothesis>& fits,
-                                const std::vector<int>& fold, int threads) {
-  const std::size_t folds = static_cast<std::size_t>(*std::ranges::max_element(fold)) + 1;
-  const std::size_t first = flights.references.size(), tests = flights.tests.size();
-  const Evidence& evidence = fitter.evidence();
-  std::vector<Residuals> left(fits.size(), Residuals(tests));
-  std::vector<VehicleHypothesis> vehicles;
-  std::vector<BasisCoefficients> nuisances;
-  for (std::size_t i = 0; i < fits.size(); ++i)
-    for (std::size_t k = 0; k < folds; ++k) {
-      const FittedHypothesis& fit = fits[i];
-      std::vector<char> others(flights.size(), 1);
-      for (std::size_t f = 0; folds > 1 && f < tests; ++f) others[first + f] = fold[f] != static_cast<int>(k) ? 1 : 0;
-      if (evidence.contrasts()) {  // references hold the parameters where they were linearised
-        const BasisCoefficients explained = fitter.explained(*fit.fit, others);
-        for (std::size_t f = 0; f < tests; ++f)
-          if (fold[f] == static_cast<int>(k))
-            left[i][f] = evidence.without(first + f, fit.fit->residual[first + f], explained);
-        continue;
-      }
-      Fitter::JointFit joint = fitter.joint_fit(fit.hypothesis, *fit.fit, others);
-      vehicles.push_back(fit.hypothesis.vehicle(joint.at));
-      nuisances.push_back(std::move(joint.nuisances));
-    }
-  if (evidence.contrasts()) return left;
-  std::vector<Residuals> rows = residuals(flights, vehicles, threads);
-  for (std::size_t i = 0; i < fits.size(); ++i)
-    for (std::size_t f = 0; f < tests; ++f) {
-      const std::size_t k = i * folds + static_cast<std::size_t>(fold[f]);
-      if (rows[k].empty()) continue;
-      Rows& s = rows[k][first + f];
-      left[i][f] = evidence.policy().nuisances_are_noise ? evidence.without(first + f, std::move(s), nuisances[k])
-                                                         : std::move(s);
-    }
-  return left;
-}
-
-void hold_out(const Fitter& fitter, const sim::Randomisation& uncertain, const Flights& flights, int threads,
-              Inference& d) {
-  std::vector<FittedHypothesis> fits = {{Hypothesis(uncertain, {}), &d.parameters}};
-  std::vector<Residuals*> of = {&d.refit};
-  for (ScoredHypothesis& a : d.hypotheses)
-    if (a.fitted()) {
-      fits.push_back({Hypothesis(uncertain, a.effects), &a.fit});
-      of.push_back(&a.held_out);
-    }
-  std::vector<int> each(flights.tests.size());
-  std::iota(each.begin(), each.end(), 0);
-  std::vector<Residuals> left = held_out(fitter, flights, fits, each, threads);
-  for (std::size_t i = 0; i < of.size(); ++i) *of[i] = std::move(left[i]);
-}
-
 Residuals smoothed_away(const Evidence& evidence, const Flights& flights, const Residuals& residual) {
   const RegimeBasis& basis = evidence.basis();
   const FlightList& tests = flights.tests;
@@ -285,8 +232,8 @@ double mean_square(const Evidence& evidence, const FlightList& tests, const Resi
   return n > 0 ? sum / n : 0;
 }
 
-Validation validate(const Fitter& fitter, const sim::Randomisation& uncertain, const Flights& flights,
-                    const Inference& d, int threads) {
+Validation validation_of(const Question& question, const Fitter& fitter, const sim::Randomisation& uncertain,
+                         const Flights& flights, const Inference& d, int threads) {
   Validation v;
   std::vector<FittedHypothesis> fits = {{Hypothesis(uncertain, {}), &d.parameters}};
   std::vector<const Residuals*> left = {&d.refit};
@@ -308,7 +255,7 @@ Validation validate(const Fitter& fitter, const sim::Randomisation& uncertain, c
     type.push_back(static_cast<int>(std::ranges::find(types, name) - types.begin()));
   }
   std::vector<Residuals> by_type;
-  if (types.size() > 1) by_type = held_out(fitter, flights, fits, type, threads);
+  if (types.size() > 1) by_type = question.held_out(fitter, flights, fits, type, threads);
   else
     for (const Residuals* each : left) by_type.push_back(*each);  // holding out the only type leaves no flight
   const auto rung = [&](const std::string& added, const Residuals& each, const Residuals& by_types) {

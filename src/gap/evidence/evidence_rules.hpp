@@ -1,0 +1,30 @@
+// What a question changes in the statistics of residuals. The questions are in gap/question/.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "gap/evidence/model_discrepancy.hpp"
+#include "gap/replay/predicted_flight.hpp"
+
+namespace flappy::gap {
+
+class RegimeBasis;
+struct Scales;
+
+class EvidenceRules {
+ public:
+  virtual ~EvidenceRules() = default;
+  /// Flights that have an offset of their own in the regime basis.
+  virtual std::vector<std::size_t> offsets(const Flights& flights) const = 0;
+  /// Flights for which all functions but offsets follow a second time, as what differs in them; none: no flights.
+  virtual std::vector<std::size_t> apart(const Flights& flights) const = 0;
+  /// Whether an excess of a block over its prior is a sign of an unknown cause.
+  virtual bool may_be_free(std::size_t block, const RegimeBasis& basis, const ModelDiscrepancy& discrepancy) const = 0;
+  /// Scales from which expectation-maximisation starts. `log_evidence`: of scales.
+  virtual Scales first_scales(const Scales& given, const std::function<double(const Scales&)>& log_evidence) const = 0;
+  /// How often an iteration maximises blocks and the centres of their scales in turn, at most.
+  virtual int max_passes() const = 0;
+};
+
+}  // namespace flappy::gap

@@ -1,0 +1,33 @@
+#include "gap/question/question.hpp"
+
+#include "gap/question/alone.hpp"
+#include "gap/question/beat_averaged.hpp"
+#include "gap/question/contrast.hpp"
+
+namespace flappy::gap {
+namespace {
+
+/// With wings, each step of a fit costs a simulation, so it has to bring more; of a beat-averaged vehicle almost nothing.
+constexpr double kWingStep_nats = 0.5, kBeatAveragedStep_nats = 0.05;
+
+const Alone kAlone(kWingStep_nats), kReferencesOfBeatAveraged(kBeatAveragedStep_nats);
+const Contrast kContrast(kWingStep_nats), kContrastOfBeatAveraged(kBeatAveragedStep_nats);
+const BeatAveraged kBeatAveraged(kBeatAveragedStep_nats);
+
+}  // namespace
+
+const Question& question_of(const Flights& flights) {
+  const bool averaged = flights.size() > 0 && flights[0]->is_averaged();
+  if (!flights.references.empty() && !flights.tests.empty()) return averaged ? kContrastOfBeatAveraged : kContrast;
+  if (!averaged) return kAlone;
+  // what a beat-averaged model gets wrong counts as noise, but in a contrast it cancels
+  if (flights.references.empty()) return kBeatAveraged;
+  return kReferencesOfBeatAveraged;
+}
+
+const Question& question_beside(const FlightList& references) {
+  if (references.empty()) return kAlone;
+  return kContrast;
+}
+
+}  // namespace flappy::gap

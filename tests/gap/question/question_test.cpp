@@ -1,0 +1,61 @@
+#include "gap/question/question.hpp"
+
+#include <gtest/gtest.h>
+
+#include "gap/evidence/synthetic_flight.hpp"
+
+namespace flappy::gap::question_test {
+namespace {
+
+using Which = std::vector<std::size_t>;
+
+ScoredHypothesis of_kind(HypothesisKind kind) {
+  ScoredHypothesis a;
+  a.kind = kind;
+  return a;
+}
+
+TEST(Question, AloneAsksWhatIsMissing) {
+  const Flights flights = as_flights(synthetic_flights(3, synthetic_law));
+  const Question& q = question_of(flights);
+  EXPECT_EQ(q.offsets(flights), (Which{1, 2}));
+  EXPECT_EQ(q.apart(flights), Which{});
+  EXPECT_NE(q.pool(of_kind(HypothesisKind::none)), q.pool(of_kind(HypothesisKind::parameters)));
+  EXPECT_EQ(&question_beside({}), &q);
+}
+
+TEST(Question, ReferencesWithoutTestsAreFittedAsFlightsAlone) {
+  const auto made = synthetic_flights(2, synthetic_law);
+  EXPECT_EQ(&question_of(as_flights(made, 2)), &question_of(as_flights(made)));
+}
+
+// Each session has a first flight, which has no offset; all functions follow a second time for the tests.
+TEST(Question, AContrastAsksWhatChanged) {
+  const auto made = synthetic_flights(5, synthetic_law);
+  const Flights flights = as_flights(made, 2);
+  const Question& q = question_of(flights);
+  EXPECT_EQ(q.offsets(flights), (Which{1, 3, 4}));
+  EXPECT_EQ(q.apart(flights), (Which{2, 3, 4}));
+  EXPECT_EQ(q.pool(of_kind(HypothesisKind::none)), q.pool(of_kind(HypothesisKind::parameters)));
+  EXPECT_NE(q.pool(of_kind(HypothesisKind::none)), q.pool(of_kind(HypothesisKind::unknown)));
+  EXPECT_EQ(&question_beside(flights.references), &q);
+}
+
+// An unknown cause of a contrast is free in blocks of the tests alone, where references show what cancels.
+TEST(Question, FreesOtherBlocksInAContrast) {
+  const auto made = synthetic_flights(4, synthetic_law);
+  const Flights alone = as_flights(made), pair = as_flights(made, 2);
+  const ModelDiscrepancy d = read_model_discrepancy();
+  const auto free = [&](const Flights& flights, Regimes regimes, bool of_tests) {
+    const Question& q = question_of(flights);
+    const std::size_t block = static_cast<std::size_t>(regimes) + (of_tests ? kRegimes : 0);
+    return q.may_be_free(block, RegimeBasis(q, flights), d);
+  };
+  EXPECT_TRUE(free(alone, Regimes::place, false));
+  EXPECT_FALSE(free(alone, Regimes::inputs, false));
+  EXPECT_TRUE(free(pair, Regimes::inputs, true));
+  EXPECT_FALSE(free(pair, Regimes::place, false));
+}
+
+}  // namespace
+}  // namespace flappy::gap::question_test
