@@ -89,6 +89,22 @@ struct Reduced {
   double log_scale = 0;  ///< contribution of delta to the log evidence: minus half the log determinant of its precision
 };
 
+// Rows, groups and blocks. A row is one number of one flight; delta has a coefficient for each group and function:
+//
+//               channel         torque_x                torque_y        ...   rotate_z
+//               coefficient     mean cos1 sin1 ... sin4  mean cos1 ...         mean ... sin4
+//   flight 1    beat 1          |    |    |        |                                          a beat: kRowsPerBeat rows
+//               beat 2          |    |    |        |
+//   flight 2    beat 1          |    |    |        |     (a channel may have no rows, and a beat may not be covered)
+//               ...             |    |    |        |
+//                               group 0, 1, 2, ... 8     9, 10, ...            ... kGroups - 1
+//
+//   delta                       group: mean   cos1  sin1   cos2  sin2 ...
+//     function 1        always       [ a ]    [ b     b ]  [ c     c ]        a block is a box: one channel, one harmonic,
+//     function flap     inputs       [ d ]    [ e     e ]  [ f     f ]        one class of functions. Its coefficients
+//     function stroke   inputs       [ d ]    [ e     e ]  [ f     f ]        share a scale. In a contrast each class
+//     function velocity velocity     [ g ]    [ h     h ]  [ i     i ]        comes again, for what differs in the tests.
+//
 /// Classes of functions whose coefficients share a scale: Regimes, and again for those of the test flights.
 inline constexpr int kRegimes = static_cast<int>(Regimes::count), kClasses = 2 * kRegimes;
 /// Blocks: [channel][harmonic][class].
@@ -186,6 +202,7 @@ class Evidence {
     double sd = 1, past = 0, signal = 0;
     double declared_sd = 0;
   };
+  class Weighing;
   enum class Learn { declared, weights, noise, rest_as_noise };
   const PredictedFlight& flight(std::size_t f) const { return *(*flights_)[f]; }
   bool has_rows(int group) const { return flight(0).has_rows(group / kCoefficients, group % kCoefficients); }

@@ -27,19 +27,6 @@ constexpr double kStrideGrowth = 1.5, kMaxStride = 8;
 /// Smallest scale of a free block over the scale of the robot.
 constexpr double kMinFree = 2;
 
-struct Sums {
-  MatrixXd normal, change, all;  ///< basis x basis; basis x regressors; normal (change), then basis x residual
-  VectorXd prior_sd;             ///< prior standard deviation of delta at scale 1
-  double squares = 0;            ///< sum of squares of the residual
-};
-
-/// A group under given scales.
-struct Half {
-  VectorXd sd, law_sd;
-  Eigen::LLT<MatrixXd> llt;  ///< L L^T = H
-  MatrixXd half;             ///< L^-1 d all
-};
-
 double log_prior(double scale, double robot, double freedom) {
   const double ratio = robot / scale;
   return freedom / 2 * (2 * std::log(ratio) + 1 - ratio * ratio);
@@ -81,77 +68,143 @@ double Evidence::scale_cost_nats(double times, ScalePrior prior, const Scales& s
   return -log_prior(times, scales.prior_scale(prior), prior.freedom);
 }
 
-ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regressors& regressors,
-                               const std::vector<char>& use, const BasisCoefficients& law_sd, const Scales& start,
-                               std::optional<double> unknown_penalty_nats, int max_iterations) const {
-  const Index q = basis().size(), k = static_cast<Index>(regressors.columns.size());
-  std::vector<double> nu;
-  for (std::size_t b = 0; b < kBlocks; ++b)
-    nu.push_back(block_of_tests(b) ? discrepancy_.session.block_freedom : discrepancy_.freedom_of(regimes_of_block(b)));
-  const VectorXd prior_mean = regressors.prior_mean();
-  std::vector<int> seen;
-  for (int g = 0; g < kGroups; ++g)
-    for (std::size_t f = 0; f < use.size(); ++f)
-      if (use[f] && normal_[f][static_cast<std::size_t>(g)](0, 0) > 0) {
-        seen.push_back(g);
-        break;
-      }
-  std::vector<Sums> sums(seen.size());
-  std::vector<int> counts(kBlocks, 0);
-  for (const int g : seen)
-    for (int i = 0; i < basis().size(); ++i) ++counts[static_cast<std::size_t>(block_of(g, i))];
-  io::parallel_for(seen.size(), threads_, [&](std::size_t n) {
-    Sums& s = sums[n];
-    auto [normal, right] = sums_of(residual, use, seen[n]);
-    s.normal = std::move(normal);
-    s.change.resize(q, k);
-    for (Index i = 0; i < k; ++i)
-      s.change.col(i) = regressors.columns[static_cast<std::size_t>(i)]->row(seen[n]).transpose();
-    s.all.resize(q, k + 1);
-    s.all.leftCols(k).noalias() = s.normal * s.change;
-    s.all.col(k) = right;
-    s.prior_sd = prior_sd(seen[n]);
-    s.squares = smooth_square(s.normal, right);
-  });
-  MatrixXd whole = MatrixXd::Zero(k + 1, k + 1);
-  for (const Sums& s : sums) {
-    whole.topLeftCorner(k, k).noalias() += s.change.transpose() * s.all.leftCols(k);
-    whole.row(k).head(k) += s.all.col(k).transpose() * s.change;
-    whole(k, k) += s.squares;
+/// One call of Evidence::weigh.
+class Evidence::Weighing {
+ public:
+  Weighing(const Evidence& evidence, const SufficientStatistics& residual, const Regressors& regressors,
+           const std::vector<char>& use, const BasisCoefficients& law_sd, const Scales& start,
+           std::optional<double> unknown_penalty_nats)
+      : e_(evidence),
+        regressors_(regressors),
+        law_sd_(law_sd),
+        unknown_penalty_nats_(unknown_penalty_nats),
+        start_(start),
+        q_(evidence.basis().size()),
+        k_(static_cast<Index>(regressors.columns.size())),
+        prior_mean_(regressors.prior_mean()) {
+    find_groups(use);
+    count_blocks();
+    sum_groups(residual, use);
+    count_effects();
+    if (start_.blocks.empty()) start_.blocks.assign(kBlocks, 1);
+    if (start_.free.empty()) start_.free.assign(kBlocks, 0);
   }
 
-  ScaledEvidence best;
-  best.scales = start;
-  if (best.scales.blocks.empty()) best.scales.blocks.assign(kBlocks, 1);
-  if (best.scales.free.empty()) best.scales.free.assign(kBlocks, 0);
-  best.posterior.log_evidence = -std::numeric_limits<double>::infinity();
-  std::vector<int> of_effect;  // number of regressors of each scale
-  std::vector<ScalePrior> priors;
-  for (std::size_t i = 0; i < regressors.effects.size(); ++i)
-    if (regressors.effects[i] >= 0) {
-      const auto e = static_cast<std::size_t>(regressors.effects[i]);
-      of_effect.resize(std::max(of_effect.size(), e + 1));
-      priors.resize(of_effect.size());
-      ++of_effect[e];
-      priors[e] = regressors.priors[i];
+  /// Expectation-maximisation, over-relaxed.
+  ScaledEvidence run(int max_iterations) {
+    ScaledEvidence best;
+    best.scales = start_;
+    best.posterior.log_evidence = -std::numeric_limits<double>::infinity();
+    Scales now = start_, next = start_;
+    double stride = 1;
+    if (max_iterations > 1)
+      now = e_.rules_->first_scales(now, [&](const Scales& s) { return evidence_at(s, false).posterior.log_evidence; });
+    for (int iteration = 0; iteration < max_iterations; ++iteration) {
+      ScaledEvidence w = evidence_at(now, true);
+      const double gain = w.posterior.log_evidence - best.posterior.log_evidence;
+      if (!(gain > 0)) {  // the stride was too long: back to the best scales, and on with stride 1, which cannot lose
+        if (stride == 1) break;
+        stride = 1;
+        now = strided(best.scales, next, stride);
+        continue;
+      }
+      expect_squares(w);
+      best = std::move(w);
+      if (gain < kSettled_nats || (e_.scales_held_ && !unknown_penalty_nats_)) break;
+      stride = std::min(kMaxStride, kStrideGrowth * stride);
+      next = most_probable_scales(best);
+      now = strided(best.scales, next, stride);
     }
-  best.scales.effects.resize(std::max(best.scales.effects.size(), of_effect.size()), 1);
-  of_effect.resize(best.scales.effects.size());
-  priors.resize(best.scales.effects.size());
-  Scales now = best.scales, next = best.scales;
-  double stride = 1;
-  std::vector<Half> halves(seen.size());
-  std::vector<int> chosen(static_cast<std::size_t>(k));
-  for (Index i = 0; i < k; ++i) chosen[static_cast<std::size_t>(i)] = static_cast<int>(i);
-  /// Leaves the groups under these scales in `halves`.
-  const auto evidence_with = [&](const Scales& scales, bool covariance) {
-    io::parallel_for(seen.size(), threads_, [&](std::size_t n) {
-      const Sums& s = sums[n];
-      Half& h = halves[n];
-      h.law_sd = law_sd.size() > 0 ? VectorXd(law_sd.row(seen[n]).transpose()) : VectorXd::Zero(q);
-      h.sd.resize(q);
-      for (Index i = 0; i < q; ++i) {
-        const int block = block_of(seen[n], static_cast<int>(i));
+    return best;
+  }
+
+ private:
+  /// What does not depend on scales, of a group.
+  struct Sums {
+    MatrixXd normal, change, all;  ///< basis x basis; basis x regressors; normal (change), then basis x residual
+    VectorXd prior_sd;             ///< prior standard deviation of delta at scale 1
+    double squares = 0;            ///< sum of squares of the residual
+  };
+  /// A group under given scales.
+  struct Half {
+    VectorXd sd, law_sd;
+    Eigen::LLT<MatrixXd> llt;  ///< L L^T = H
+    MatrixXd half;             ///< L^-1 d all
+  };
+  /// Scales that follow a centre f: the sums of nu, and of nu / s^2.
+  struct Followers {
+    double freedom = 0, inverses = 0;
+    void add(double nu, double scale) { freedom += nu, inverses += nu / (scale * scale); }
+  };
+
+  /// Groups with rows in the flights that count.
+  void find_groups(const std::vector<char>& use) {
+    for (int g = 0; g < kGroups; ++g)
+      for (std::size_t f = 0; f < use.size(); ++f)
+        if (use[f] && e_.normal_[f][static_cast<std::size_t>(g)](0, 0) > 0) {
+          seen_.push_back(g);
+          break;
+        }
+  }
+
+  void count_blocks() {
+    for (std::size_t b = 0; b < kBlocks; ++b)
+      nu_.push_back(block_of_tests(b) ? e_.discrepancy_.session.block_freedom
+                                      : e_.discrepancy_.freedom_of(regimes_of_block(b)));
+    counts_.assign(kBlocks, 0);
+    for (const int g : seen_)
+      for (int i = 0; i < e_.basis().size(); ++i) ++counts_[static_cast<std::size_t>(e_.block_of(g, i))];
+  }
+
+  void sum_groups(const SufficientStatistics& residual, const std::vector<char>& use) {
+    sums_.resize(seen_.size());
+    halves_.resize(seen_.size());
+    io::parallel_for(seen_.size(), e_.threads_, [&](std::size_t n) {
+      Sums& s = sums_[n];
+      auto [normal, right] = e_.sums_of(residual, use, seen_[n]);
+      s.normal = std::move(normal);
+      s.change.resize(q_, k_);
+      for (Index i = 0; i < k_; ++i)
+        s.change.col(i) = regressors_.columns[static_cast<std::size_t>(i)]->row(seen_[n]).transpose();
+      s.all.resize(q_, k_ + 1);
+      s.all.leftCols(k_).noalias() = s.normal * s.change;
+      s.all.col(k_) = right;
+      s.prior_sd = e_.prior_sd(seen_[n]);
+      s.squares = smooth_square(s.normal, right);
+    });
+    whole_ = MatrixXd::Zero(k_ + 1, k_ + 1);
+    for (const Sums& s : sums_) {
+      whole_.topLeftCorner(k_, k_).noalias() += s.change.transpose() * s.all.leftCols(k_);
+      whole_.row(k_).head(k_) += s.all.col(k_).transpose() * s.change;
+      whole_(k_, k_) += s.squares;
+    }
+    for (Index i = 0; i < k_; ++i) chosen_.push_back(static_cast<int>(i));
+  }
+
+  void count_effects() {
+    for (std::size_t i = 0; i < regressors_.effects.size(); ++i)
+      if (regressors_.effects[i] >= 0) {
+        const auto e = static_cast<std::size_t>(regressors_.effects[i]);
+        of_effect_.resize(std::max(of_effect_.size(), e + 1));
+        priors_.resize(of_effect_.size());
+        ++of_effect_[e];
+        priors_[e] = regressors_.priors[i];
+      }
+    start_.effects.resize(std::max(start_.effects.size(), of_effect_.size()), 1);
+    of_effect_.resize(start_.effects.size());
+    priors_.resize(start_.effects.size());
+  }
+
+  /// The evidence with delta integrated out, under these scales. Leaves the groups in halves_.
+  ScaledEvidence evidence_at(const Scales& scales, bool covariance) {
+    // each group: H, and what delta takes from the sums
+    io::parallel_for(seen_.size(), e_.threads_, [&](std::size_t n) {
+      const Sums& s = sums_[n];
+      Half& h = halves_[n];
+      h.law_sd = law_sd_.size() > 0 ? VectorXd(law_sd_.row(seen_[n]).transpose()) : VectorXd::Zero(q_);
+      h.sd.resize(q_);
+      for (Index i = 0; i < q_; ++i) {
+        const int block = e_.block_of(seen_[n], static_cast<int>(i));
         h.sd[i] = std::hypot(scales.blocks[static_cast<std::size_t>(block)] * s.prior_sd[i], h.law_sd[i]);
       }
       MatrixXd precision = h.sd.asDiagonal() * s.normal * h.sd.asDiagonal();
@@ -160,117 +213,140 @@ ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regre
       h.half = h.llt.matrixL().solve(h.sd.asDiagonal() * s.all);
     });
     // regressors in units of the prior of their coefficients
-    VectorXd unit = VectorXd::Ones(k + 1);
-    for (Index i = 0; i < k; ++i)
-      if (const int e = regressors.effects[static_cast<std::size_t>(i)]; e >= 0)
+    VectorXd unit = VectorXd::Ones(k_ + 1);
+    for (Index i = 0; i < k_; ++i)
+      if (const int e = regressors_.effects[static_cast<std::size_t>(i)]; e >= 0)
         unit[i] = scales.effects[static_cast<std::size_t>(e)];
-    io::parallel_for(seen.size(), threads_, [&](std::size_t n) { halves[n].half *= unit.asDiagonal(); });
-    Reduced reduced{unit.asDiagonal() * whole * unit.asDiagonal(), 0};
-    for (const Half& h : halves) {
+    io::parallel_for(seen_.size(), e_.threads_, [&](std::size_t n) { halves_[n].half *= unit.asDiagonal(); });
+    // the sum over the groups
+    Reduced reduced{unit.asDiagonal() * whole_ * unit.asDiagonal(), 0};
+    for (const Half& h : halves_) {
       reduced.sums.selfadjointView<Eigen::Lower>().rankUpdate(h.half.transpose(), -1);
       reduced.log_scale -= h.llt.matrixLLT().diagonal().array().log().sum();
     }
     reduced.sums = MatrixXd(reduced.sums.selfadjointView<Eigen::Lower>());
-    ScaledEvidence w{posterior(reduced, chosen, prior_mean, covariance), scales, 1, BasisCoefficients::Zero(kGroups, q),
-                     BasisCoefficients::Zero(kGroups, q)};
-    double log_scales = -0.5 * std::pow(std::log(scales.robot) / discrepancy_.spread.robot_sd, 2);
-    log_scales -= 0.5 * std::pow(std::log(scales.session) / discrepancy_.session.scale_sd, 2);
-    for (std::size_t b = 0; b < kBlocks; ++b)
-      if (counts[b] > 0)
-        log_scales += scales.free[b] ? -*unknown_penalty_nats
-                      : scales_held_ ? 0
-                                     : log_prior(scales.blocks[b], scales.centre(b), nu[b]);
-    for (std::size_t e = 0; e < of_effect.size(); ++e)
-      if (of_effect[e] > 0 && !scales_held_)
-        log_scales += log_prior(scales.effects[e], scales.prior_scale(priors[e]), priors[e].freedom);
-    w.posterior.log_evidence += log_scales;
+    ScaledEvidence w{posterior(reduced, chosen_, prior_mean_, covariance), scales, 1,
+                     BasisCoefficients::Zero(kGroups, q_), BasisCoefficients::Zero(kGroups, q_)};
+    w.posterior.log_evidence += log_prior_of(scales);
     return w;
-  };
-  if (max_iterations > 1)
-    now = rules_->first_scales(now, [&](const Scales& s) { return evidence_with(s, false).posterior.log_evidence; });
-  for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    ScaledEvidence w = evidence_with(now, true);
-    const double gain = w.posterior.log_evidence - best.posterior.log_evidence;
-    if (!(gain > 0)) {  // the stride was too long: back to the best scales, and on with stride 1, which cannot lose
-      if (stride == 1) break;
-      stride = 1;
-      now = strided(best.scales, next, stride);
-      continue;
-    }
+  }
 
-    // expected squares of delta, in units of D
+  double log_prior_of(const Scales& scales) const {
+    double sum = -0.5 * std::pow(std::log(scales.robot) / e_.discrepancy_.spread.robot_sd, 2);
+    sum -= 0.5 * std::pow(std::log(scales.session) / e_.discrepancy_.session.scale_sd, 2);
+    for (std::size_t b = 0; b < kBlocks; ++b)
+      if (counts_[b] > 0)
+        sum += scales.free[b]    ? -*unknown_penalty_nats_
+               : e_.scales_held_ ? 0
+                                 : log_prior(scales.blocks[b], scales.centre(b), nu_[b]);
+    for (std::size_t e = 0; e < of_effect_.size(); ++e)
+      if (of_effect_[e] > 0 && !e_.scales_held_)
+        sum += log_prior(scales.effects[e], scales.prior_scale(priors_[e]), priors_[e].freedom);
+    return sum;
+  }
+
+  /// E step: delta, and its expected squares in units of D, given the posterior of the regressors.
+  void expect_squares(ScaledEvidence& w) const {
     const MatrixXd spread = w.posterior.covariance.llt().matrixL();
-    io::parallel_for(seen.size(), threads_, [&](std::size_t n) {
-      const Half& h = halves[n];
-      const VectorXd z = h.llt.matrixU().solve(h.half.col(k) - h.half.leftCols(k) * w.posterior.mean);
-      const MatrixXd inverse = h.llt.matrixU().solve(MatrixXd::Identity(q, q));
+    io::parallel_for(seen_.size(), e_.threads_, [&](std::size_t n) {
+      const Half& h = halves_[n];
+      const VectorXd z = h.llt.matrixU().solve(h.half.col(k_) - h.half.leftCols(k_) * w.posterior.mean);
+      const MatrixXd inverse = h.llt.matrixU().solve(MatrixXd::Identity(q_, q_));
       MatrixXd moved;
-      if (k > 0)  // Eigen's triangular products and row expressions fail for matrices without columns
-        moved = h.llt.matrixU().solve(h.half.leftCols(k) * spread.triangularView<Eigen::Lower>());
-      for (Index i = 0; i < q; ++i) {
+      if (k_ > 0)  // Eigen's triangular products and row expressions fail for matrices without columns
+        moved = h.llt.matrixU().solve(h.half.leftCols(k_) * spread.triangularView<Eigen::Lower>());
+      for (Index i = 0; i < q_; ++i) {
         const double d = h.sd[i], share = d > 0 ? 1 - std::pow(h.law_sd[i] / d, 2) : 0;  // delta's share of variance
         const double square =
-            d * d * (z[i] * z[i] + inverse.row(i).squaredNorm() + (k > 0 ? moved.row(i).squaredNorm() : 0.0));
+            d * d * (z[i] * z[i] + inverse.row(i).squaredNorm() + (k_ > 0 ? moved.row(i).squaredNorm() : 0.0));
         const double own = share * share * square + share * h.law_sd[i] * h.law_sd[i];
-        w.delta(seen[n], i) = z[i];
-        w.squares(seen[n], i) = sums[n].prior_sd[i] > 0 ? own / (sums[n].prior_sd[i] * sums[n].prior_sd[i]) : 0;
+        w.delta(seen_[n], i) = z[i];
+        w.squares(seen_[n], i) = sums_[n].prior_sd[i] > 0 ? own / (sums_[n].prior_sd[i] * sums_[n].prior_sd[i]) : 0;
       }
     });
-    const VectorXd w_mean = w.posterior.mean, w_variance = w.posterior.covariance.diagonal();
-    best = std::move(w);
-    if (gain < kSettled_nats || (scales_held_ && !unknown_penalty_nats)) break;
-    stride = std::min(kMaxStride, kStrideGrowth * stride);
-    next = best.scales;
+  }
+
+  /// M step.
+  Scales most_probable_scales(const ScaledEvidence& w) const {
+    Scales next = w.scales;
     std::vector<double> total(kBlocks, 0);
-    for (const int g : seen)
-      for (Index i = 0; i < q; ++i)
-        total[static_cast<std::size_t>(block_of(g, static_cast<int>(i)))] += best.squares(g, i);
-    double effects_freedom = 0, effects_inverses = 0;
-    if (!scales_held_) {
-      std::vector<double> squares(of_effect.size(), 0);
-      for (Index i = 0; i < k; ++i)
-        if (const int e = regressors.effects[static_cast<std::size_t>(i)]; e >= 0)
-          squares[static_cast<std::size_t>(e)] += w_mean[i] * w_mean[i] + w_variance[i];
-      for (std::size_t e = 0; e < of_effect.size(); ++e) {
-        if (of_effect[e] == 0) continue;
-        const double nu_e = priors[e].freedom, prior = next.prior_scale(priors[e]);
-        const double squares_e = squares[e] * next.effects[e] * next.effects[e];
-        next.effects[e] = std::sqrt((squares_e + nu_e * prior * prior) / (of_effect[e] + nu_e));
-        if (priors[e].follows_robot)
-          effects_freedom += nu_e, effects_inverses += nu_e / (next.effects[e] * next.effects[e]);
-      }
-    }
-    for (int pass = 0; pass < rules_->max_passes(); ++pass) {
+    for (const int g : seen_)
+      for (Index i = 0; i < q_; ++i)
+        total[static_cast<std::size_t>(e_.block_of(g, static_cast<int>(i)))] += w.squares(g, i);
+    const Followers effects = maximise_effects(w.posterior, next);
+    // blocks and their centres hold each other back
+    for (int pass = 0; pass < e_.rules_->max_passes(); ++pass) {
       const double robot = next.robot, session = next.session;
-      double freedom = effects_freedom, inverses = effects_inverses, session_freedom = 0, session_inverses = 0;
+      Followers of_robot = effects, of_session;
       for (std::size_t b = 0; b < kBlocks; ++b) {
-        if (counts[b] == 0) continue;
-        const double n = counts[b], f2 = std::pow(next.centre(b), 2);
-        const double bound2 = scales_held_ ? 1 : (total[b] + nu[b] * f2) / (n + nu[b]);
-        next.blocks[b] = std::sqrt(bound2);
-        next.free[b] = 0;
-        if (unknown_penalty_nats && rules_->may_be_free(b, basis(), discrepancy_)) {
-          const double free2 = std::max(total[b] / n, kMinFree * kMinFree * f2);
-          const auto objective = [&](double s2) { return -0.5 * (n * std::log(s2) + total[b] / s2); };
-          const double bound = scales_held_ ? 0 : log_prior(std::sqrt(bound2), next.centre(b), nu[b]);
-          if (objective(free2) - *unknown_penalty_nats > objective(bound2) + bound) {
-            next.blocks[b] = std::sqrt(free2);
-            next.free[b] = 1;
-          }
-        }
-        if (next.free[b]) continue;
-        const double inverse = nu[b] / (next.blocks[b] * next.blocks[b]);
-        if (block_of_tests(b)) session_freedom += nu[b], session_inverses += inverse;
-        else freedom += nu[b], inverses += inverse;
+        if (counts_[b] == 0) continue;
+        maximise_block(b, total[b], next);
+        if (!next.free[b]) (block_of_tests(b) ? of_session : of_robot).add(nu_[b], next.blocks[b]);
       }
-      if (!scales_held_) next.robot = robot_scale(freedom, inverses, discrepancy_.spread.robot_sd);
-      if (session_freedom > 0)  // there are blocks of test flights
-        next.session = robot_scale(session_freedom, session_inverses, discrepancy_.session.scale_sd);
+      if (!e_.scales_held_)
+        next.robot = robot_scale(of_robot.freedom, of_robot.inverses, e_.discrepancy_.spread.robot_sd);
+      if (of_session.freedom > 0)  // there are blocks of test flights
+        next.session = robot_scale(of_session.freedom, of_session.inverses, e_.discrepancy_.session.scale_sd);
       if (next.robot == robot && next.session == session) break;
     }
-    now = strided(best.scales, next, stride);
+    return next;
   }
-  return best;
+
+  /// Scales of background magnitudes; returns those that follow the robot.
+  Followers maximise_effects(const Posterior& p, Scales& next) const {
+    Followers follow;
+    if (e_.scales_held_) return follow;
+    std::vector<double> squares(of_effect_.size(), 0);
+    for (Index i = 0; i < k_; ++i)
+      if (const int e = regressors_.effects[static_cast<std::size_t>(i)]; e >= 0)
+        squares[static_cast<std::size_t>(e)] += p.mean[i] * p.mean[i] + p.covariance(i, i);
+    for (std::size_t e = 0; e < of_effect_.size(); ++e) {
+      if (of_effect_[e] == 0) continue;
+      const double nu_e = priors_[e].freedom, prior = next.prior_scale(priors_[e]);
+      const double squares_e = squares[e] * next.effects[e] * next.effects[e];
+      next.effects[e] = std::sqrt((squares_e + nu_e * prior * prior) / (of_effect_[e] + nu_e));
+      if (priors_[e].follows_robot) follow.add(nu_e, next.effects[e]);
+    }
+    return follow;
+  }
+
+  /// The scale of a block, within its prior or free of it. `total`: expected squares of its coefficients.
+  void maximise_block(std::size_t b, double total, Scales& next) const {
+    const double n = counts_[b], f2 = std::pow(next.centre(b), 2);
+    const double bound2 = e_.scales_held_ ? 1 : (total + nu_[b] * f2) / (n + nu_[b]);
+    next.blocks[b] = std::sqrt(bound2);
+    next.free[b] = 0;
+    if (!unknown_penalty_nats_ || !e_.rules_->may_be_free(b, e_.basis(), e_.discrepancy_)) return;
+    const double free2 = std::max(total / n, kMinFree * kMinFree * f2);
+    const auto objective = [&](double s2) { return -0.5 * (n * std::log(s2) + total / s2); };
+    const double bound = e_.scales_held_ ? 0 : log_prior(std::sqrt(bound2), next.centre(b), nu_[b]);
+    if (!(objective(free2) - *unknown_penalty_nats_ > objective(bound2) + bound)) return;
+    next.blocks[b] = std::sqrt(free2);
+    next.free[b] = 1;
+  }
+
+  const Evidence& e_;
+  const Regressors& regressors_;
+  const BasisCoefficients& law_sd_;
+  std::optional<double> unknown_penalty_nats_;
+  Scales start_;
+  Index q_, k_;  ///< number of functions of the basis; of regressors
+  VectorXd prior_mean_;
+  std::vector<int> seen_;           ///< groups with rows
+  std::vector<double> nu_;          ///< [block] degrees of freedom of its scale
+  std::vector<int> counts_;         ///< [block] number of its coefficients
+  std::vector<int> of_effect_;      ///< [effect] number of regressors of its scale
+  std::vector<ScalePrior> priors_;  ///< [effect]
+  std::vector<Sums> sums_;          ///< [seen group]
+  std::vector<Half> halves_;        ///< [seen group]
+  MatrixXd whole_;                  ///< sums of products of the regressors and, last, the residual, over all groups
+  std::vector<int> chosen_;         ///< all regressors
+};
+
+ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regressors& regressors,
+                               const std::vector<char>& use, const BasisCoefficients& law_sd, const Scales& start,
+                               std::optional<double> unknown_penalty_nats, int max_iterations) const {
+  return Weighing(*this, residual, regressors, use, law_sd, start, unknown_penalty_nats).run(max_iterations);
 }
 
 }  // namespace flappy::gap
