@@ -38,7 +38,7 @@ ROOMS = {
     "gap/evidence": BASE | {"flightlog", "gap/replay"},
     "gap/localise": BASE | {"flightlog", "gap/result", "gap/replay", "gap/evidence"},
     "gap/question": BASE | {"flightlog", "gap/result", "gap/replay", "gap/evidence", "gap/localise"},
-    "gap/diagnose": ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/localise", "gap/question", "gap/learn"},
+    "gap/diagnose": ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/localise", "gap/question"},
     "gap/learn": BASE | {"flightlog", "gap/replay", "gap/evidence", "gap/question"},
     "gap/plan": ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/question", "gap/diagnose"},
     "server": set(),  # what several of its rooms share

@@ -99,6 +99,8 @@ file(WRITE ${WORK}/bad/mocap.csv "t_s,x_mm,y_m,z_m,qw,qx,qy,qz\n")
 expect_refused("${WORK}/bad/mocap.csv:1: x_mm: unknown column; accepted here with another unit: \"x_m\"" check ${WORK}/bad)
 file(REMOVE ${WORK}/bad/flight.toml)
 expect_refused("${WORK}/bad/flight.toml: cannot be read: No such file or directory" check ${WORK}/bad)
+expect_refused("--magnitude wind: no factor; accepted: EFFECT=FACTOR, as wind=2" plan
+  --vehicle ${SOURCE}/configs/vehicles/hummingbird_nominal.toml --magnitude wind)
 expect_refused("flappy-gap: A subcommand is required; accepted: check, import, diagnose, mcap, plan, learn-discrepancy, effects; see flappy-gap --help")
 expect_refused("flappy-gap: diagnos: no such command; accepted: check, import, diagnose, mcap, plan, learn-discrepancy, effects; did you mean \"diagnose\"?; see flappy-gap --help" diagnos)
 expect_refused("flappy-gap: flight is required; see flappy-gap --help" check)

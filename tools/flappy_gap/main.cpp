@@ -6,13 +6,13 @@
 #include "flightlog/check/check.hpp"
 #include "flightlog/check/data_faults.hpp"
 #include "gap/diagnose/diagnose_command.hpp"
-#include "gap/diagnose/learn_command.hpp"
-#include "gap/diagnose/mcap_command.hpp"
-#include "gap/plan/plan_command.hpp"
 #include "import_command.hpp"
 #include "io/config.hpp"
 #include "io/program.hpp"
+#include "learn_command.hpp"
+#include "mcap_command.hpp"
 #include "model/effects/registry.hpp"
+#include "plan_command.hpp"
 
 namespace flappy::gap {
 namespace {

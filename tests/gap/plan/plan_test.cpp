@@ -8,7 +8,6 @@
 
 #include "gap/diagnose/next_experiment.hpp"
 #include "gap/flown_flights.hpp"
-#include "gap/plan/plan_command.hpp"
 #include "gap/plan/separation.hpp"
 #include "io/temporary_folder.hpp"
 #include "io/text.hpp"
@@ -138,8 +137,6 @@ TEST(Plan, RefusesWhatCannotBeFlown) {
               io::format("--magnitude wind: is %g; accepted: a factor above 0, at most 16.666666666666668", times));
   EXPECT_TRUE(with_change([](PlanSettings& o) { o.sensors = "nowhere.toml"; }).find("nowhere.toml") !=
               std::string::npos);
-  PlanCommand c{.settings = s, .magnitudes = {"wind"}, .out = ""};
-  EXPECT_EQ(test::refusal([&] { run_plan(c); }), "--magnitude wind: no factor; accepted: EFFECT=FACTOR, as wind=2");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "gap/diagnose/mcap_command.hpp"
+#include "mcap_command.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "gap/diagnose/learn_command.hpp"
+#include "learn_command.hpp"
 
 #include <algorithm>
 #include <cstdio>

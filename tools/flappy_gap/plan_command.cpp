@@ -1,4 +1,4 @@
-#include "gap/plan/plan_command.hpp"
+#include "plan_command.hpp"
 
 #include <algorithm>
 #include <charconv>
