@@ -53,10 +53,11 @@ bool right_group(const ScoredCase& c) {
 bool among_three(const ScoredCase& c) {
   const Answer& p = c.prediction;
   if (group_holds(c) || (p.kind == "remainder" && named_alone(c))) return true;
-  for (const FittedSet& s : p.sets) {
+  for (const gap::RankedHypothesis& s : p.sets) {
     if (!same(s.effects, c.truth.effects)) continue;
     const double mine = s.probability;
-    std::ptrdiff_t above = std::ranges::count_if(p.sets, [&](const FittedSet& o) { return o.probability > mine; });
+    std::ptrdiff_t above =
+        std::ranges::count_if(p.sets, [&](const gap::RankedHypothesis& o) { return o.probability > mine; });
     above += (p.none > mine) + (p.parameters > mine) + (p.unknown > mine);
     return mine > 0 && above < 3;
   }
@@ -65,8 +66,8 @@ bool among_three(const ScoredCase& c) {
 
 bool false_alarm(const ScoredCase& c) { return c.prediction.kind != "none" && c.prediction.kind != "parameters"; }
 
-const FittedSet* fitted(const Answer& p, const Names& effects) {
-  for (const FittedSet& s : p.sets)
+const gap::RankedHypothesis* fitted(const Answer& p, const Names& effects) {
+  for (const gap::RankedHypothesis& s : p.sets)
     if (same(s.effects, effects)) return &s;
   return nullptr;
 }
@@ -75,7 +76,8 @@ const FittedSet* fitted(const Answer& p, const Names& effects) {
 Names at_work(const Answer& p) {
   if (names_set(p.kind)) return p.effects;
   if (p.kind != "group") return {};
-  const auto most = std::ranges::find_if(p.sets, [&](const FittedSet& s) { return holds(p.effects, s.effects); });
+  const auto most =
+      std::ranges::find_if(p.sets, [&](const gap::RankedHypothesis& s) { return holds(p.effects, s.effects); });
   return most == p.sets.end() ? Names() : most->effects;
 }
 
@@ -258,16 +260,16 @@ Answer answer_of(const Prediction& p) {
   a.best_rmse = p.best_rmse;
   for (const gap::Suspect& s : d.suspects) a.suspects.push_back(s.effect);
   for (const gap::RankedHypothesis& h : d.hypotheses) {
-    a.evidence.push_back({h.effects, h.log_evidence - h.log_prior});
+    a.hypotheses.push_back(h);
     if (h.kind == gap::HypothesisKind::none) a.none = h.probability;
     if (h.kind == gap::HypothesisKind::parameters) a.parameters = h.probability;
     if (h.kind == gap::HypothesisKind::unknown) a.unknown = h.probability;
     if (h.kind != gap::HypothesisKind::effect) continue;
-    if (const auto same = std::ranges::find(a.sets, h.effects, &FittedSet::effects); same != a.sets.end()) {
+    if (const auto same = std::ranges::find(a.sets, h.effects, &gap::RankedHypothesis::effects); same != a.sets.end()) {
       same->probability += h.probability;  // hypotheses with and without a remainder count together
       continue;
     }
-    a.sets.push_back({h.effects, h.probability, h.loss, h.loss_gain_sd});
+    a.sets.push_back(h);
   }
   return a;
 }
@@ -286,9 +288,9 @@ bool right(const CaseTruth& t, const Answer& p) {
 std::optional<double> realised_nats(const ScoredCase& c) {
   if (c.truth.effects.size() != 1) return std::nullopt;
   std::optional<double> own, rival;
-  for (const Weighed& w : c.prediction.evidence) {
-    std::optional<double>& best = std::ranges::count(w.effects, c.truth.effects.front()) > 0 ? own : rival;
-    best = std::max(best.value_or(w.nats), w.nats);
+  for (const gap::RankedHypothesis& h : c.prediction.hypotheses) {
+    std::optional<double>& best = std::ranges::count(h.effects, c.truth.effects.front()) > 0 ? own : rival;
+    best = std::max(best.value_or(h.explained()), h.explained());
   }
   if (!own || !rival) return std::nullopt;
   return *own - *rival;
@@ -296,24 +298,24 @@ std::optional<double> realised_nats(const ScoredCase& c) {
 
 std::optional<double> closure(const ScoredCase& c) {
   if (c.prediction.kind == "data") return 0;
-  const FittedSet* truth = fitted(c.prediction, c.truth.effects);
+  const gap::RankedHypothesis* truth = fitted(c.prediction, c.truth.effects);
   std::optional<double> refit = c.prediction.refit;
-  if ((truth == nullptr || !truth->left) && c.true_fit) {
+  if ((truth == nullptr || !truth->loss) && c.true_fit) {
     truth = fitted(*c.true_fit, c.truth.effects);
     refit = c.true_fit->refit;
   }
-  if (truth == nullptr || !truth->left || !refit || !c.prediction.refit) return std::nullopt;
-  const double closable = *refit - *truth->left;
-  if (closable < kSureOfGain * truth->gain_sd || closable <= 0) return std::nullopt;
-  const FittedSet* named = fitted(c.prediction, at_work(c.prediction));
-  if (named == nullptr || !named->left) return 0;
-  return (*c.prediction.refit - *named->left) / closable;
+  if (truth == nullptr || !truth->loss || !refit || !c.prediction.refit) return std::nullopt;
+  const double closable = *refit - *truth->loss;
+  if (closable < kSureOfGain * truth->loss_gain_sd || closable <= 0) return std::nullopt;
+  const gap::RankedHypothesis* named = fitted(c.prediction, at_work(c.prediction));
+  if (named == nullptr || !named->loss) return 0;
+  return (*c.prediction.refit - *named->loss) / closable;
 }
 
 bool needs_true_fit(const ScoredCase& c) {
   if ((c.truth.part != "singles" && c.truth.part != "changed") || within_noise(c)) return false;
-  const FittedSet* truth = fitted(c.prediction, c.truth.effects);
-  return c.prediction.kind != "data" && (truth == nullptr || !truth->left);
+  const gap::RankedHypothesis* truth = fitted(c.prediction, c.truth.effects);
+  return c.prediction.kind != "data" && (truth == nullptr || !truth->loss);
 }
 
 bool needs_change_over_noise(const ScoredCase& c) {

@@ -44,22 +44,9 @@ inline constexpr const char* kContrastParts[] = {
     "changed",        "changed_short_reference", "changed_short_test", "unchanged",    "changed_calm",
     "unchanged_calm", "changed_withheld",        "changed_outside",    "changed_pairs"};
 
-struct FittedSet {
-  std::vector<std::string> effects;
-  double probability = 0;
-  std::optional<double> left;  ///< mean loss in held-out flights; none: not fitted
-  double gain_sd = 0;          ///< standard deviation of its gain over the parameters alone
-};
-
 /// Place of an unknown cause, in the terms of blind::FamilyEffect.
 struct Where {
   std::string channel, regime;
-};
-
-/// A hypothesis and its evidence, prior left out.
-struct Weighed {
-  std::vector<std::string> effects;  ///< empty: none, parameters, or an unknown cause
-  double nats = 0;
 };
 
 /// A plan's expectation for a case, given its true effect.
@@ -72,10 +59,11 @@ struct Answer {
   /// Kind of the verdict; "remainder": effects and a remainder; "crashed": the robot crashed in the flight to be
   /// diagnosed.
   std::string kind = "data";
-  std::vector<std::string> effects;   ///< effects that the verdict names; for a group, its possible effects
-  double probability = 0;             ///< probability of the verdict
-  std::vector<FittedSet> sets;        ///< the most probable first
-  std::vector<Weighed> evidence;      ///< evidence of every hypothesis
+  std::vector<std::string> effects;               ///< effects that the verdict names; for a group, its possible effects
+  double probability = 0;                         ///< probability of the verdict
+  std::vector<gap::RankedHypothesis> hypotheses;  ///< all
+  /// Those with effects, the most probable first; with and without a remainder together.
+  std::vector<gap::RankedHypothesis> sets;
   std::vector<std::string> suspects;  ///< most probable effects given that one is missing
   double none = 0, parameters = 0, unknown = 0;
   std::optional<double> nominal, refit, floor;  ///< mean losses: vehicle file, parameters fitted, noise alone

@@ -12,18 +12,25 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-FittedSet fitted(Names effects, double probability, std::optional<double> left = {}, double gain_sd = 0) {
-  FittedSet s;
+gap::RankedHypothesis fitted(Names effects, double probability, std::optional<double> left = {}, double gain_sd = 0) {
+  gap::RankedHypothesis s;
   s.effects = std::move(effects);
   s.probability = probability;
-  s.left = left;
-  s.gain_sd = gain_sd;
+  s.loss = left;
+  s.loss_gain_sd = gain_sd;
   return s;
+}
+
+gap::RankedHypothesis weighed(Names effects, double nats) {
+  gap::RankedHypothesis h;
+  h.effects = std::move(effects);
+  h.log_evidence = nats;
+  return h;
 }
 
 /// A verdict with the sets that stand behind it.
 ScoredCase judged(const std::string& part, Names truth, const std::string& kind, Names named, double probability,
-                  std::vector<FittedSet> sets = {}) {
+                  std::vector<gap::RankedHypothesis> sets = {}) {
   ScoredCase c;
   c.truth.part = part;
   c.truth.effects = std::move(truth);
@@ -90,7 +97,8 @@ TEST(Score, ComparesPlansWithWhatBecameOfThem) {
   for (int i = 0; i < 20; ++i) {
     const bool right = i >= 10;
     ScoredCase c = judged("changed", {"wind"}, "effect", {right ? "wind" : "tether"}, 0.9);
-    c.prediction.evidence = {{{"wind"}, 2.0 * i - 25}, {{"tether", "wind"}, 2.0 * i - 19}, {{"tether"}, 0}, {{}, -50}};
+    c.prediction.hypotheses = {weighed({"wind"}, 2.0 * i - 25), weighed({"tether", "wind"}, 2.0 * i - 19),
+                               weighed({"tether"}, 0), weighed({}, -50)};
     c.foreseen = Foresight{10.0 * (i + 1), 0.04 * i};
     cases.push_back(c);
   }
@@ -100,7 +108,7 @@ TEST(Score, ComparesPlansWithWhatBecameOfThem) {
   EXPECT_EQ(main_score(cases, "contrast_plan_rank").count, 20u);
   // medians of 105 and 0: nothing was brought; with ten nats more, 105 over 10
   EXPECT_FALSE(main_score(cases, "contrast_plan_hope").value);
-  for (ScoredCase& c : cases) c.prediction.evidence[1].nats += 10;
+  for (ScoredCase& c : cases) c.prediction.hypotheses[1].log_evidence += 10;
   EXPECT_DOUBLE_EQ(*main_score(cases, "contrast_plan_hope").value, 10.5);
   cases[0].prediction.effects = {"wind"};
   EXPECT_FALSE(main_score(cases, "contrast_plan_auc").value) << "fewer than ten are wrong";
@@ -288,7 +296,7 @@ TEST(Score, ClosureIsMeasuredAgainstTheTrueEffect) {
   c.prediction.kind = "unknown";
   EXPECT_DOUBLE_EQ(*closure(c), 0) << "a verdict without effects closes nothing";
   c.prediction.kind = "effect";
-  c.prediction.sets[1].gain_sd = 0.26;
+  c.prediction.sets[1].loss_gain_sd = 0.26;
   EXPECT_FALSE(closure(c)) << "nothing that is sure to close";
   // the truth was not fitted: a fit made for the purpose
   c.prediction.sets.pop_back();

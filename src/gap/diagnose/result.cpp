@@ -39,14 +39,9 @@ void add_hypotheses(const RowContext& context, const sim::Randomisation& uncerta
   std::vector<RankedHypothesis> without_effects;
   for (const ScoredHypothesis& a : d.hypotheses) {
     const bool effect = a.kind == HypothesisKind::effect;
-    RankedHypothesis h;
-    h.kind = a.kind;
-    h.effects = a.effects;
+    RankedHypothesis h = a;
     h.group = effect ? pool_name(a.effects) : name_of(a.kind);
     h.remainder = effect && a.has_remainder();
-    h.probability = a.probability;
-    h.log_evidence = a.log_evidence;
-    h.log_prior = a.log_prior;
     if (effect) h.parameters = estimates_of(a, uncertain);
     if (a.fitted()) {
       const Losses left = losses_of(context, a.held_out);

@@ -19,13 +19,9 @@ struct FreeBlock {
   double gain_nats = 0;  ///< gain of evidence; for a free block, less the penalty of an unknown cause
 };
 
-/// A hypothesis with its evidence. Hypotheses exclude each other; their probabilities add up to 1.
-struct ScoredHypothesis {
-  HypothesisKind kind = HypothesisKind::parameters;
-  std::vector<std::string> effects;
-  double log_evidence = 0;  ///< log evidence of all flights; includes log_prior
-  double log_prior = 0;
-  double probability = 0;
+/// A hypothesis with its fit. Its parameters, loss and closure are left to the result (diagnose/result.hpp).
+struct ScoredHypothesis : RankedHypothesis {
+  ScoredHypothesis() { kind = HypothesisKind::parameters; }
   std::vector<FreeBlock> unexplained;     ///< blocks of an unknown cause, or of a remainder in addition to the effects
   std::vector<std::string> jointly_with;  ///< effects with which these blocks are fitted jointly
   Fit fit;                                ///< effects and parameters; without a residual if fitted only linearly
@@ -37,8 +33,6 @@ struct ScoredHypothesis {
   std::vector<std::string> predicted_with;
   bool fitted() const { return fit.flown(); }
   bool has_remainder() const { return !unexplained.empty(); }
-  /// Log evidence without the prior.
-  double explained() const { return log_evidence - log_prior; }
 };
 
 /// Parameters and effects of the corrected vehicle.

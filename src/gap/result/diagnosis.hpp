@@ -38,6 +38,8 @@ struct RankedHypothesis {
   std::optional<double> loss;        ///< mean loss in held-out flights; none: it was not fitted by simulation
   double loss_gain_sd = 0;           ///< standard deviation of (loss of the parameters alone - loss)
   std::optional<Closure> closure;
+  /// Log evidence without the prior.
+  double explained() const { return log_evidence - log_prior; }
 };
 
 /// One of the effects that are most probable if an effect is missing, whatever the verdict.
