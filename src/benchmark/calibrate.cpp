@@ -7,7 +7,7 @@
 #include <functional>
 
 #include "benchmark/records.hpp"
-#include "gap/diagnose/verdict.hpp"
+#include "gap/answer/verdict.hpp"
 #include "io/files.hpp"
 #include "io/program.hpp"
 #include "io/sha256.hpp"

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "blind/family.hpp"
-#include "gap/diagnose/next_experiment.hpp"
+#include "gap/next/next_experiment.hpp"
 
 namespace flappy::benchmark {
 

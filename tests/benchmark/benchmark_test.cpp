@@ -13,7 +13,7 @@
 #include "benchmark/records.hpp"
 #include "benchmark/score_bench.hpp"
 #include "full.hpp"
-#include "gap/diagnose/next_experiment.hpp"
+#include "gap/next/next_experiment.hpp"
 #include "gap/question/verdict_rule.hpp"
 #include "io/files.hpp"
 #include "io/sha256.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "gap/diagnose/inference.hpp"
+#include "gap/answer/inference.hpp"
 #include "gap/question/question.hpp"
 #include "gap/replay/reset_prediction.hpp"
 #include "io/config.hpp"

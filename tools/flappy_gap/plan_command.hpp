@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "gap/plan/plan.hpp"
+#include "gap/next/plan.hpp"
 
 namespace flappy::gap {
 

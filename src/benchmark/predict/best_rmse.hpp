@@ -1,7 +1,7 @@
 #pragma once
 
 #include "benchmark/predict/predict.hpp"
-#include "gap/diagnose/inference.hpp"
+#include "gap/answer/inference.hpp"
 
 namespace flappy::benchmark {
 

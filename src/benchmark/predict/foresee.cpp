@@ -1,6 +1,6 @@
 #include "benchmark/predict/foresee.hpp"
 
-#include "gap/plan/plan.hpp"
+#include "gap/next/plan.hpp"
 
 namespace flappy::benchmark {
 

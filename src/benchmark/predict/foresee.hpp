@@ -16,7 +16,7 @@ struct Foreseen {
   double probability = 0;  ///< that the diagnosis gives the effect
 };
 
-/// The plan (gap/plan/plan.hpp) of flights with the inputs and paths of the question's, on one thread. `magnitudes`:
+/// The plan (gap/next/plan.hpp) of flights with the inputs and paths of the question's, on one thread. `magnitudes`:
 /// [effect] over the typical magnitude. io::InputError for a file or log that is not accepted.
 std::vector<Foreseen> foresee(const Question& question, const std::map<std::string, double>& magnitudes);
 

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <iterator>
 
-#include "flappy/vehicle_file.hpp"
 #include "flightlog/check/data_faults.hpp"
-#include "gap/diagnose/closed_loop_prediction.hpp"
-#include "gap/diagnose/contrast_warnings.hpp"
-#include "gap/diagnose/corrected_vehicle.hpp"
-#include "gap/diagnose/result.hpp"
+#include "gap/answer/contrast_warnings.hpp"
+#include "gap/answer/corrected_vehicle.hpp"
+#include "gap/answer/result.hpp"
+#include "gap/next/closed_loop_prediction.hpp"
+#include "gap/replay/believed_vehicle.hpp"
 #include "gap/replay/prediction.hpp"
 #include "io/config.hpp"
 #include "model/effects/registry.hpp"
@@ -51,16 +51,6 @@ rollout::FlyConfig read_pilot(const std::string& manoeuvre) {
 
 }  // namespace
 
-model::Vehicle read_believed_vehicle(const std::string& file) {
-  model::Vehicle vehicle = model::read_any_vehicle(file);
-  if (vehicle.beat_averaged) return vehicle;
-  vehicle = model::read_vehicle_for_steps(file, kHoldStep_s);
-  if (!vehicle.effects.empty())
-    io::Config::load(file).root().fail("effects", "a diagnosis asks what is missing in the vehicle as it was believed",
-                                       "a vehicle without effects");
-  return vehicle;
-}
-
 std::vector<NamedFlights> sets_of(const std::vector<std::string>& reference) {
   std::vector<NamedFlights> sets;
   std::size_t now = 0;
@@ -78,14 +68,6 @@ std::vector<NamedFlights> sets_of(const std::vector<std::string>& reference) {
     sets[now].flights.push_back(named ? given.substr(equals + 1) : given);
   }
   return sets;
-}
-
-void check_effect(const std::string& option, const std::string& id, const model::Vehicle& vehicle) {
-  std::vector<std::string> known;
-  for (const model::CatalogueEffect& e : model::causes_of(vehicle)) known.emplace_back(e.info.id);
-  if (std::ranges::count(known, id) > 0) return;
-  throw io::InputError(option + " " + id + ": no such effect; accepted: those that flappy-gap effects lists" +
-                       io::did_you_mean(id, known));
 }
 
 DiagnosisRequest read_request(const DiagnosisSettings& settings) {

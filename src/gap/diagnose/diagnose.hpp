@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "gap/diagnose/inference.hpp"
-#include "gap/diagnose/next_experiment.hpp"
+#include "gap/answer/inference.hpp"
+#include "gap/next/next_experiment.hpp"
 #include "rollout/fly_config.hpp"
 
 namespace flappy::gap {
@@ -52,10 +52,6 @@ struct DiagnosisRequest {
   rollout::FlyConfig pilot;
   std::vector<Manoeuvre> manoeuvres;
 };
-/// io::InputError if the vehicle's catalogue lacks the effect that an option names.
-void check_effect(const std::string& option, const std::string& id, const model::Vehicle& vehicle);
-/// Reads a vehicle without effects. io::InputError for one with effects, or that cannot be flown.
-model::Vehicle read_believed_vehicle(const std::string& file);
 /// Reads and checks all files but the logs. io::InputError for a setting or file that is not accepted.
 DiagnosisRequest read_request(const DiagnosisSettings& settings);
 

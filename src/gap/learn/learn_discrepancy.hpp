@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "gap/evidence/robot_fit.hpp"
+#include "gap/fit/robot_fit.hpp"
 
 namespace flappy::gap {
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "gap/evidence/fit.hpp"
+#include "gap/fit/fit.hpp"
 
 namespace flappy::gap {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "gap/evidence/robot_fit.hpp"
+#include "gap/fit/robot_fit.hpp"
 #include "gap/question/verdict_rule.hpp"
 #include "gap/result/diagnosis.hpp"
 

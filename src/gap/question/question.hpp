@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "gap/evidence/fit_rules.hpp"
+#include "gap/fit/fit_rules.hpp"
 #include "gap/question/held_out.hpp"
 #include "gap/question/inferred.hpp"
 #include "gap/question/rival.hpp"

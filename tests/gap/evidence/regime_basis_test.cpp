@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "gap/evidence/synthetic_flight.hpp"
+#include "gap/synthetic_flight.hpp"
 
 namespace flappy::gap::regime_basis_test {
 namespace {

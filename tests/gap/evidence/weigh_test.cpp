@@ -1,7 +1,7 @@
 // The scales that make flights most probable.
 #include <gtest/gtest.h>
 
-#include "gap/evidence/synthetic_flight.hpp"
+#include "gap/synthetic_flight.hpp"
 
 namespace flappy::gap::weigh_test {
 namespace {

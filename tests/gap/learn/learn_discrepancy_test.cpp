@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "gap/evidence/synthetic_flight.hpp"
+#include "gap/synthetic_flight.hpp"
 
 namespace flappy::gap::learn_discrepancy_test {
 namespace {

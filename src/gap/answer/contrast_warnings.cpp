@@ -1,0 +1,80 @@
+#include "gap/answer/contrast_warnings.hpp"
+
+#include <algorithm>
+
+#include "io/files.hpp"
+#include "io/text.hpp"
+
+namespace flappy::gap {
+namespace {
+
+/// Shorter sessions tell less than the benchmark's shortest ones, which are 10 s long.
+constexpr double kShortest_s = 9;
+/// A regime counts as not covered if more than this share of the beats of the tests is beyond the references'.
+constexpr double kMaxBeyond = 0.2;
+
+double duration_s(const FlightList& flights) {
+  double sum = 0;
+  for (const auto& f : flights) sum += static_cast<double>(f->beats()) / f->beats_Hz();
+  return sum;
+}
+
+struct Range {
+  double low = 1e300, high = -1e300;
+};
+
+}  // namespace
+
+void check_same_streams(const std::vector<flightlog::FlightLog>& logs, const std::vector<std::string>& folders) {
+  for (std::size_t f = 1; f < logs.size(); ++f) {
+    const auto check = [&](const char* file, bool first, bool here) {
+      if (first != here)
+        throw io::InputError(folders[f] + ": has " + (here ? "" : "no ") + file + ", but " + folders[0] + " has " +
+                             (first ? "it" : "none") + "; accepted: flights with the same streams");
+    };
+    check("power.csv", logs[0].power.has_value(), logs[f].power.has_value());
+    check("wings.csv", logs[0].wings.has_value(), logs[f].wings.has_value());
+    check("imu.csv", logs[0].header.imu.rate_hz > 0, logs[f].header.imu.rate_hz > 0);
+  }
+}
+
+std::vector<std::string> contrast_warnings(const std::vector<flightlog::FlightHeader>& headers,
+                                           const Flights& flights) {
+  std::vector<std::string> lines;
+  const auto& [references, tests] = flights;
+  const auto differs = [&](const auto& same) {
+    return !std::ranges::all_of(headers, [&](const auto& h) { return same(h, headers.front()); });
+  };
+  if (differs([](const auto& a, const auto& b) { return a.vehicle_sha256 == b.vehicle_sha256; }))
+    lines.push_back(
+        "flights and reference name different vehicle files: if the robots are not the same, what differs "
+        "between them is taken for a change");
+  if (differs([](const auto& a, const auto& b) { return a.imu == b.imu && a.mocap == b.mocap; }))
+    lines.push_back("flights and reference declare different sensors: errors of the sensors do not cancel");
+  for (const auto& [name, list] : {std::pair("reference lasts", references), std::pair("flights last", tests)})
+    if (const double s = duration_s(list); s < kShortest_s)
+      lines.push_back(
+          io::format("the %s %.1f s: under 10 s, small changes stay hidden, and probabilities were not "
+                     "tested",
+                     name, s));
+  const std::vector<RegimeQuantity> quantities = tests.front()->regimes();
+  for (std::size_t q = 0; q < quantities.size(); ++q) {
+    if (quantities[q].name == "time" || quantities[q].name == "heading")
+      continue;  // a model's errors do not depend on it
+    Range range;
+    const auto values = [q](const auto& f) { return f->regimes()[q].values; };
+    for (const auto& f : references)
+      for (const double v : values(f)) range.low = std::min(range.low, v), range.high = std::max(range.high, v);
+    double beyond = 0, all = 0;
+    for (const auto& f : tests)
+      for (const double v : values(f)) beyond += v < range.low || v > range.high ? 1 : 0, all += 1;
+    if (beyond > kMaxBeyond * all)
+      lines.push_back(io::format(
+          "%.0f %% of the flights have a %s that the reference never has (%.3g to %.3g %s): "
+          "errors of the model do not cancel there",
+          100 * beyond / all, quantities[q].name.c_str(), range.low, range.high, quantities[q].unit.c_str()));
+  }
+  return lines;
+}
+
+}  // namespace flappy::gap

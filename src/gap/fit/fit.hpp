@@ -1,0 +1,184 @@
+// Finds the most probable unknowns of a hypothesis by Gauss-Newton on whole flights. Derivatives are differences
+// between vehicles that are simulated together, as lanes of a batch.
+#pragma once
+
+#include <map>
+#include <memory>
+
+#include "gap/evidence/evidence.hpp"
+#include "gap/fit/fit_rules.hpp"
+#include "gap/fit/hypothesis.hpp"
+
+namespace flappy::gap {
+
+/// Orthonormal directions through the coordinates of a hypothesis.
+struct Directions {
+  Eigen::MatrixXd axes;   ///< [coordinate][direction]
+  Eigen::VectorXd reach;  ///< [direction] half the step of the difference
+};
+
+/// A hypothesis linearised at given coordinates, and its posterior there.
+struct Fit {
+  Eigen::VectorXd at;
+  Directions directions;
+  Residuals residual;               ///< empty: not simulated, or the simulation diverged
+  SufficientStatistics statistics;  ///< statistics of the residual, averaged over points around `at`
+  /// [direction] change of the prediction per unit along it; empty if the simulation diverges there.
+  std::vector<BasisCoefficients> columns;
+  double law_factor = 1;  ///< by how much the laws of its effects may deviate from the catalogue's (Fitter::law_sd)
+  Posterior posterior;    ///< along the directions, relative to `at`
+  bool flown() const { return !residual.empty(); }
+  /// Posterior mean and covariance of the coordinates.
+  Eigen::VectorXd mean() const;
+  Eigen::MatrixXd covariance() const;
+};
+
+/// Background magnitude of an effect: a regressor with a standard normal coefficient.
+struct Background {
+  /// An unknown of an effect ("": of those that all hypotheses share), by index, and by how much the column moves its
+  /// coordinate.
+  struct Move {
+    std::string effect;
+    Eigen::Index unknown;
+    double by;
+  };
+  std::string effect;
+  BasisCoefficients column;
+  std::vector<Move> moves = {};  ///< empty: the column is no vehicle's, as that of a shape
+};
+
+/// Fits hypotheses, given evidence, nuisance regressors and scales. Immutable: with_... return a changed copy.
+class Fitter {
+ public:
+  /// Columns of magnitudes by [effect, name].
+  using LinearMagnitudes = std::map<std::pair<std::string, std::string>, BasisCoefficients>;
+
+  /// Without nuisance regressors; scales are 1. Keeps references to `rules` and `flights`.
+  Fitter(const FitRules& rules, const Flights& flights, std::shared_ptr<const Evidence> evidence, int threads);
+  Fitter with_evidence(std::shared_ptr<const Evidence> evidence) const;
+  /// Fits `nuisances`, then background magnitudes, jointly with every hypothesis, even those of effects that it names.
+  /// Leaves out regressors on which the flights have no information, given `fit`.
+  Fitter with_nuisances(const Regressors& nuisances, const std::vector<Background>& background, const Fit& fit) const;
+  /// Columns of magnitudes that act linearly and need not be simulated.
+  Fitter with_linear_magnitudes(LinearMagnitudes magnitudes) const;
+  Fitter with_scales(Scales scales) const;
+  Fitter without_background() const;
+
+  const FitRules& rules() const { return *rules_; }
+  const Flights& flights() const { return *flights_; }
+  int threads() const { return threads_; }
+  const Evidence& evidence() const { return *evidence_; }
+  const Scales& scales() const { return scales_; }
+  /// Names of Scales::effects.
+  const std::vector<std::string>& effects() const { return effects_; }
+  /// Index of an effect in Scales::effects; -1: none.
+  int place_of(const std::string& effect) const;
+  std::vector<char> all_flights() const { return std::vector<char>(flights_->size(), 1); }
+
+  struct NuisanceMean {
+    std::size_t place;  ///< index in `nuisances` of with_nuisances; then in `background`
+    double mean;        ///< posterior mean of the coefficient of the column given to with_nuisances
+  };
+  /// Posterior of a nuisance regressor, given a fit.
+  struct NuisanceEstimate : NuisanceMean {
+    double sd;
+  };
+  /// Posteriors of the errors of sensors and the minor draws that were not left out; none of background magnitudes.
+  std::vector<NuisanceEstimate> nuisances(const Fit& fit) const;
+
+  /// The columns of a fit, without empty ones.
+  static Regressors own_regressors(const Fit& fit);
+  /// The part of a posterior of own_regressors() and others that is of the fit's directions; those without a column keep
+  /// their prior.
+  static Posterior of_directions(const Fit& fit, const Posterior& posterior);
+  /// The columns of a fit, then nuisances and background magnitudes with the robot's scales. A named effect keeps its
+  /// background, as the model may have errors along it.
+  Regressors regressors(const Fit& fit) const;
+  /// As regressors(), with scales of 1.
+  Regressors unscaled_regressors(const Fit& fit) const;
+
+  /// Posterior along all directions of a fit, from some flights alone. `use`: [flight] whether it counts.
+  Posterior posterior(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
+  /// The most probable coordinates from some flights alone, and the part of the residual that nuisances then explain.
+  struct JointFit {
+    Eigen::VectorXd at;
+    BasisCoefficients nuisances;
+    std::vector<NuisanceMean> means;  ///< left out: regressors that the flights have no information on
+  };
+  JointFit joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
+  /// The part of a fit's residual that everything explains by linear columns, learnt from some flights alone: in a
+  /// contrast, changes of the parameters, and what the model gets wrong in both sessions or sessions differ by. Effects
+  /// follow the laws of the catalogue.
+  BasisCoefficients explained(const Fit& fit, const std::vector<char>& use) const;
+  /// Standard deviation, [group][basis], of the deviations of effects from the catalogue's laws.
+  BasisCoefficients law_sd(const Hypothesis& hypothesis, const Fit& fit) const {
+    return law_sd(hypothesis, fit, fit.law_factor);
+  }
+  BasisCoefficients law_sd(const Hypothesis& hypothesis, const Fit& fit, double law_factor) const;
+  /// The same for one effect. `change`: [group][basis] what it adds to the prediction.
+  BasisCoefficients law_sd_of(const std::string& effect, const BasisCoefficients& change, double law_factor) const {
+    return rules_->law_sd(*evidence_, effect, change, law_factor);
+  }
+  /// Whether the law of an effect may deviate at all.
+  bool law_may_deviate(const Hypothesis& hypothesis, const Fit& fit) const;
+  /// That of the model, with the fitter's scales, and of the laws of the effects.
+  BasisCoefficients discrepancy_sd(const Hypothesis& hypothesis, const Fit& fit) const;
+
+  /// A fit without a posterior. `known`: columns of the first directions, which are not simulated again.
+  Fit linearise(const Hypothesis& hypothesis, const Eigen::VectorXd& at, Directions directions,
+                const std::vector<BasisCoefficients>& known = {}) const;
+  static Directions axes(const Hypothesis& hypothesis);
+  /// At most `max_iterations` iterations from `start` on. Not flown() if the simulation diverges at the start.
+  Fit fit(const Hypothesis& hypothesis, Eigen::VectorXd start, int max_iterations) const;
+  /// As fit(), with the directions and columns of another fit for the parameters.
+  Fit fit_given(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters,
+                int max_iterations) const;
+  /// Fits the effects alone, so that all effects are compared with the same columns of the parameters.
+  Fit fit_effects(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters) const;
+  /// Continues another fit, along its directions.
+  Fit refit(const Hypothesis& hypothesis, const Fit& before, int max_iterations) const;
+  /// A linear fit without a residual, around the magnitudes of the vehicle file. `effects`: columns of the unknowns of
+  /// the effects; an unknown with an empty column is not fitted.
+  Fit fit_linear(const Hypothesis& hypothesis, const Fit& parameters,
+                 const std::vector<BasisCoefficients>& effects) const;
+
+ private:
+  std::map<std::string, BasisCoefficients> changes(const Hypothesis& hypothesis, const Fit& fit) const;
+  /// Null: the direction is not a linear magnitude.
+  const BasisCoefficients* linear_column(const Hypothesis& hypothesis, Eigen::Index direction) const;
+  static Directions joint_directions(const Hypothesis& hypothesis, const Fit& parameters);
+  static std::vector<BasisCoefficients> shared_columns(const Hypothesis& hypothesis, const Fit& parameters);
+  static Directions principal(const Hypothesis& hypothesis, const Fit& fit);
+  Fit improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, const Fit* parameters,
+              bool columns_are_here) const;
+  std::vector<Eigen::VectorXd> around(const Hypothesis& hypothesis, const Eigen::VectorXd& at,
+                                      const Directions& directions, const std::vector<BasisCoefficients>& known,
+                                      std::vector<VehicleHypothesis>& vehicles) const;
+  void average(const std::vector<Residuals>& rows, const std::vector<Eigen::VectorXd>& shifts, Fit& fit) const;
+  Reduced reduce(const Fit& fit, const Regressors& regressors) const;
+  Posterior solve(const Fit& fit, const Regressors& regressors, Reduced reduced, double damping = 0) const;
+  double cost(const Regressors& nuisances, const Eigen::MatrixXd& sums, const SufficientStatistics& residual,
+              const Eigen::VectorXd& at) const;
+
+  struct Nuisance {
+    BasisCoefficients column;
+    double prior_mean;
+    int effect;  ///< in effects_; -1: none
+    ScalePrior prior;
+    std::size_t place;  ///< as NuisanceMean::place
+    double scale = 1;
+    BasisCoefficients scaled = {};
+  };
+  void add_nuisances(bool scaled, Regressors& to) const;
+
+  const FitRules* rules_;
+  const Flights* flights_;
+  std::shared_ptr<const Evidence> evidence_;
+  int threads_;
+  Scales scales_;
+  LinearMagnitudes linear_;
+  std::vector<Nuisance> nuisances_;
+  std::vector<std::string> effects_;
+};
+
+}  // namespace flappy::gap

@@ -1,0 +1,60 @@
+// The next flight: the manoeuvre that best tells apart the rivals, the hypotheses that are still probable.
+//
+// The most probable vehicle flies each manoeuvre in our simulator; each rival predicts the log. With Delta the
+// difference of the predictions of rivals A and B as fitted so far, the expected evidence for A over B, if A is true,
+// is
+//   nats(A, B) = 1/2 Delta^T K^-1 Delta      K: covariance of noise, model discrepancy (evidence.hpp), deviations of
+//                                            the laws of their effects, and what is still uncertain of B
+// So B may adapt to the new flight as far as the flights so far allow. The correlation of its errors in old and new
+// flights is neglected: a lower bound. For an effect left open, the magnitude is the root mean square of its posterior.
+// With N_A the nats of A over the most probable rival (for that one: over the next) and D(N) the tempered factor on a
+// rival N nats behind (verdict.hpp), the probability p of a true A becomes p / (p + (1 - p) D(N_A)). The expected
+// information,
+//   I = - sum over A of p_A log(p_A + (1 - p_A) D(N_A)),
+// is at most the entropy now: separating many rivals a little beats separating one well.
+//
+// In a contrast the new flight is a further test flight. All rivals have the parameters of the reference, so they
+// differ by their effects alone. The references stay among the flights: in the regimes that they visit, the model
+// discrepancy cancels, and K has the differences between sessions.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "gap/answer/inference.hpp"
+#include "rollout/fly_config.hpp"
+
+namespace flappy::gap {
+
+/// A safe flight, or an intervention: a flight before which something is done to the robot (`changes` of the
+/// configuration). Its log begins at settle_s of the configuration.
+struct Manoeuvre {
+  std::string name;
+  rollout::FlyConfig config;
+  std::string cost;  ///< of an intervention, in words
+};
+
+/// File of interventions in a folder of manoeuvres.
+inline constexpr const char* kInterventions = "interventions.toml";
+
+/// The configurations (*.toml) of a folder by name, then its interventions. io::InputError if there is none or a faulty
+/// one.
+std::vector<Manoeuvre> read_manoeuvres(const std::filesystem::path& folder,
+                                       const std::vector<std::string>& overrides = {});
+
+struct NextOptions {
+  int threads = 0;
+  double least_probability = 0.01;  ///< least probability of a rival
+  FlightList references;            ///< reference flights of a contrast; empty: no contrast
+  ModelDiscrepancy discrepancy;
+  VerdictRule rule;
+};
+
+/// The most informative manoeuvre first; empty with fewer than two rivals. Hypotheses with an unknown cause or a
+/// remainder are no rivals: no vehicle simulates them. Leaves out manoeuvres in which one of the four most probable
+/// rivals crashes.
+std::vector<NextExperiment> rank_experiments(const Inference& inference, const sim::Randomisation& uncertain,
+                                             const std::vector<Manoeuvre>& manoeuvres, const NextOptions& options);
+
+}  // namespace flappy::gap

@@ -1,0 +1,40 @@
+// Which effects planned flights would tell apart. If the robot has effect T, its rows change by c. A hypothesis R, with
+// the magnitudes of its effect, parameters, errors of sensors, model discrepancy and noise integrated out
+// (gap/evidence/evidence.hpp), gains over the parameters alone
+//   G_R(c) = log p(c | R) - log p(c | parameters)
+// as screening finds it (gap/fit/screening.hpp). The expected evidence for T over R is
+//   nats(T, R) = G_T(c) - G_R(c).
+// The discrepancy includes how far the robot's law of T deviates from the catalogue's. What noise adds on average, at
+// most half a nat for each magnitude, is left out.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gap/fit/robot_fit.hpp"
+#include "gap/question/verdict_rule.hpp"
+
+namespace flappy::gap {
+
+struct Separation {
+  std::vector<std::string> effects;  ///< that the robot may have
+  std::vector<std::string> rivals;   ///< all effects that change a row, then "parameters": none
+  Eigen::MatrixXd nats;              ///< [effect][rival] expected evidence for the effect over the rival
+  /// [effect] Probability that a diagnosis gives the effect, if the robot has it.
+  std::vector<double> probability;
+  /// [effect] Factor on the magnitude from which on that probability is kSure; none: not up to kMaxFactor and
+  /// largest_factor().
+  std::vector<std::optional<double>> sure_from;
+};
+inline constexpr double kSure = 0.9, kMaxFactor = 16;
+
+/// The largest factor on the typical magnitudes of an effect that a vehicle file accepts.
+double largest_factor(const model::CatalogueEffect& effect);
+
+/// `robot`: of RobotFit::planned. `asked`: [effect] magnitude over the typical one. Leaves out effects that change no
+/// row, or whose simulation diverges. `sure`: also find sure_from.
+Separation separation_of(const Flights& flights, const RobotFit& robot, const std::map<std::string, double>& asked,
+                         const VerdictRule& rule, int threads, bool sure = true);
+
+}  // namespace flappy::gap

@@ -1,0 +1,225 @@
+#include "gap/fit/robot_fit.hpp"
+
+#include <gtest/gtest.h>
+
+#include "gap/synthetic_flight.hpp"
+
+namespace flappy::gap::robot_fit_test {
+namespace {
+
+class RobotFits : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    priors_ = new auto(synthetic_priors());
+    made_ = new auto(synthetic_flights(2, synthetic_law));
+    const Hypothesis wind(*priors_, {"wind"});
+    Eigen::VectorXd at = wind.start();
+    at[0] = -1.2;
+    at[2] = 0.1;
+    VehicleHypothesis truth = wind.vehicle(at);
+    truth.vehicle.torso.com_m.x += 0.0015;
+    for (const auto& f : *made_) f->fly(truth);
+    flights_ = new Flights(as_flights(*made_));
+    robot_ = new RobotFit(question_of(*flights_), *flights_, *priors_, read_model_discrepancy(), {"tether"}, 2);
+  }
+  static void TearDownTestSuite() {
+    delete robot_;
+    delete flights_;
+    delete made_;
+    delete priors_;
+  }
+  static inline const sim::Randomisation* priors_ = nullptr;
+  static inline std::vector<std::shared_ptr<SyntheticFlight>>* made_ = nullptr;
+  static inline Flights* flights_ = nullptr;
+  static inline RobotFit* robot_ = nullptr;
+};
+
+TEST_F(RobotFits, FitsParametersAndMinorDraws) {
+  const Fit& fit = robot_->parameters();
+  EXPECT_NEAR(fit.mean()[0], -1.2, 4 * std::sqrt(fit.covariance()(0, 0)));
+  // 1.5 mm, of a prior of 1 mm
+  EXPECT_NEAR(robot_->uncertain().minors().at(0), 1.5, 0.5);
+  EXPECT_FALSE(robot_->nominal().residual.empty());
+  double nominal = 0, refit = 0;
+  for (std::size_t f = 0; f < 2; ++f)
+    for (std::size_t i = 0; i < fit.residual[f].size(); ++i)
+      nominal += std::pow(robot_->nominal().residual[f][i], 2), refit += std::pow(fit.residual[f][i], 2);
+  EXPECT_LT(refit, nominal);
+}
+
+// A joint fit also moves the minor draws, so a corrected vehicle needs both.
+TEST_F(RobotFits, GivesMinorDrawsOfAJointFit) {
+  const RobotFit robot = RobotFit::planned(question_of(*flights_), *flights_, *priors_, read_model_discrepancy(), 2);
+  const Hypothesis& h = robot.no_effects();
+  const Fitter without = robot.fitter().without_background();
+  const Fitter::JointFit joint =
+      without.joint_fit(h, without.linearise(h, h.start(), Fitter::axes(h)), without.all_flights());
+  EXPECT_EQ(robot.uncertain().minors().at(0), 0);
+  EXPECT_NEAR(robot.minors_given(joint).at(0), 1.5, 0.5);
+}
+
+TEST_F(RobotFits, KnowsWhatMagnitudesChange) {
+  const std::vector<MagnitudeColumn>& all = robot_->magnitudes();
+  const auto wind = std::ranges::find(all, "wind", &MagnitudeColumn::effect);
+  ASSERT_NE(wind, all.end());
+  // 5 per m/s, and the coordinate's unit
+  const double expected = 5 * unknowns_of("wind")[0].scale;
+  const RegimeBasis& basis = robot_->evidence().basis();
+  const double sd = std::sqrt(((*made_)[0]->velocity.squaredNorm() + (*made_)[1]->velocity.squaredNorm()) / 240 -
+                              std::pow(((*made_)[0]->velocity.sum() + (*made_)[1]->velocity.sum()) / 240, 2));
+  ASSERT_EQ(basis.name(2), "velocity_x");
+  EXPECT_NEAR(wind->change(group_index(kForceX, 0), 2), expected * sd, 1e-3);
+  EXPECT_EQ(wind->near.size(), 2u);
+  EXPECT_EQ(std::ranges::find(all, "tether", &MagnitudeColumn::effect), all.end()) << "withheld";
+  const auto ground = std::ranges::find(all, "ground_effect", &MagnitudeColumn::effect);
+  EXPECT_EQ(ground->near.size(), 1u);
+  EXPECT_FALSE(ground->large.empty());
+}
+
+// A vehicle takes background magnitudes by their moves, so each column is what its moves change.
+TEST_F(RobotFits, SaysHowBackgroundsMoveUnknowns) {
+  int apart = 0;
+  for (const Background& b : robot_->background(read_model_discrepancy(), false)) {
+    ASSERT_FALSE(b.moves.empty()) << b.effect;
+    BasisCoefficients sum = BasisCoefficients::Zero(b.column.rows(), b.column.cols()), other = sum;
+    for (const Background::Move& m : b.moves)
+      for (const MagnitudeColumn& c : robot_->magnitudes())
+        if (c.effect == m.effect && c.unknown == m.unknown) sum += m.by * c.near.front(), other += m.by * c.near.back();
+    EXPECT_LT(std::min((b.column - sum).norm(), (b.column - other).norm()), 1e-12 * (1 + b.column.norm())) << b.effect;
+    apart += b.moves.size() == 2 && b.moves[0].by == -b.moves[1].by ? 1 : 0;
+  }
+  EXPECT_GT(apart, 0) << "the wings of one effect";
+  for (const Background& b : robot_->background(read_model_discrepancy(), true))
+    if (b.moves.empty()) return;
+  FAIL() << "a shape is no coordinate by itself";
+}
+
+TEST_F(RobotFits, WeighsHypothesesWithScalesOfTheirOwn) {
+  const Hypothesis wind(robot_->uncertain(), {"wind"});
+  const Fit fit = robot_->fitter().fit_effects(wind, wind.start(), robot_->parameters());
+  const Scales& scales = robot_->fitter().scales();
+  const double with = robot_->weigh(wind, fit, scales).posterior.log_evidence,
+               without = robot_->weigh(robot_->no_effects(), robot_->parameters(), scales).posterior.log_evidence;
+  EXPECT_GT(with, without);
+  // with the wind in force the robot has less of its background
+  const auto place = static_cast<std::size_t>(robot_->fitter().place_of("wind"));
+  const Scales given = robot_->find_scales(wind, fit, scales);
+  ASSERT_LT(place, given.effects.size());
+  EXPECT_LT(given.effects[place], scales.effects[place]);
+  // an unknown cause pays its penalty
+  const ScaledEvidence unknown = robot_->weigh(robot_->no_effects(), robot_->parameters(), scales, 10);
+  EXPECT_GE(unknown.posterior.log_evidence, without - 1e-6);
+}
+
+// The same by a search for the scale t that makes magnitudes most probable as background: -log N(0, (t sd)^2), and the cost of t.
+TEST_F(RobotFits, SaysHowMuchMoreProbableMagnitudesAreAsAnEffect) {
+  const ModelDiscrepancy discrepancy = read_model_discrepancy();
+  const auto background = [&](const std::string& effect, const Eigen::VectorXd& magnitudes) {
+    double least = 1e300;
+    for (double log_t = -3; log_t < 6; log_t += 1e-3) {
+      const double sd = std::exp(log_t) * discrepancy.background_sd(effect);
+      least = std::min(least, 0.5 * magnitudes.squaredNorm() / (sd * sd) +
+                                  static_cast<double>(magnitudes.size()) * std::log(sd) +
+                                  Evidence::scale_cost_nats(std::exp(log_t), discrepancy.scale_prior(effect), {}));
+    }
+    return least;
+  };
+  const Eigen::Vector3d offset(0.4, -0.1, 1.2);
+  EXPECT_NEAR(robot_->beyond_background("com_offset", offset, {}),
+              background("com_offset", offset) - 0.5 * offset.squaredNorm(), 1e-5);
+  const Eigen::Vector2d one(0.5, 0), both(0.5, 0.5);
+  const auto sides = [&](double apart, double alike) {
+    return background("wing_damage", Eigen::VectorXd::Constant(1, apart)) +
+           background("wing_damage_of_both", Eigen::VectorXd::Constant(1, alike));
+  };
+  EXPECT_NEAR(robot_->beyond_background("wing_damage", one, {}), sides(0.5 / std::sqrt(2), 0.5 / std::sqrt(2)) - 0.125,
+              1e-5);
+  EXPECT_NEAR(robot_->beyond_background("wing_damage", both, {}), sides(0, std::sqrt(0.5)) - 0.25, 1e-5);
+}
+
+TEST_F(RobotFits, ReportsTheLagAndErrorsOfSensors) {
+  const std::vector<SensorFinding> found =
+      robot_->sensors(robot_->fitter(), robot_->no_effects(), robot_->parameters());
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found.front().name, "imu.latency_s");
+  EXPECT_NEAR(found.front().sd, found.front().prior_sd, 1e-9) << "these flights say nothing of it";
+}
+
+TEST(Residuals, OfReferencesAreWithoutEffects) {
+  const sim::Randomisation priors = synthetic_priors();
+  const auto made = synthetic_flights(3, synthetic_law);
+  const Flights flights = as_flights(made, 2);
+  const Hypothesis wind(priors, {"wind"});
+  Eigen::VectorXd at = wind.start(), windy = at;
+  windy[2] = 1;
+  const std::vector<Residuals> r = residuals(flights, {wind.vehicle(at), wind.vehicle(windy)}, 1);
+  EXPECT_EQ(r[0][0], r[1][0]);
+  EXPECT_EQ(r[0][1], r[1][1]);
+  EXPECT_NE(r[0][2], r[1][2]);
+  EXPECT_EQ(made[0]->predicted, 1u) << "both vehicles share one prediction";
+  EXPECT_EQ(residuals(flights, {wind.vehicle(windy)}, 1)[0], r[1]);
+  EXPECT_EQ(made[0]->predicted, 1u) << "which is kept";
+  EXPECT_EQ(made[2]->predicted, 3u);
+}
+
+// The model is off by something that follows the velocity as wind does, in all flights. Wind appears in the tests alone.
+TEST(Contrast, TellsWhatAppearedFromWhatWasAlwaysOff) {
+  const sim::Randomisation priors = synthetic_priors();
+  const Hypothesis none(priors, {}), wind(priors, {"wind"});
+  const auto flown = [&](double appears) {
+    auto made = synthetic_flights(4, synthetic_law);
+    for (std::size_t f = 0; f < 4; ++f) {
+      Eigen::VectorXd at = wind.start();
+      at[0] = 0.7;
+      at[2] = f < 2 ? 0 : appears;
+      made[f]->fly(wind.vehicle(at));
+      made[f]->add_measured(kForceX, 0, 0.3 * made[f]->velocity);
+    }
+    return made;
+  };
+  const auto gain = [&](double appears) {
+    const auto made = flown(appears);
+    const Flights flights = as_flights(made, 2), references{flights.references, {}};
+    ModelDiscrepancy discrepancy = read_model_discrepancy();
+    discrepancy.session = read_session_variation();
+    const RobotFit robot(question_of(flights),
+                         RobotFit::of_references(question_of(references), references, priors, discrepancy, {}, 2),
+                         flights);
+    const Hypothesis h(robot.uncertain(), {"wind"});
+    const Fit fit = robot.fitter().fit_effects(h, h.start(), robot.parameters());
+    if (appears != 0) EXPECT_NEAR(fit.mean()[2], appears, 4 * std::sqrt(fit.covariance()(2, 2)));
+    const Scales& scales = robot.fitter().scales();
+    return robot.weigh(h, fit, scales).posterior.log_evidence -
+           robot.weigh(robot.no_effects(), robot.parameters(), scales).posterior.log_evidence;
+  };
+  EXPECT_GT(gain(0.3), 10);
+  EXPECT_LT(gain(0), 1);
+}
+
+// Something acts along the velocity in the tests alone. Where references never moved, it may have acted before.
+TEST(Contrast, CallsUnknownOnlyWhatReferencesWouldHaveShown) {
+  const sim::Randomisation priors = synthetic_priors();
+  const auto freed = [&](double calm) {
+    auto made = synthetic_flights(4, synthetic_law);
+    for (std::size_t f = 0; f < 4; ++f) {
+      if (f < 2) made[f]->velocity *= calm;
+      made[f]->fly(Hypothesis(priors, {}).vehicle(Hypothesis(priors, {}).start()));
+      if (f >= 2) made[f]->add_measured(kTorqueY, 1, made[f]->velocity);
+    }
+    const Flights flights = as_flights(made, 2), references{flights.references, {}};
+    ModelDiscrepancy discrepancy = read_model_discrepancy();
+    discrepancy.session = read_session_variation();
+    const RobotFit robot(question_of(flights),
+                         RobotFit::of_references(question_of(references), references, priors, discrepancy, {}, 2),
+                         flights);
+    EXPECT_EQ(robot.fitter().place_of(std::string(kModelOf) + "body_drag") >= 0, calm < 1)
+        << "errors of the model do not cancel";
+    const ScaledEvidence w = robot.weigh(robot.no_effects(), robot.parameters(), robot.fitter().scales(), 10);
+    return std::ranges::count(w.scales.free, 1);
+  };
+  EXPECT_GE(freed(1), 1);
+  EXPECT_EQ(freed(0.05), 0);
+}
+
+}  // namespace
+}  // namespace flappy::gap::robot_fit_test
