@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "flightlog/smoother.hpp"
-#include "flightlog/world.hpp"
+#include "flightlog/log_world.hpp"
 #include "identify/force_map.hpp"
 #include "io/csv.hpp"
 #include "io/statistics.hpp"

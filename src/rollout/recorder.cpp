@@ -5,7 +5,7 @@
 #include <numbers>
 #include <utility>
 
-#include "flightlog/world.hpp"
+#include "flightlog/log_world.hpp"
 #include "io/csv.hpp"
 #include "model/derive.hpp"
 #include "model/jointed.hpp"

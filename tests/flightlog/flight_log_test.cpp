@@ -12,7 +12,7 @@
 
 #include "flightlog/readings.hpp"
 #include "flightlog/some_log.hpp"
-#include "flightlog/world.hpp"
+#include "flightlog/log_world.hpp"
 #include "io/files.hpp"
 
 namespace flappy::flightlog {

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks that families of blind robots share nothing: families.py ROOT, or --self-test.
 
-A file of src/blind/b or src/blind/c (family a flies with what we do, include_graph.py) may include its own family, blind/family.hpp, flightlog/flight_log.hpp, io, Eigen and the
+A file of src/lab/blind/b or src/lab/blind/c (family a flies with what we do, include_graph.py) may include its own family, lab/blind/family.hpp, flightlog/flight_log.hpp, io, Eigen and the
 standard library.
 """
 import re
@@ -11,7 +11,7 @@ from pathlib import Path
 from self_test import misjudged, run
 
 FAMILIES = ("b", "c")
-SHARED = {"blind/family.hpp", "flightlog/flight_log.hpp"}
+SHARED = {"lab/blind/family.hpp", "flightlog/flight_log.hpp"}
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(["<])([^">]+)[">]', re.MULTILINE)
 ANY_INCLUDE = re.compile(r"^[ \t]*(?:#|%:|\?\?=)[ \t]*(?:include\w*|import)\b.*$|^[ \t]*(?:export[ \t]+)?import[ \t].*$|\b__has_include\b.*$", re.MULTILINE)
 STANDARD = re.compile(r"[a-z][a-z0-9_]*")
@@ -24,7 +24,7 @@ def may_include(family, bracket, name):
     if bracket == "<":
         engine = family == "c" and name == "mujoco/mujoco.h"  # what family C stands on
         return bool(STANDARD.fullmatch(name)) or name.startswith("Eigen/") or engine
-    return name in SHARED or name.startswith(f"blind/{family}/") or name.startswith("io/")
+    return name in SHARED or name.startswith(f"lab/blind/{family}/") or name.startswith("io/")
 
 
 def faults(root):
@@ -32,7 +32,7 @@ def faults(root):
     found = []
     count = 0
     for family in FAMILIES:
-        for path in sorted((root / "src" / "blind" / family).rglob("*")):
+        for path in sorted((root / "src" / "lab/blind" / family).rglob("*")):
             if not path.is_file():
                 continue
             count += 1
@@ -46,31 +46,31 @@ def faults(root):
                 if plain and may_include(family, plain[1], plain[2]):
                     continue
                 line = text.count("\n", 0, match.start()) + 1
-                found.append(f"{where}:{line}: {plain[2] if plain else match[0].strip()}: family {family} may include blind/{family}/*, "
+                found.append(f"{where}:{line}: {plain[2] if plain else match[0].strip()}: family {family} may include lab/blind/{family}/*, "
                              f"{', '.join(sorted(SHARED))}, io/*, Eigen and the standard library")
-    return found if count else ["no file of a family below src/blind"]
+    return found if count else ["no file of a family below src/lab/blind"]
 
 
 def self_test():
     """Each tree has one file that is wrong, or none."""
-    good = {"src/blind/b/robot.hpp": "#pragma once\n#include <Eigen/Dense>\n#include <vector>\n#include \"blind/family.hpp\"\n",
-            "src/blind/b/robot.cpp": "#include \"blind/b/robot.hpp\"\n#include \"io/config.hpp\"\n#include \"flightlog/flight_log.hpp\"\n",
-            "src/blind/a/air.cpp": "#include \"model/air.hpp\"\n"}
+    good = {"src/lab/blind/b/robot.hpp": "#pragma once\n#include <Eigen/Dense>\n#include <vector>\n#include \"lab/blind/family.hpp\"\n",
+            "src/lab/blind/b/robot.cpp": "#include \"lab/blind/b/robot.hpp\"\n#include \"io/config.hpp\"\n#include \"flightlog/flight_log.hpp\"\n",
+            "src/lab/blind/a/air.cpp": "#include \"model/air.hpp\"\n"}
     cases = [
         ({}, None),
-        ({"src/blind/c/robot.cpp": "#include \"blind/c/robot.hpp\"\n"}, None),
-        ({"src/blind/b/x.cpp": "\n#include \"model/wing_beat.hpp\"\n"}, "src/blind/b/x.cpp:2: model/wing_beat.hpp: family b"),
-        ({"src/blind/b/x.cpp": "#include \"blind/a/robot.hpp\"\n"}, "blind/a/robot.hpp"),
-        ({"src/blind/b/x.cpp": "#include <flappy/vehicle.hpp>\n"}, "flappy/vehicle.hpp"),
-        ({"src/blind/b/x.cpp": "#include \"blind/c/robot.hpp\"\n"}, "blind/c/robot.hpp"),
-        ({"src/blind/c/x.cpp": "#include \"blind/b/robot.hpp\"\n"}, "family c may include blind/c/*"),
-        ({"src/blind/b/x.cpp": "#include \"blind/b/../a/air.hpp\"\n"}, "blind/b/../a/air.hpp"),
-        ({"src/blind/b/x.cpp": "#  include\t\"flight/pid.hpp\"\n"}, "flight/pid.hpp"),
-        ({"src/blind/b/x.cpp": "#include \"flightlog/motion.hpp\"\n"}, "flightlog/motion.hpp"),
-        ({"src/blind/b/x.cpp": "#include FLAPPY_HEADER\n"}, "#include FLAPPY_HEADER"),
-        ({"src/blind/b/x.cpp": "import model;\n"}, "import model;"),
-        ({"src/blind/b/x.inc": ""}, "made of .hpp and .cpp"),
-        ({"src/blind/b/deep/x.hpp": "#include <Random123/philox.h>\n"}, "Random123/philox.h"),
+        ({"src/lab/blind/c/robot.cpp": "#include \"lab/blind/c/robot.hpp\"\n"}, None),
+        ({"src/lab/blind/b/x.cpp": "\n#include \"model/wing_beat.hpp\"\n"}, "src/lab/blind/b/x.cpp:2: model/wing_beat.hpp: family b"),
+        ({"src/lab/blind/b/x.cpp": "#include \"lab/blind/a/robot.hpp\"\n"}, "lab/blind/a/robot.hpp"),
+        ({"src/lab/blind/b/x.cpp": "#include <flappy/vehicle.hpp>\n"}, "flappy/vehicle.hpp"),
+        ({"src/lab/blind/b/x.cpp": "#include \"lab/blind/c/robot.hpp\"\n"}, "lab/blind/c/robot.hpp"),
+        ({"src/lab/blind/c/x.cpp": "#include \"lab/blind/b/robot.hpp\"\n"}, "family c may include lab/blind/c/*"),
+        ({"src/lab/blind/b/x.cpp": "#include \"lab/blind/b/../a/air.hpp\"\n"}, "lab/blind/b/../a/air.hpp"),
+        ({"src/lab/blind/b/x.cpp": "#  include\t\"flight/pid.hpp\"\n"}, "flight/pid.hpp"),
+        ({"src/lab/blind/b/x.cpp": "#include \"flightlog/motion.hpp\"\n"}, "flightlog/motion.hpp"),
+        ({"src/lab/blind/b/x.cpp": "#include FLAPPY_HEADER\n"}, "#include FLAPPY_HEADER"),
+        ({"src/lab/blind/b/x.cpp": "import model;\n"}, "import model;"),
+        ({"src/lab/blind/b/x.inc": ""}, "made of .hpp and .cpp"),
+        ({"src/lab/blind/b/deep/x.hpp": "#include <Random123/philox.h>\n"}, "Random123/philox.h"),
     ]
     if wrong := misjudged(faults, good, cases):
         return wrong

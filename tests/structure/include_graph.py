@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks which room includes which: include_graph.py ROOT, or --self-test.
+"""Checks which room includes which, and that names of files are unique: include_graph.py ROOT, or --self-test.
 
 A quoted or angled include that begins with a room or with flappy/ is one arrow of the graph. Files that a file of
 another room brings in are its own affair.
@@ -49,27 +49,29 @@ ROOMS = {
     "server/commands": {"io", "server", "server/dds", "server/jobs"},
     "server/record": BASE | {"flightlog", "flightlog/import", "flightlog/ros", "server/dds"},
     "server/sitl": ROLLOUT | {"server/dds", "server/telemetry"},
-    "blind": {"io", "flightlog"},
-    "blind/a": FLIGHT | {"blind", "flightlog"},
-    "blind/b": {"io", "blind", "flightlog"},
-    "blind/c": {"io", "blind", "flightlog"},
-    "benchmark": GAP | {"blind", "blind/a", "blind/b", "blind/c", "benchmark/predict"},
+    "lab/blind": {"io", "flightlog"},
+    "lab/blind/a": FLIGHT | {"lab/blind", "flightlog"},
+    "lab/blind/b": {"io", "lab/blind", "flightlog"},
+    "lab/blind/c": {"io", "lab/blind", "flightlog"},
+    "lab/benchmark": GAP | {"lab/blind", "lab/blind/a", "lab/blind/b", "lab/blind/c", "lab/benchmark/predict"},
     "view": ROLLOUT | {"flightlog/check", "gap/result", "learn"},
     "server/jobs": {"io"},
     "server/http": {"io", "server", "server/jobs"},
-    "benchmark/predict": GAP,  # answers the benchmark's questions, and knows nothing of who makes them
+    "lab/benchmark/predict": GAP,  # answers the benchmark's questions, and knows nothing of who makes them
 }
 # Rooms that may include no more than these files of others, and io: blind robots share neither physics nor effects
 # with what they are a test of, only plain data, the log, and family a what flies.
 ONLY = {
-    "blind": {"flightlog/flight_log.hpp"},
-    "blind/a": {"blind/family.hpp", "flightlog/flight_log.hpp", "flight/pid.hpp", "flight/episode.hpp", "flight/excitation.hpp", "model/wing_beat.hpp", "sim/randomise.hpp",
+    "lab/blind": {"flightlog/flight_log.hpp"},
+    "lab/blind/a": {"lab/blind/family.hpp", "flightlog/flight_log.hpp", "flight/pid.hpp", "flight/episode.hpp", "flight/excitation.hpp", "model/wing_beat.hpp", "sim/randomise.hpp",
               "flappy/vehicle.hpp", "flappy/vehicle_file.hpp"},
-    "blind/b": {"blind/family.hpp", "flightlog/flight_log.hpp"},
-    "blind/c": {"blind/family.hpp", "flightlog/flight_log.hpp"},
+    "lab/blind/b": {"lab/blind/family.hpp", "flightlog/flight_log.hpp"},
+    "lab/blind/c": {"lab/blind/family.hpp", "flightlog/flight_log.hpp"},
 }
-# Programs that must not know a room: a diagnosis never sees the truth.
-IGNORANT = {"tools/flappy_gap": {"blind", "blind/a", "blind/b", "blind/c", "benchmark", "benchmark/predict"}}
+# The laboratory measures the product; nothing of the product knows it, least of all a diagnosis, which never sees the truth.
+LABORATORY = {room for room in ROOMS if room.startswith("lab/")}
+# The programs of the laboratory. No other may include it.
+LABORATORIES = ("tools/flappy_blind", "tools/flappy_bench")
 # Which room declares itself in which public header.
 PUBLIC = {"vehicle.hpp": "model", "vehicle_file.hpp": "model", "world.hpp": "sim", "batch.hpp": "sim"}
 TORCH = {"torch", "ATen", "c10", "caffe2"}
@@ -89,15 +91,19 @@ def room_of(path):
 
 
 def faults(root):
-    """One line for each include that the design does not allow, and for each file that has no room."""
+    """One line for each include that the design does not allow, and for each file that has no room, or the name of another."""
     found = []
     files = [p for folder in ("src", "include", "tools") for p in sorted((root / folder).rglob("*")) if p.suffix in (".hpp", ".cpp", ".h")]
+    seen = {"main.cpp": None}  # each program has one
     for path in files:
         where = path.relative_to(root)
+        first = seen.setdefault(path.name, where)
+        if first not in (None, where):
+            found.append(f"{where}: has the name of {first}")
         public = where.parts[0] == "include"
         if where.parts[0] == "tools":
             room = "/".join(where.parts[:2])
-            if room not in IGNORANT:
+            if room in LABORATORIES:
                 continue
         elif public:
             room = PUBLIC.get("/".join(where.parts[2:])) if where.parts[1] == "flappy" else None
@@ -131,11 +137,11 @@ def fault_of(root, where, room, public, bracket, name):
             return "no such file"
         target = room_of(name)
     else:
-        return None if bracket == "<" or room in IGNORANT else "no known room"
+        return None if bracket == "<" or room.startswith("tools/") else "no known room"
     if target is None or target == room:
         return None
-    if room in IGNORANT:
-        return f"{room} must not know {target}" if target in IGNORANT[room] else None
+    if room.startswith("tools/"):
+        return f"{room} must not know {target}" if target in LABORATORY else None
     if room in ONLY and target != "io" and name not in ONLY[room]:
         return f"{room} may include io and {', '.join(sorted(ONLY[room]))} only"
     if target in ROOMS[room]:
@@ -157,20 +163,22 @@ def self_test():
         ({"src/model/x.hpp": '#include "flappy/batch.hpp"\n'}, "not sim"),
         ({"src/io/x.cpp": '#include "flappy/vehicle.hpp"\n'}, "io may include no other room, not model"),
         ({"src/sim/x.cpp": '#include "flight/c.hpp"\n'}, "not flight"),
-        ({"src/blind/a/x.cpp": '#include "model/a.hpp"\n'}, "src/blind/a/x.cpp:1: model/a.hpp: blind/a may include io and blind/family.hpp, flappy/vehicle.hpp"),
-        ({"src/blind/a/x.cpp": '#include "flight/c.hpp"\n'}, "flight/c.hpp: blind/a may include io and"),
-        ({"src/blind/a/x.cpp": '#include "flappy/batch.hpp"\n'}, "flappy/batch.hpp: blind/a may include io and"),
-        ({"src/blind/a/x.cpp": '#include "flappy/vehicle.hpp"\n#include "io/files.hpp"\n#include "blind/a/y.hpp"\n', "src/blind/a/y.hpp": ""}, None),
-        ({"src/blind/b/x.cpp": '#include "blind/a/y.hpp"\n', "src/blind/a/y.hpp": ""}, "blind/b may include io and"),
-        ({"src/blind/c/x.cpp": '#include "flappy/vehicle.hpp"\n'}, "blind/c may include io and blind/family.hpp, flightlog/flight_log.hpp only"),
-        ({"src/blind/c/x.cpp": '#include "blind/a/robot.hpp"\n', "src/blind/a/robot.hpp": ""}, "blind/c may include io and"),
-        ({"src/blind/c/x.cpp": '#include "io/files.hpp"\n#include <mujoco/mujoco.h>\n#include "blind/c/y.hpp"\n', "src/blind/c/y.hpp": ""}, None),
-        ({"src/benchmark/x.cpp": '#include "gap/replay/b.hpp"\n#include "blind/a/y.hpp"\n', "src/blind/a/y.hpp": "", "src/gap/replay/b.hpp": ""}, None),
-        ({"src/benchmark/predict/x.cpp": '#include "gap/replay/b.hpp"\n', "src/gap/replay/b.hpp": ""}, None),
-        ({"src/benchmark/predict/x.cpp": '#include "blind/a/y.hpp"\n', "src/blind/a/y.hpp": ""}, "not blind/a"),
-        ({"src/benchmark/predict/x.cpp": '#include "benchmark/y.hpp"\n', "src/benchmark/y.hpp": ""}, "not benchmark"),
-        ({"src/blind/a/x.cpp": '#include "gap/replay/b.hpp"\n', "src/gap/replay/b.hpp": ""}, "gap/replay/b.hpp: blind/a may include io and"),
-        ({"src/gap/diagnose/x.cpp": '#include "benchmark/y.hpp"\n', "src/benchmark/y.hpp": ""}, "not benchmark"),
+        ({"src/policy/a.hpp": ""}, "has the name of src/model/a.hpp"),
+        ({"tools/flappy_fly/main.cpp": "", "tools/flappy_gap/main.cpp": ""}, None),
+        ({"src/lab/blind/a/x.cpp": '#include "model/a.hpp"\n'}, "src/lab/blind/a/x.cpp:1: model/a.hpp: lab/blind/a may include io and flappy/vehicle.hpp"),
+        ({"src/lab/blind/a/x.cpp": '#include "flight/c.hpp"\n'}, "flight/c.hpp: lab/blind/a may include io and"),
+        ({"src/lab/blind/a/x.cpp": '#include "flappy/batch.hpp"\n'}, "flappy/batch.hpp: lab/blind/a may include io and"),
+        ({"src/lab/blind/a/x.cpp": '#include "flappy/vehicle.hpp"\n#include "io/files.hpp"\n#include "lab/blind/a/y.hpp"\n', "src/lab/blind/a/y.hpp": ""}, None),
+        ({"src/lab/blind/b/x.cpp": '#include "lab/blind/a/y.hpp"\n', "src/lab/blind/a/y.hpp": ""}, "lab/blind/b may include io and"),
+        ({"src/lab/blind/c/x.cpp": '#include "flappy/vehicle.hpp"\n'}, "lab/blind/c may include io and flightlog/flight_log.hpp, lab/blind/family.hpp only"),
+        ({"src/lab/blind/c/x.cpp": '#include "lab/blind/a/robot.hpp"\n', "src/lab/blind/a/robot.hpp": ""}, "lab/blind/c may include io and"),
+        ({"src/lab/blind/c/x.cpp": '#include "io/files.hpp"\n#include <mujoco/mujoco.h>\n#include "lab/blind/c/y.hpp"\n', "src/lab/blind/c/y.hpp": ""}, None),
+        ({"src/lab/benchmark/x.cpp": '#include "gap/replay/r.hpp"\n#include "lab/blind/a/y.hpp"\n', "src/lab/blind/a/y.hpp": "", "src/gap/replay/r.hpp": ""}, None),
+        ({"src/lab/benchmark/predict/x.cpp": '#include "gap/replay/r.hpp"\n', "src/gap/replay/r.hpp": ""}, None),
+        ({"src/lab/benchmark/predict/x.cpp": '#include "lab/blind/a/y.hpp"\n', "src/lab/blind/a/y.hpp": ""}, "not lab/blind/a"),
+        ({"src/lab/benchmark/predict/x.cpp": '#include "lab/benchmark/y.hpp"\n', "src/lab/benchmark/y.hpp": ""}, "not lab/benchmark"),
+        ({"src/lab/blind/a/x.cpp": '#include "gap/replay/r.hpp"\n', "src/gap/replay/r.hpp": ""}, "gap/replay/r.hpp: lab/blind/a may include io and"),
+        ({"src/gap/diagnose/x.cpp": '#include "lab/benchmark/y.hpp"\n', "src/lab/benchmark/y.hpp": ""}, "not lab/benchmark"),
         ({"src/gap/replay/x.cpp": '#include "gap/evidence/y.hpp"\n', "src/gap/evidence/y.hpp": ""}, "not gap/evidence"),
         ({"src/gap/x.cpp": ""}, "src/gap/x.cpp: no known room"),
         ({"src/deploy/header/x.cpp": '#include "learn/d.hpp"\n', "src/learn/d.hpp": ""}, "not learn"),
@@ -181,13 +189,13 @@ def self_test():
         ({"src/learn/torch/x.cpp": "#include <torch/torch.h>\n"}, None),
         ({"src/learn/x.cpp": "#include <torch/torch.h>\n"}, "LibTorch belongs to src/policy/ and src/learn/torch/ and src/io/torch/"),
         ({"src/view/x.cpp": '#include "sim/b.hpp"\n#include "learn/d.hpp"\n', "src/learn/d.hpp": ""}, None),
-        ({"src/view/x.cpp": '#include "benchmark/d.hpp"\n', "src/benchmark/d.hpp": ""}, "not benchmark"),
+        ({"src/view/x.cpp": '#include "lab/benchmark/d.hpp"\n', "src/lab/benchmark/d.hpp": ""}, "not lab/benchmark"),
         ({"src/rollout/x.cpp": '#include "view/d.hpp"\n', "src/view/d.hpp": ""}, "not view"),
         ({"src/attic/x.cpp": ""}, "src/attic/x.cpp: no known room"),
-        ({"tools/flappy_blind/main.cpp": '#include "blind/a/y.hpp"\n', "src/blind/a/y.hpp": ""}, None),
+        ({"tools/flappy_blind/main.cpp": '#include "lab/blind/a/y.hpp"\n', "src/lab/blind/a/y.hpp": ""}, None),
         ({"tools/flappy_gap/main.cpp": '#include "gap/diagnose/y.hpp"\n#include "command.hpp"\n', "src/gap/diagnose/y.hpp": ""}, None),
-        ({"tools/flappy_gap/main.cpp": '#include "blind/a/y.hpp"\n', "src/blind/a/y.hpp": ""}, "tools/flappy_gap must not know blind/a"),
-        ({"tools/flappy_gap/main.cpp": '#include "benchmark/y.hpp"\n', "src/benchmark/y.hpp": ""}, "tools/flappy_gap must not know benchmark"),
+        ({"tools/flappy_gap/main.cpp": '#include "lab/blind/a/y.hpp"\n', "src/lab/blind/a/y.hpp": ""}, "tools/flappy_gap must not know lab/blind/a"),
+        ({"tools/flappy_gap/main.cpp": '#include "lab/benchmark/y.hpp"\n', "src/lab/benchmark/y.hpp": ""}, "tools/flappy_gap must not know lab/benchmark"),
         ({"src/loose.cpp": ""}, "no known room"),
         ({"src/sim/x.cpp": '#include "b.hpp"\n'}, "no known room"),
         ({"src/sim/x.cpp": '#include "model/gone.hpp"\n'}, "no such file"),

@@ -12,7 +12,7 @@ run(make --family c --out ${WORK}/single --set development --part singles --case
 expect_equal("exit code of make, which says ${err}" "${code}" 0)
 expect_refused("${WORK}/single/predictions.sha256: cannot be read: No such file or directory"
   loop ${WORK}/single --run ${WORK}/run --out ${WORK}/loop)
-run(score ${WORK}/single --discrepancy ${SOURCE}/configs/gap/discrepancy/without_c.toml)
+run(score ${WORK}/single --discrepancy ${SOURCE}/configs/lab/discrepancy/without_c.toml)
 expect_equal("exit code of score, which says ${err}" "${code}" 0)
 set(loop loop ${WORK}/single --run ${WORK}/run --out ${WORK}/single_loop --escapes 2 ${small})
 run(${loop} --json ${WORK}/loop.json)

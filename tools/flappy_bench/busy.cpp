@@ -10,10 +10,10 @@
 #include <ctime>
 #include <memory>
 
-#include "closed_loop.hpp"
+#include "bench_closed_loop.hpp"
 #include "flappy/batch.hpp"
 #include "io/parallel.hpp"
-#include "learner.hpp"
+#include "bench_learner.hpp"
 
 namespace flappy::bench {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "accuracy.hpp"
 #include "busy.hpp"
-#include "closed_loop.hpp"
+#include "bench_closed_loop.hpp"
 #include "engines.hpp"
 #include "figures.hpp"
 #include "flappy/batch.hpp"
@@ -17,12 +17,12 @@
 #include "io/parallel.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
-#include "learner.hpp"
+#include "bench_learner.hpp"
 #include "many_flights.hpp"
 #include "model/effects/registry.hpp"
 #include "roof.hpp"
 #include "speed.hpp"
-#include "telemetry.hpp"
+#include "bench_telemetry.hpp"
 #ifdef FLAPPY_HAVE_PEERS
 #include <mujoco/mujoco.h>
 

@@ -3,8 +3,8 @@
 
 #include <filesystem>
 
-#include "blind/a/escape.hpp"
-#include "blind/family.hpp"
+#include "lab/blind/a/a_escape.hpp"
+#include "lab/blind/family.hpp"
 #include "rollout/outcome.hpp"
 
 namespace flappy::blind {

@@ -6,10 +6,10 @@
 #include <map>
 #include <optional>
 
-#include "benchmark/families.hpp"
-#include "benchmark/records.hpp"
-#include "benchmark/work.hpp"
-#include "blind/a/family_a.hpp"
+#include "lab/benchmark/families.hpp"
+#include "lab/benchmark/records.hpp"
+#include "lab/benchmark/work.hpp"
+#include "lab/blind/a/family_a.hpp"
 #include "escape_rules.hpp"
 #include "io/append_file.hpp"
 #include "io/files.hpp"

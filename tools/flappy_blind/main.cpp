@@ -4,14 +4,14 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "benchmark/calibrate.hpp"
-#include "benchmark/detectability.hpp"
-#include "benchmark/families.hpp"
-#include "benchmark/foresee_bench.hpp"
-#include "benchmark/make.hpp"
-#include "benchmark/score_bench.hpp"
-#include "blind/a/family_a.hpp"
-#include "blind/firmware/firmware.hpp"
+#include "lab/benchmark/calibrate.hpp"
+#include "lab/benchmark/detectability.hpp"
+#include "lab/benchmark/families.hpp"
+#include "lab/benchmark/foresee_bench.hpp"
+#include "lab/benchmark/make.hpp"
+#include "lab/benchmark/score_bench.hpp"
+#include "lab/blind/a/family_a.hpp"
+#include "lab/blind/firmware/faulty_firmware.hpp"
 #include "escapes.hpp"
 #include "io/installation.hpp"
 #include "io/sha256.hpp"
@@ -150,7 +150,7 @@ void add_question_options(io::Command& c, benchmark::BenchQuestions& q) {
   c.option("--vehicle", q.vehicle, "the robot as declared, where it is elsewhere now");
   c.option("--priors", q.priors, "what is uncertain of the vehicle").shows_default();
   c.option("--discrepancy", q.discrepancy,
-           "what models get wrong; of a family: configs/gap/discrepancy/without_FAMILY.toml")
+           "what models get wrong; of a family: configs/lab/discrepancy/without_FAMILY.toml")
       .shows_default();
   c.option("--sessions", q.sessions, "what differs between sessions, for a contrast").shows_default();
   c.option("--verdict", q.verdict,

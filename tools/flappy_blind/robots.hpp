@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "blind/a/sampled_robot.hpp"
+#include "lab/blind/a/sampled_robot.hpp"
 #include "io/installation.hpp"
 #include "io/program.hpp"
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "deploy/flown/replay.hpp"
+#include "deploy/flown/replay_flown.hpp"
 #include "io/files.hpp"
 #include "io/statistics.hpp"
 #include "io/text.hpp"

@@ -11,7 +11,7 @@
 
 #include "flightlog/ros/mcap.hpp"
 #include "flightlog/ros/mcap_records.hpp"
-#include "flightlog/ros/messages.hpp"
+#include "flightlog/ros/ros_messages.hpp"
 #include "io/files.hpp"
 #include "io/mapped_file.hpp"
 #include "io/temporary_folder.hpp"

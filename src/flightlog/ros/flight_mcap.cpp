@@ -9,7 +9,7 @@
 
 #include "flightlog/ros/cdr.hpp"
 #include "flightlog/ros/mcap.hpp"
-#include "flightlog/ros/messages.hpp"
+#include "flightlog/ros/ros_messages.hpp"
 #include "flightlog/ros/type_hash.hpp"
 
 namespace flappy::flightlog::ros {

@@ -1,4 +1,4 @@
-#include "flightlog/ros/messages.hpp"
+#include "flightlog/ros/ros_messages.hpp"
 
 namespace flappy::flightlog::ros {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "gap/result/plan.hpp"
+#include "gap/result/planned.hpp"
 
 namespace flappy::gap {
 

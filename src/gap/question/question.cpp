@@ -1,7 +1,7 @@
 #include "gap/question/question.hpp"
 
 #include "gap/question/alone.hpp"
-#include "gap/question/beat_averaged.hpp"
+#include "gap/question/beat_averaged_question.hpp"
 #include "gap/question/contrast.hpp"
 
 namespace flappy::gap {

@@ -15,7 +15,7 @@
 #include <tuple>
 
 #include "flightlog/beat_averaged_motion.hpp"
-#include "flightlog/world.hpp"
+#include "flightlog/log_world.hpp"
 #include "gap/replay/predicted_flight.hpp"
 #include "gap/replay/predicted_loads.hpp"
 #include "model/beat_averaged.hpp"

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "flightlog/readings.hpp"
-#include "flightlog/world.hpp"
+#include "flightlog/log_world.hpp"
 #include "io/statistics.hpp"
 #include "sim/replay.hpp"
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "gap/result/plan.hpp"
+#include "gap/result/planned.hpp"
 
 namespace flappy::gap {
 

@@ -7,7 +7,7 @@
 #include <map>
 #include <mutex>
 
-#include "flightlog/ros/messages.hpp"
+#include "flightlog/ros/ros_messages.hpp"
 #include "flightlog/ros/type_hash.hpp"
 #include "io/files.hpp"
 #include "io/log.hpp"

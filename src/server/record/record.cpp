@@ -9,7 +9,7 @@
 #include <set>
 
 #include "flightlog/ros/mcap.hpp"
-#include "flightlog/ros/messages.hpp"
+#include "flightlog/ros/ros_messages.hpp"
 #include "flightlog/ros/type_hash.hpp"
 #include "io/log.hpp"
 #include "io/progress.hpp"

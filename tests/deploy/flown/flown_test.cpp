@@ -7,7 +7,7 @@
 #include <random>
 
 #include "deploy/flown/inferences.hpp"
-#include "deploy/flown/replay.hpp"
+#include "deploy/flown/replay_flown.hpp"
 #include "deploy/header/exported_files.hpp"
 #include "deploy/header/policy_vectors.hpp"
 #include "full.hpp"

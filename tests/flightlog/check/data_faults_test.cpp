@@ -6,7 +6,7 @@
 
 #include <functional>
 
-#include "blind/a/flights.hpp"
+#include "lab/blind/a/flights.hpp"
 #include "flightlog/check/synthetic_log.hpp"
 #include "full.hpp"
 #include "vehicles.hpp"

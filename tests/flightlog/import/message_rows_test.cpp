@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "flightlog/ros/cdr.hpp"
-#include "flightlog/ros/messages.hpp"
+#include "flightlog/ros/ros_messages.hpp"
 
 namespace flappy::flightlog {
 namespace {

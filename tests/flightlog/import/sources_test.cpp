@@ -9,7 +9,7 @@
 #include "flightlog/import/ulogs.hpp"
 #include "flightlog/ros/cdr.hpp"
 #include "flightlog/ros/mcap.hpp"
-#include "flightlog/ros/messages.hpp"
+#include "flightlog/ros/ros_messages.hpp"
 #include "io/temporary_folder.hpp"
 #include "refusal.hpp"
 

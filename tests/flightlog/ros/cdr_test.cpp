@@ -7,7 +7,7 @@
 #include <set>
 
 #include "flightlog/ros/bag.hpp"
-#include "flightlog/ros/messages.hpp"
+#include "flightlog/ros/ros_messages.hpp"
 #include "flightlog/ros/type_hash.hpp"
 
 namespace flappy::flightlog::ros::cdr_test {

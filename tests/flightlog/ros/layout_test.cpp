@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "flightlog/ros/messages.hpp"
+#include "flightlog/ros/ros_messages.hpp"
 #include "flightlog/ros/type_hash.hpp"
 
 namespace flappy::flightlog::ros::layout_test {

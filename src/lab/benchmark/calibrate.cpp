@@ -1,0 +1,253 @@
+#include "lab/benchmark/calibrate.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+
+#include "lab/benchmark/records.hpp"
+#include "gap/answer/verdict.hpp"
+#include "io/files.hpp"
+#include "io/program.hpp"
+#include "io/sha256.hpp"
+#include "io/text.hpp"
+
+namespace flappy::benchmark {
+namespace {
+
+namespace fs = std::filesystem;
+using gap::ScoredHypothesis;
+using gap::VerdictRule;
+
+/// Least probability of a right answer in the score, so that no single case decides.
+constexpr double kMinProbability = 1e-3;
+/// Price of the square of the steps that a constant moves; with ten robots a part, some constants would else go to
+/// their limits. Chosen by cross-validation over the families on 83 development robots: 0.03 to 1 are alike, and 0 is
+/// worse by 0.12 in the mean log probability.
+constexpr double kPriceOfMoving = 0.1;
+
+struct Constant {
+  const char *table, *key;
+  std::function<double&(VerdictRule&)> of;
+  double low, high;
+  double step = 0;  ///< 0: a factor of e
+
+  double moved(double x, double steps) const {
+    return std::clamp(step > 0 ? x + step * steps : x * std::exp(steps), low, high);
+  }
+  double steps_between(double from, double to) const { return step > 0 ? (to - from) / step : std::log(to / from); }
+};
+
+/// Place of a number in the text of a TOML file: first character and length. None: the file lacks it.
+std::optional<std::pair<std::size_t, std::size_t>> find_number(const std::string& text, const std::string& table,
+                                                               const std::string& key) {
+  const std::size_t header = text.find("\n[" + table + "]");
+  if (header == std::string::npos) return std::nullopt;
+  const std::size_t end = text.find("\n[", header + 1), at = text.find("\n" + key + " = ", header);
+  if (at >= end) return std::nullopt;
+  const std::size_t begin = at + key.size() + 4;
+  return std::pair{begin, text.find_first_of(" \n", begin) - begin};
+}
+
+/// Comments and layout stay.
+void set_number(std::string& text, const std::string& table, const std::string& key, const std::string& value) {
+  if (const auto place = find_number(text, table, key)) text.replace(place->first, place->second, value);
+}
+
+/// The constants that a verdict file has.
+std::vector<Constant> constants_of(const std::string& file) {
+  std::vector<Constant> all = {
+      {"tempering", "nats", [](VerdictRule& r) -> double& { return r.tempering.nats; }, 0.1, 100},
+      {"tempering", "freedom", [](VerdictRule& r) -> double& { return r.tempering.freedom; }, 0.3, 30},
+      {"gain", "by_chance_nats", [](VerdictRule& r) -> double& { return r.gain.by_chance_nats; }, 0, 300, 10},
+      {"gain.outside", "by_chance_nats", [](VerdictRule& r) -> double& { return r.gain.outside_by_chance_nats; }, 0,
+       300, 10},
+      {"another_law", "further_share", [](VerdictRule& r) -> double& { return r.gain.further_share; }, 0, 1, 0.2},
+      {"another_law", "remainder_share", [](VerdictRule& r) -> double& { return r.gain.remainder_share; }, 0, 1, 0.2},
+      {"prior", "parameters", [](VerdictRule& r) -> double& { return r.prior.parameters; }, 0.01, 0.9},
+      {"prior", "unknown", [](VerdictRule& r) -> double& { return r.prior.unknown; }, 0.01, 0.8},
+      {"prior", "remainder", [](VerdictRule& r) -> double& { return r.prior.remainder; }, 0.001, 1},
+  };
+  std::erase_if(all, [&](const Constant& c) { return !find_number(file, c.table, c.key); });
+  return all;
+}
+
+struct Case {
+  CaseTruth truth;
+  std::vector<ScoredHypothesis> hypotheses;
+  double weight = 0;
+  std::size_t part = 0;
+};
+
+double moved_prior(const ScoredHypothesis& a, const VerdictRule& from, const VerdictRule& to) {
+  using Kind = gap::HypothesisKind;
+  const auto move = [](double before, double now) { return std::log(now / before); };
+  switch (a.kind) {
+    case Kind::none:
+      return move(from.prior.none, to.prior.none);
+    case Kind::parameters:
+      return move(from.prior.parameters, to.prior.parameters);
+    case Kind::unknown:
+      return move(from.prior.unknown, to.prior.unknown);
+    case Kind::effect:
+      return move(from.prior.effect, to.prior.effect) +
+             (!a.has_remainder() ? 0 : move(from.prior.remainder, to.prior.remainder));
+  }
+  return 0;
+}
+
+/// InputError if the benchmark in `folder` was scored with other constants than those of `verdict`.
+void check_verdict(const fs::path& folder, const Manifest& manifest, const fs::path& verdict) {
+  const std::string options = io::read_text(folder / "predictions" / "options.txt"), option = "--verdict ";
+  const std::size_t at = options.find(option) + option.size();
+  std::string scored_with = options.substr(at, options.find('\n', at) - at);
+  if (scored_with == "default") {
+    const bool contrast = !manifest.cases.front().references(folder).empty();
+    scored_with =
+        io::sha256(io::read_text(io::config_path(contrast ? "gap/contrast_verdict.toml" : "gap/verdict.toml")));
+  }
+  if (io::sha256(io::read_text(verdict)) != scored_with)
+    throw io::InputError("--verdict " + verdict.string() + ": " + folder.string() +
+                         " was scored with another; accepted: the file that it was scored with");
+}
+
+class Calibration {
+ public:
+  explicit Calibration(const CalibrateCommand& command)
+      : rule_(gap::read_verdict_rule(command.verdict)), constants_(constants_of(io::read_text(command.verdict))) {
+    std::map<std::string, std::size_t> parts;
+    std::vector<double> counts;
+    for (const fs::path& folder : command.folders) {
+      const Manifest manifest = read_manifest(folder);
+      if (!fs::exists(true_fits(folder)))
+        throw io::InputError(folder.string() + ": was not scored; accepted: folders of flappy-blind score");
+      check_verdict(folder, manifest, command.verdict);
+      std::map<std::size_t, CaseTruth> truths;
+      const Json sealed = open_labels(folder, manifest);
+      for (const Json& json : sealed.at("cases")) {
+        const Label l = label_from(json);
+        truths[l.planned.number] = l.truth();
+      }
+      for (const PublicCase& c : manifest.cases) {
+        const Prediction p = read_prediction(prediction_file(folder, c.number));
+        Case own{.truth = truths.at(c.number)};
+        for (const gap::RankedHypothesis& h : p.diagnosis.hypotheses) {
+          ScoredHypothesis a;
+          a.kind = h.kind;
+          a.effects = h.effects;
+          a.log_evidence = h.log_evidence;
+          a.log_prior = h.log_prior;
+          if (h.remainder) a.unexplained.emplace_back();
+          own.hypotheses.push_back(std::move(a));
+        }
+        if (own.hypotheses.empty()) continue;  // its data were faulty
+        own.part = parts.try_emplace(manifest.family + " " + own.truth.part, counts.size()).first->second;
+        if (own.part == counts.size()) counts.push_back(0);
+        counts[own.part] += 1;
+        cases_.push_back(std::move(own));
+      }
+    }
+    for (Case& c : cases_) c.weight = 1 / (counts[c.part] * static_cast<double>(counts.size()));
+  }
+
+  std::size_t cases() const { return cases_.size(); }
+  const VerdictRule& start() const { return rule_; }
+  const std::vector<Constant>& constants() const { return constants_; }
+
+  /// Weighted mean logarithm of the probability of the right answers.
+  double score(const VerdictRule& rule) const {
+    double sum = 0;
+    for (const Case& c : cases_) {
+      std::vector<ScoredHypothesis> all = c.hypotheses;
+      for (ScoredHypothesis& a : all) {
+        const double move = moved_prior(a, rule_, rule);
+        a.log_prior += move;
+        a.log_evidence += move;
+      }
+      set_probabilities(all, rule);
+      double probability = 0;
+      for (const ScoredHypothesis& a : all)
+        if (right(c.truth, {.kind = a.has_remainder() ? "remainder" : name_of(a.kind), .effects = a.effects}))
+          probability += a.probability;
+      sum += c.weight * std::log(kMinProbability + (1 - kMinProbability) * probability);
+    }
+    return sum;
+  }
+
+  /// Maximises the score less the price of what moved along one constant after another, with shrinking steps (Hooke,
+  /// Jeeves 1961).
+  VerdictRule best() const {
+    VerdictRule rule = rule_;
+    double value = score(rule);
+    for (double step = 2; step > 0.01; step /= 2)
+      for (bool better = true; better;) {
+        better = false;
+        for (const Constant& c : constants_)
+          for (const double way : {step, -step}) {
+            VerdictRule there = rule;
+            double& x = c.of(there);
+            x = c.moved(x, way);
+            if (std::ranges::count(shared(there), &x)) share(there, x);
+            const double now = score(there) - price(there);
+            if (now > value + 1e-6) rule = there, value = now, better = true;
+          }
+      }
+    return rule;
+  }
+
+ private:
+  double price(VerdictRule& rule) const {
+    VerdictRule start = rule_;
+    double sum = 0;
+    for (const Constant& c : constants_) sum += std::pow(c.steps_between(c.of(start), c.of(rule)), 2);
+    return kPriceOfMoving * sum;
+  }
+  /// The priors that add up to 1.
+  static std::array<double*, 4> shared(VerdictRule& rule) {
+    return {&rule.prior.none, &rule.prior.parameters, &rule.prior.effect, &rule.prior.unknown};
+  }
+  /// Scales the other priors so that all add up to 1 with `one`.
+  static void share(VerdictRule& rule, const double& one) {
+    double others = 0;
+    for (const double* p : shared(rule))
+      if (p != &one) others += *p;
+    for (double* p : shared(rule))
+      if (p != &one) *p *= (1 - one) / others;
+  }
+
+  VerdictRule rule_;
+  std::vector<Constant> constants_;
+  std::vector<Case> cases_;
+};
+
+std::string rounded(double x) { return io::format("%.4g", x); }
+
+}  // namespace
+
+Json calibrate(const CalibrateCommand& command) {
+  io::check_output(command.out);
+  const Calibration calibration(command);
+  VerdictRule before = calibration.start(), after = calibration.best();
+  after.prior.none = std::stod(rounded(after.prior.none));
+  after.prior.parameters = std::stod(rounded(after.prior.parameters));
+  after.prior.unknown = std::stod(rounded(after.prior.unknown));
+  after.prior.effect = 1 - after.prior.none - after.prior.parameters - after.prior.unknown;
+  std::string text = io::read_text(command.verdict);
+  Json json = {
+      {"cases", calibration.cases()}, {"score_before", calibration.score(before)}, {"score", calibration.score(after)}};
+  for (const Constant& c : calibration.constants()) {
+    set_number(text, c.table, c.key, rounded(c.of(after)));
+    json[std::string(c.table) + "." + c.key] = c.of(after);
+    std::printf("%-12s %-24s %10.4g, was %.4g\n", c.table, c.key, c.of(after), c.of(before));
+  }
+  for (const auto& [key, value] : {std::pair{"none", after.prior.none}, {"effect", after.prior.effect}})
+    set_number(text, "prior", key, io::shortest_digits(value));
+  std::printf("mean log probability of what is right: %.3f, was %.3f, of %zu cases\n", json["score"].get<double>(),
+              json["score_before"].get<double>(), calibration.cases());
+  gap::parse_verdict_rule(text, command.out.string());  // a file that no program reads is not written
+  io::write_atomically(command.out, text);
+  return json;
+}
+
+}  // namespace flappy::benchmark

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lab/benchmark/score.hpp"
+#include "lab/blind/a/a_effects.hpp"
+#include "lab/blind/family.hpp"
+
+namespace flappy::benchmark {
+
+struct Detectability {
+  double detectable = 0;      ///< detectable magnitude, in units of the family
+  bool undetectable = false;  ///< twice the detectable magnitude exceeds what a robot may have
+  bool hidden = false;        ///< hover alone does not show twice the detectable magnitude
+};
+
+/// Magnitude of most effects over the detectable one.
+inline constexpr double kOverDetectable = 2;
+
+/// Reads the table for every effect of a family that the catalogue has, and listed ones outside it. InputError if an
+/// effect of the catalogue is missing.
+std::map<std::string, Detectability> read_detectability(const std::filesystem::path& file, const blind::Family& family);
+
+/// One robot and its flights, as only the maker knows them.
+struct PlannedCase {
+  std::size_t number = 0;  ///< from 1, in random order
+  std::string part;        ///< one of kParts or kContrastParts
+  std::vector<blind::BlindEffect> effects;
+  std::uint64_t seed = 0;
+  bool hover = false, power = false;
+  bool own_parameters = false, conventions = false;  ///< as in blind::Assignment
+  bool published = false;                            ///< its vehicle is drawn from the published randomisation
+  /// In a contrast, the robot flies `references` flights without its effects, and then `flights` in another session.
+  std::size_t references = 0, flights = blind::Family::kFlights;
+  bool calm_reference = false;        ///< the references hover and follow slow paths
+  std::vector<std::string> withheld;  ///< effects withheld from the catalogue
+};
+
+/// The assignment of a case to its family, without the seed.
+blind::Assignment assignment_of(const PlannedCase& planned, const std::filesystem::path& vehicle);
+/// That of its reference flights; none without them.
+std::optional<blind::Assignment> reference_of(const PlannedCase& planned, const std::filesystem::path& vehicle);
+
+struct PlanOptions {
+  bool reported = false;             ///< seeds of the reported scores; false: seeds for development
+  bool contrast = false;             ///< parts of the contrast; false: of the diagnosis without reference flights
+  std::vector<std::string> parts;    ///< empty: all
+  std::vector<std::string> effects;  ///< robots of contrasts have these effects alone; empty: all
+  std::size_t at_most = 0;           ///< most cases of each part; 0: all
+  std::size_t flights = blind::Family::kFlights;  ///< most flights of a session of a contrast
+};
+
+/// Seeds of family b begin at 20,000,000 (development) and 29,000,000 (reported); a and c: 10,000,000 and 30,000,000
+/// likewise.
+std::vector<PlannedCase> plan_cases(const blind::Family& family,
+                                    const std::map<std::string, Detectability>& detectability,
+                                    const PlanOptions& options);
+
+}  // namespace flappy::benchmark

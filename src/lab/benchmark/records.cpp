@@ -1,0 +1,203 @@
+#include "lab/benchmark/records.hpp"
+
+#include <cstdio>
+#include <set>
+
+#include "lab/benchmark/families.hpp"
+#include "gap/result/diagnosis_json.hpp"
+#include "io/schema.hpp"
+#include "io/sha256.hpp"
+
+namespace flappy::benchmark {
+namespace {
+
+using Names = std::vector<std::string>;
+
+[[noreturn]] void refuse_changed(const std::filesystem::path& file) {
+  throw io::InputError(file.string() + ": has changed; accepted: what was sealed");
+}
+
+}  // namespace
+
+std::string number_text(std::size_t number) {
+  char text[24];
+  std::snprintf(text, sizeof text, "%04zu", number);
+  return text;
+}
+
+Json read_json(const std::filesystem::path& file) {
+  const std::string text = io::read_text(file);
+  try {
+    return Json::parse(text);
+  } catch (const Json::exception& e) {
+    throw io::InputError(file.string() + ": is no JSON: " + e.what() + "; accepted: what flappy-blind wrote");
+  }
+}
+
+namespace {
+
+std::vector<std::filesystem::path> folders_in(const PublicCase& c, const std::filesystem::path& folder,
+                                              const std::string& begin) {
+  std::set<std::filesystem::path> all;
+  for (const auto& [file, sha256] : c.files)
+    if (const auto of = (folder / file).parent_path(); of.filename().string().starts_with(begin)) all.insert(of);
+  return {all.begin(), all.end()};
+}
+
+}  // namespace
+
+std::vector<std::filesystem::path> PublicCase::flights(const std::filesystem::path& folder) const {
+  return folders_in(*this, folder, kFlightFolder);
+}
+
+std::vector<std::filesystem::path> PublicCase::references(const std::filesystem::path& folder) const {
+  return folders_in(*this, folder, kReferenceFolder);
+}
+
+Json to_json(const Manifest& m) {
+  Json cases = Json::array();
+  for (const PublicCase& c : m.cases)
+    cases.push_back({{"number", c.number}, {"withheld", c.withheld}, {"files", c.files}});
+  return {{"schema", 2},
+          {"family", m.family},
+          {"set", m.set},
+          {"vehicle", m.vehicle},
+          {"vehicle_sha256", m.vehicle_sha256},
+          {"labels_sha256", m.labels_sha256},
+          {"commit", m.commit},
+          {"engine", m.engine},
+          {"cases", cases}};
+}
+
+Manifest read_manifest(const std::filesystem::path& folder) {
+  const std::filesystem::path file = folder / "manifest.json";
+  const Json json = read_json(file);
+  try {
+    if (const Json& schema = json.at("schema"); schema != 2)
+      throw io::InputError(file.string() + ": schema " +
+                           io::other_schema(schema.get<std::int64_t>(), 2, json.value("commit", "")) +
+                           "; accepted: schema 2");
+    Manifest m{json.at("family"),
+               json.at("set"),
+               json.at("vehicle"),
+               json.at("vehicle_sha256"),
+               json.at("labels_sha256"),
+               json.at("commit"),
+               json.value("engine", ""),
+               {}};
+    for (const Json& c : json.at("cases"))
+      m.cases.push_back({c.at("number"), c.at("withheld"), c.at("files").get<std::map<std::string, std::string>>()});
+    return m;
+  } catch (const Json::exception& e) {
+    throw io::InputError(file.string() + ": " + e.what() + "; accepted: what flappy-blind make wrote");
+  }
+}
+
+std::filesystem::path prediction_file(const std::filesystem::path& folder, std::size_t number) {
+  return folder / "predictions" / (number_text(number) + ".json");
+}
+
+void check_predictions(const std::filesystem::path& folder, const Manifest& manifest) {
+  const std::string sums = io::read_text(folder / kSums);
+  for (const PublicCase& c : manifest.cases)
+    if (sums.find(sum_line(folder, c.number)) == std::string::npos) refuse_changed(prediction_file(folder, c.number));
+}
+
+std::string sum_line(const std::filesystem::path& folder, std::size_t number) {
+  const std::filesystem::path file = prediction_file(folder, number);
+  return io::sha256(io::read_text(file)) + "  " + file.lexically_relative(folder).string() + "\n";
+}
+
+std::filesystem::path true_fits(const std::filesystem::path& folder) { return folder / "true_fits"; }
+
+Json open_labels(const std::filesystem::path& folder, const Manifest& manifest) {
+  const std::filesystem::path sealed = folder / "sealed" / "labels.json";
+  if (io::sha256(io::read_text(sealed)) != manifest.labels_sha256) refuse_changed(sealed);
+  return read_json(sealed);
+}
+
+CaseTruth Label::truth() const {
+  CaseTruth t{planned.part, {}, channels, regimes, planned.seed, draw};
+  for (const blind::BlindEffect& e : planned.effects) t.effects.push_back(e.id);
+  return t;
+}
+
+blind::Assignment Label::robot(const std::filesystem::path& vehicle) const {
+  blind::Assignment a = assignment_of(planned, vehicle);
+  a.seed = seed_of_draw(planned.seed, draw);
+  return a;
+}
+
+Json to_json(const PlannedCase& p) {
+  Json effects = Json::array();
+  for (const blind::BlindEffect& e : p.effects) effects.push_back({{"id", e.id}, {"magnitude", e.magnitude}});
+  return {{"number", p.number},
+          {"part", p.part},
+          {"effects", effects},
+          {"seed", p.seed},
+          {"hover", p.hover},
+          {"power", p.power},
+          {"own_parameters", p.own_parameters},
+          {"conventions", p.conventions},
+          {"published", p.published},
+          {"references", p.references},
+          {"flights", p.flights},
+          {"calm_reference", p.calm_reference},
+          {"withheld", p.withheld}};
+}
+
+Json to_json(const Label& label) {
+  Json json = to_json(label.planned);
+  json["draw"] = label.draw;
+  json["channels"] = label.channels;
+  json["regimes"] = label.regimes;
+  return json;
+}
+
+Label label_from(const Json& json) {
+  Label l;
+  PlannedCase& p = l.planned;
+  p.number = json.at("number");
+  p.part = json.at("part");
+  for (const Json& e : json.at("effects")) p.effects.push_back({e.at("id"), e.at("magnitude")});
+  p.seed = json.at("seed");
+  p.hover = json.at("hover");
+  p.power = json.at("power");
+  p.own_parameters = json.at("own_parameters");
+  p.conventions = json.at("conventions");
+  p.published = json.at("published");
+  p.references = json.value("references", std::size_t{0});
+  p.flights = json.value("flights", blind::Family::kFlights);
+  p.calm_reference = json.value("calm_reference", false);
+  p.withheld = json.at("withheld").get<Names>();
+  l.draw = json.at("draw");
+  l.channels = json.at("channels").get<Names>();
+  l.regimes = json.at("regimes").get<Names>();
+  return l;
+}
+
+Json to_json(const Prediction& p) {
+  const Json best_rmse =
+      p.best_rmse ? Json{{"named", p.best_rmse->named}, {"ranking", p.best_rmse->ranking}} : Json(nullptr);
+  return {{"diagnosis", to_json(p.diagnosis)},
+          {"best_rmse", best_rmse},
+          {"corrected", p.corrected},
+          {"crashed", p.crashed}};
+}
+
+Prediction read_prediction(const std::filesystem::path& file) {
+  const Json json = read_json(file);
+  try {
+    Prediction p;
+    p.diagnosis = gap::diagnosis_from(json.at("diagnosis"), file);
+    if (const Json& b = json.at("best_rmse"); !b.is_null())
+      p.best_rmse = Baseline{b.at("named").get<Names>(), b.at("ranking").get<Names>()};
+    p.corrected = json.at("corrected");
+    p.crashed = json.at("crashed");
+    return p;
+  } catch (const Json::exception& e) {
+    throw io::InputError(file.string() + ": " + e.what() + "; accepted: what this flappy-blind score wrote");
+  }
+}
+
+}  // namespace flappy::benchmark

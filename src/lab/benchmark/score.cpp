@@ -1,0 +1,481 @@
+#include "lab/benchmark/score.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <set>
+#include <tuple>
+
+#include "lab/benchmark/change_over_noise.hpp"
+#include "io/statistics.hpp"
+#include "io/text.hpp"
+#include "model/effects/registry.hpp"
+
+namespace flappy::benchmark {
+namespace {
+
+using model::group_of;
+
+using Names = std::vector<std::string>;
+using Cases = std::vector<const ScoredCase*>;
+
+constexpr double kConfident = 0.8, kSureOfGain = 2, kFalseAlarms = 0.05;
+
+bool same(Names a, Names b) {
+  std::ranges::sort(a);
+  std::ranges::sort(b);
+  return a == b;
+}
+
+bool holds(const Names& all, const Names& some) {
+  return std::ranges::all_of(some, [&](const std::string& s) { return std::ranges::count(all, s) > 0; });
+}
+
+/// Whether a verdict states a set of effects, alone or with a remainder.
+bool names_set(const std::string& kind) { return kind == "effect" || kind == "remainder"; }
+bool names_effects(const Answer& p) { return names_set(p.kind) || p.kind == "group"; }
+
+bool group_holds(const ScoredCase& c) {
+  return c.prediction.kind == "group" && holds(c.prediction.effects, c.truth.effects);
+}
+
+bool named_alone(const ScoredCase& c) {
+  return names_set(c.prediction.kind) && same(c.prediction.effects, c.truth.effects);
+}
+
+bool right_group(const ScoredCase& c) {
+  const Names& named = c.prediction.effects;
+  return group_holds(c) || (names_set(c.prediction.kind) && named.size() == 1 &&
+                            group_of(named.front()) == group_of(c.truth.effects.front()));
+}
+
+/// Whether the truth is one of the three most probable answers.
+bool among_three(const ScoredCase& c) {
+  const Answer& p = c.prediction;
+  if (group_holds(c) || (p.kind == "remainder" && named_alone(c))) return true;
+  for (const gap::RankedHypothesis& s : p.sets) {
+    if (!same(s.effects, c.truth.effects)) continue;
+    const double mine = s.probability;
+    std::ptrdiff_t above =
+        std::ranges::count_if(p.sets, [&](const gap::RankedHypothesis& o) { return o.probability > mine; });
+    above += (p.none > mine) + (p.parameters > mine) + (p.unknown > mine);
+    return mine > 0 && above < 3;
+  }
+  return false;
+}
+
+bool false_alarm(const ScoredCase& c) { return c.prediction.kind != "none" && c.prediction.kind != "parameters"; }
+
+const gap::RankedHypothesis* fitted(const Answer& p, const Names& effects) {
+  for (const gap::RankedHypothesis& s : p.sets)
+    if (same(s.effects, effects)) return &s;
+  return nullptr;
+}
+
+/// For a group, of its most probable set.
+Names at_work(const Answer& p) {
+  if (names_set(p.kind)) return p.effects;
+  if (p.kind != "group") return {};
+  const auto most =
+      std::ranges::find_if(p.sets, [&](const gap::RankedHypothesis& s) { return holds(p.effects, s.effects); });
+  return most == p.sets.end() ? Names() : most->effects;
+}
+
+/// F1 of the named effects over all cases together. `which`: cases that count, maybe several times.
+std::optional<double> f1(const std::vector<std::pair<Names, Names>>& named_and_true,
+                         const std::vector<std::size_t>& which) {
+  double hits = 0, sum = 0;
+  for (const std::size_t i : which) {
+    const auto& [named, truth] = named_and_true[i];
+    for (const std::string& n : named) hits += std::ranges::count(truth, n) > 0 ? 1 : 0;
+    sum += static_cast<double>(named.size() + truth.size());
+  }
+  if (sum == 0) return std::nullopt;
+  return 2 * hits / sum;
+}
+
+ScoreValue f1_score(const std::vector<std::pair<Names, Names>>& named_and_true) {
+  return resampled(named_and_true.size(),
+                   [&](const std::vector<std::size_t>& which) { return f1(named_and_true, which); });
+}
+
+Cases of_parts(const std::vector<ScoredCase>& cases, const std::set<std::string>& parts) {
+  Cases list;
+  for (const ScoredCase& c : cases)
+    if (parts.contains(c.truth.part)) list.push_back(&c);
+  return list;
+}
+
+template <class Is>
+ScoreValue share(const Cases& cases, const Is& is) {
+  return proportion(static_cast<std::size_t>(std::ranges::count_if(cases, [&](const ScoredCase* c) { return is(*c); })),
+                    cases.size());
+}
+
+/// Share of the baseline, over the cases that it has an answer for.
+template <class Is>
+std::optional<ScoreValue> of_baseline(const Cases& cases, const Is& is) {
+  Cases had = cases;
+  std::erase_if(had, [&](const ScoredCase* c) { return !c->prediction.best_rmse; });
+  if (had.empty()) return std::nullopt;
+  return share(had, [&](const ScoredCase& c) { return is(c.truth, *c.prediction.best_rmse); });
+}
+
+bool baseline_first(const CaseTruth& t, const Baseline& b) {
+  return !b.named.empty() && b.ranking.front() == t.effects.front();
+}
+
+bool baseline_group(const CaseTruth& t, const Baseline& b) {
+  return !b.named.empty() && group_of(b.ranking.front()) == group_of(t.effects.front());
+}
+
+bool baseline_among_three(const CaseTruth& t, const Baseline& b) {
+  const auto end = b.ranking.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(3, b.ranking.size()));
+  return std::find(b.ranking.begin(), end, t.effects.front()) != end;
+}
+
+enum class Bar { at_least, at_most };
+
+/// A row of the table.
+ScoreLine line(std::string key, std::string what, Bar bar, double must, double aim, ScoreValue score,
+               std::optional<ScoreValue> best_rmse = {}) {
+  const auto text = [&](double b) { return io::format(bar == Bar::at_least ? "%.2f" : "at most %.2f", b); };
+  ScoreLine l{std::move(key), std::move(what), text(must), text(aim), score, {}, {}, best_rmse};
+  if (score.value) {
+    const auto meets = [&](double b) { return bar == Bar::at_most ? *score.value <= b : *score.value >= b; };
+    l.meets_must = meets(must);
+    l.meets_aim = meets(aim);
+  }
+  return l;
+}
+
+ScoreLine calibration_line(const std::vector<ScoredCase>& cases) {
+  std::vector<Claim> claims;
+  for (const ScoredCase& c : cases) claims.push_back({c.prediction.probability, right(c.truth, c.prediction)});
+  return line("ece", "calibration error (ECE) over all parts", Bar::at_most, 0.06, 0.03, calibration_score(claims));
+}
+
+ScoreLine closure_line(const Cases& cases) {
+  std::vector<double> values;
+  for (const ScoredCase* c : cases)
+    if (const auto v = closure(*c)) values.push_back(*v);
+  return line("closure_median", "how far: closure as a share of the truth's, median", Bar::at_least, 0.80, 0.95,
+              resampled(values.size(), [&](const std::vector<std::size_t>& which) -> std::optional<double> {
+                std::vector<double> some;
+                for (const std::size_t i : which) some.push_back(values[i]);
+                return io::median(std::move(some));
+              }));
+}
+
+ScoreLine first_line(const char* key, const char* what, double must, double aim, const Cases& cases) {
+  return line(key, what, Bar::at_least, must, aim, share(cases, named_alone), of_baseline(cases, baseline_first));
+}
+
+/// With the case of `singles` of the same robot, if the same draw flew.
+ScoreLine redeclared_line(const Cases& cases, const Cases& singles) {
+  std::map<std::pair<std::uint64_t, std::uint64_t>, const Answer*> by_robot;
+  for (const ScoredCase* c : singles) by_robot[{c->truth.seed, c->truth.draw}] = &c->prediction;
+  std::size_t unchanged = 0, count = 0;
+  for (const ScoredCase* c : cases) {
+    const auto single = by_robot.find({c->truth.seed, c->truth.draw});
+    if (single == by_robot.end()) continue;
+    ++count;
+    unchanged += single->second->kind == c->prediction.kind && same(single->second->effects, c->prediction.effects);
+  }
+  return line("redeclared_same", "verdict unchanged when only the declarations change", Bar::at_least, 0.90, 0.98,
+              proportion(unchanged, count));
+}
+
+/// A maker's word, and how the channels and regimes of a diagnosis that it covers begin.
+constexpr std::pair<const char*, const char*> kCovers[] = {
+    {"mocap", "path_"},          {"mocap", "rotate_"},       {"gyro", "torque_"},     {"gyro", "rotate_"},
+    {"accelerometer", "force_"}, {"accelerometer", "path_"}, {"current", "current_"}, {"current", "battery"},
+    {"place", "height"},         {"place", "ceiling"},       {"place", "wall"},       {"temperature", "time"},
+    {"stroke", "always"}};
+
+bool covered(const Names& sealed, const std::string& said) {
+  return std::ranges::any_of(sealed, [&](const std::string& word) {
+    return word == said ||
+           std::ranges::any_of(kCovers, [&](const auto& c) { return c.first == word && said.starts_with(c.second); });
+  });
+}
+
+bool described(const ScoredCase& c) {
+  const std::optional<Where>& w = c.prediction.where;
+  return w && covered(c.truth.channels, w->channel) && covered(c.truth.regimes, w->regime);
+}
+
+bool next_brings_truth(const ScoredCase& c) {
+  const std::optional<Answer>& v = c.after_next;
+  return v && names_set(v->kind) && same(v->effects, c.truth.effects);
+}
+
+ScoreLine pairs_line(const Cases& cases, double must = 0.75) {
+  std::vector<std::pair<Names, Names>> own;
+  std::vector<std::pair<Names, Names>> others;
+  for (const ScoredCase* c : cases) {
+    own.emplace_back(at_work(c->prediction), c->truth.effects);
+    if (const std::optional<Baseline>& b = c->prediction.best_rmse) others.emplace_back(b->named, c->truth.effects);
+  }
+  return line("pairs_f1", "pairs: F1 of names", Bar::at_least, must, 0.92, f1_score(own),
+              others.empty() ? std::nullopt : std::optional(f1_score(others)));
+}
+
+/// Standard error of the difference of two scores as if independent; they share cases, so it is rather too large.
+double standard_error(const ScoreValue& a, const ScoreValue& b) {
+  return std::hypot(a.high - a.low, b.high - b.low) / (2 * io::kNormal975);
+}
+
+std::optional<std::vector<std::string>> unbeaten_lines(const std::vector<ScoreLine>& lines) {
+  std::optional<bool> alarms;  // whether there are too many false alarms; none: not known
+  std::vector<std::string> keys;
+  for (const ScoreLine& l : lines) {
+    const std::optional<ScoreValue>& b = l.best_rmse;
+    if (!b || !b->value || !l.score.value) continue;
+    if (l.key.starts_with("false_alarm")) alarms = alarms.value_or(false) || *b->value > kFalseAlarms;
+    else if (!(*l.score.value - *b->value > standard_error(l.score, *b))) keys.push_back(l.key);
+  }
+  if (!alarms || *alarms) return std::nullopt;
+  return keys;
+}
+
+bool within_noise(const ScoredCase& c) { return c.change_over_noise && *c.change_over_noise < kBeyondNoise; }
+
+std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases);
+std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases);
+
+}  // namespace
+
+Answer answer_of(const Prediction& p) {
+  const gap::Diagnosis& d = p.diagnosis;
+  Answer a;
+  a.kind = p.crashed ? "crashed" : d.verdict.remainder ? "remainder" : name_of(d.verdict.kind);
+  a.effects = d.verdict.effects;
+  a.probability = d.verdict.probability;
+  a.nominal = d.nominal_loss;
+  a.refit = d.refit_loss;
+  if (d.refit_loss) a.floor = d.noise_floor;
+  if (!d.unexplained.empty()) a.where = Where{d.unexplained.front().channel, d.unexplained.front().regime};
+  if (d.next) a.manoeuvre = d.next->manoeuvre;
+  a.best_rmse = p.best_rmse;
+  for (const gap::Suspect& s : d.suspects) a.suspects.push_back(s.effect);
+  for (const gap::RankedHypothesis& h : d.hypotheses) {
+    a.hypotheses.push_back(h);
+    if (h.kind == gap::HypothesisKind::none) a.none = h.probability;
+    if (h.kind == gap::HypothesisKind::parameters) a.parameters = h.probability;
+    if (h.kind == gap::HypothesisKind::unknown) a.unknown = h.probability;
+    if (h.kind != gap::HypothesisKind::effect) continue;
+    if (const auto same = std::ranges::find(a.sets, h.effects, &gap::RankedHypothesis::effects); same != a.sets.end()) {
+      same->probability += h.probability;  // hypotheses with and without a remainder count together
+      continue;
+    }
+    a.sets.push_back(h);
+  }
+  return a;
+}
+
+bool abstains(const Answer& a) { return a.kind == "group" || a.probability < 0.5; }
+
+bool right(const CaseTruth& t, const Answer& p) {
+  if (t.part.starts_with("unchanged")) return p.kind == "none" || p.kind == "parameters";
+  if (t.part == "changed_withheld" || t.part == "changed_outside") return p.kind == "unknown" || p.kind == "remainder";
+  if (t.part == "none" || t.part == "conventions") return p.kind == "none" || p.kind == "parameters";
+  if (t.part == "parameters" || t.part == "own_parameters") return p.kind == "parameters";
+  if (t.part == "withheld" || t.part == "outside") return p.kind == "unknown";
+  return (names_set(p.kind) && same(p.effects, t.effects)) || (p.kind == "group" && holds(p.effects, t.effects));
+}
+
+std::optional<double> realised_nats(const ScoredCase& c) {
+  if (c.truth.effects.size() != 1) return std::nullopt;
+  std::optional<double> own, rival;
+  for (const gap::RankedHypothesis& h : c.prediction.hypotheses) {
+    std::optional<double>& best = std::ranges::count(h.effects, c.truth.effects.front()) > 0 ? own : rival;
+    best = std::max(best.value_or(h.explained()), h.explained());
+  }
+  if (!own || !rival) return std::nullopt;
+  return *own - *rival;
+}
+
+std::optional<double> closure(const ScoredCase& c) {
+  if (c.prediction.kind == "data") return 0;
+  const gap::RankedHypothesis* truth = fitted(c.prediction, c.truth.effects);
+  std::optional<double> refit = c.prediction.refit;
+  if ((truth == nullptr || !truth->loss) && c.true_fit) {
+    truth = fitted(*c.true_fit, c.truth.effects);
+    refit = c.true_fit->refit;
+  }
+  if (truth == nullptr || !truth->loss || !refit || !c.prediction.refit) return std::nullopt;
+  const double closable = *refit - *truth->loss;
+  if (closable < kSureOfGain * truth->loss_gain_sd || closable <= 0) return std::nullopt;
+  const gap::RankedHypothesis* named = fitted(c.prediction, at_work(c.prediction));
+  if (named == nullptr || !named->loss) return 0;
+  return (*c.prediction.refit - *named->loss) / closable;
+}
+
+bool needs_true_fit(const ScoredCase& c) {
+  if ((c.truth.part != "singles" && c.truth.part != "changed") || within_noise(c)) return false;
+  const gap::RankedHypothesis* truth = fitted(c.prediction, c.truth.effects);
+  return c.prediction.kind != "data" && (truth == nullptr || !truth->loss);
+}
+
+bool needs_change_over_noise(const ScoredCase& c) {
+  return c.truth.part.starts_with("changed") && c.truth.effects.size() == 1 && c.truth.part != "changed_withheld" &&
+         c.truth.part != "changed_outside" && !right(c.truth, c.prediction);
+}
+
+Scores score(const std::vector<ScoredCase>& cases) {
+  std::vector<ScoredCase> absolute, contrasts;
+  for (const ScoredCase& c : cases)
+    if (!within_noise(c)) (std::ranges::count(kContrastParts, c.truth.part) > 0 ? contrasts : absolute).push_back(c);
+  Scores s;
+  if (!absolute.empty()) s.lines = absolute_lines(absolute);
+  if (!contrasts.empty()) std::ranges::move(contrast_lines(contrasts), std::back_inserter(s.lines));
+  s.unbeaten = unbeaten_lines(s.lines);
+  return s;
+}
+
+namespace {
+
+/// How the plans of cases compare with what became of them; nothing without plans.
+void add_foresight(const std::string& key, const std::string& what, const Cases& cases, std::vector<ScoreLine>& lines) {
+  constexpr std::ptrdiff_t kFewestWrong = 10;
+  std::vector<Claim> claims;
+  std::vector<double> expected, realised;
+  for (const ScoredCase* c : cases) {
+    const std::optional<double> nats = realised_nats(*c);
+    if (!c->foreseen || !nats) continue;
+    claims.push_back({c->foreseen->probability, named_alone(*c)});
+    expected.push_back(c->foreseen->nats);
+    realised.push_back(*nats);
+  }
+  if (claims.empty()) return;
+  const auto some = [](const auto& all, const std::vector<std::size_t>& which) {
+    std::decay_t<decltype(all)> chosen;
+    for (const std::size_t i : which) chosen.push_back(all[i]);
+    return chosen;
+  };
+  lines.push_back(line(key + "_rank", what + ": rank correlation of expected and realised nats", Bar::at_least, 0.60,
+                       0.80, resampled(claims.size(), [&](const std::vector<std::size_t>& which) {
+                         return rank_correlation(some(expected, which), some(realised, which));
+                       })));
+  const std::ptrdiff_t wrong = std::ranges::count(claims, false, &Claim::right);
+  lines.push_back(
+      line(key + "_auc", what + ": area under the curve for \"named first\"", Bar::at_least, 0.75, 0.90,
+           wrong < kFewestWrong ? ScoreValue{} : resampled(claims.size(), [&](const std::vector<std::size_t>& which) {
+             return area_under_curve(some(claims, which));
+           })));
+  lines.push_back(line(key + "_ece", what + ": calibration error of \"named first\"", Bar::at_most, 0.06, 0.03,
+                       calibration_score(claims)));
+  ScoreLine hope{key + "_hope", what + ": expected over realised nats, of medians", "", "",
+                 resampled(claims.size(), [&](const std::vector<std::size_t>& which) -> std::optional<double> {
+                   const double brought = io::median(some(realised, which));
+                   if (!(brought > 0)) return std::nullopt;
+                   return io::median(some(expected, which)) / brought;
+                 })};
+  lines.push_back(std::move(hope));
+}
+
+std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases) {
+  std::vector<ScoreLine> l;
+  const Cases singles = of_parts(cases, {"singles"}), strange = of_parts(cases, {"withheld", "outside"}),
+              hover = of_parts(cases, {"hover"});
+  l.push_back(first_line("top1_mocap_imu", "right effect first, mocap and IMU", 0.85, 0.95, singles));
+  l.push_back(first_line("top1_current", "right effect first, current logged too", 0.88, 0.97,
+                         of_parts(cases, {"singles_current"})));
+  l.push_back(line("group_top1", "right group first", Bar::at_least, 0.92, 0.98, share(singles, right_group),
+                   of_baseline(singles, baseline_group)));
+  l.push_back(line("top3", "right effect among three", Bar::at_least, 0.95, 0.99, share(singles, among_three),
+                   of_baseline(singles, baseline_among_three)));
+  l.push_back(
+      first_line("top1_typical", "right effect first at typical magnitude", 0.80, 0.93, of_parts(cases, {"typical"})));
+  l.push_back(line("suspects", "given that an effect is missing: it is among the three named", Bar::at_least, 0.60,
+                   0.80, share(singles, [](const ScoredCase& c) {
+                     return std::ranges::count(c.prediction.suspects, c.truth.effects.front()) > 0;
+                   })));
+  for (const auto& [part, what] : {std::pair{"none", "false alarm: none"},
+                                   {"parameters", "false alarm: parameters"},
+                                   {"own_parameters", "false alarm: own parameters"},
+                                   {"conventions", "false alarm: other conventions"}}) {
+    const Cases harmless = of_parts(cases, {part});
+    l.push_back(line(std::string("false_alarm_") + part, what, Bar::at_most, kFalseAlarms, 0.02,
+                     share(harmless, false_alarm),
+                     of_baseline(harmless, [](const CaseTruth&, const Baseline& b) { return !b.named.empty(); })));
+  }
+  l.push_back(redeclared_line(of_parts(cases, {"redeclared"}), singles));
+  l.push_back(line("unknown", "withheld or outside: \"unknown\"", Bar::at_least, 0.75, 0.90,
+                   share(strange, [](const ScoredCase& c) { return c.prediction.kind == "unknown"; })));
+  l.push_back(line("unknown_wrong", "withheld or outside: a wrong name above 0.8", Bar::at_most, 0.05, 0.02,
+                   share(strange, [](const ScoredCase& c) {
+                     return names_effects(c.prediction) && c.prediction.probability > kConfident;
+                   })));
+  Cases unknown = strange;
+  std::erase_if(unknown, [](const ScoredCase* c) { return c->prediction.kind != "unknown"; });
+  l.push_back(line("unknown_where", "unknown: where it acts is described as sealed", Bar::at_least, 0.80, 0.95,
+                   share(unknown, described)));
+  l.push_back(calibration_line(cases));
+  l.push_back(closure_line(singles));
+  l.push_back(pairs_line(of_parts(cases, {"pairs"})));
+  l.push_back(line("hover_abstain", "hover only: abstains", Bar::at_least, 0.85, 0.95,
+                   share(hover, [](const ScoredCase& c) { return abstains(c.prediction); })));
+  l.push_back(line("hover_next", "hover only: the proposed flight, flown, brings the truth to first place",
+                   Bar::at_least, 0.60, 0.85, share(hover, next_brings_truth)));
+  Cases followed = singles;
+  std::erase_if(followed, [](const ScoredCase* c) { return !c->after_next; });
+  if (!followed.empty())
+    l.push_back(line("undecided_next", "undecided singles: the proposal, flown, brings the truth to first place",
+                     Bar::at_least, 0.75, 0.90, share(followed, next_brings_truth)));
+  add_foresight("plan", "plan", singles, l);
+  return l;
+}
+
+std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases) {
+  std::vector<ScoreLine> l;
+  const auto of = [&](const char* part) { return of_parts(cases, {part}); };
+  const Cases changed = of("changed"), strange = of_parts(cases, {"changed_withheld", "changed_outside"});
+  l.push_back(first_line("contrast_top1", "contrast: right effect first", 0.85, 0.95, changed));
+  l.push_back(line("contrast_group_top1", "contrast: right group first", Bar::at_least, 0.92, 0.98,
+                   share(changed, right_group), of_baseline(changed, baseline_group)));
+  l.push_back(line("contrast_top3", "contrast: right effect among three", Bar::at_least, 0.97, 0.99,
+                   share(changed, among_three), of_baseline(changed, baseline_among_three)));
+  l.push_back(first_line("contrast_short_reference", "contrast: right first, reference of 10 s", 0.75, 0.90,
+                         of("changed_short_reference")));
+  l.push_back(
+      first_line("contrast_short_test", "contrast: right first, test of 10 s", 0.75, 0.90, of("changed_short_test")));
+  l.push_back(first_line("contrast_calm_top1", "contrast: right first, reference in hover and on slow paths", 0.70,
+                         0.85, of("changed_calm")));
+  for (const auto& [part, key, what] :
+       {std::tuple{"unchanged", "false_alarm_contrast", "contrast: harmless session, anything named"},
+        {"unchanged_calm", "false_alarm_contrast_calm", "contrast: harmless, reference in hover and on slow paths"}}) {
+    const Cases harmless = of(part);
+    l.push_back(line(key, what, Bar::at_most, kFalseAlarms, 0.02, share(harmless, false_alarm),
+                     of_baseline(harmless, [](const CaseTruth&, const Baseline& b) { return !b.named.empty(); })));
+  }
+  const auto left = [](const ScoredCase& c) {
+    return c.prediction.kind == "unknown" || c.prediction.kind == "remainder";
+  };
+  l.push_back(line("contrast_unknown", "contrast, withheld or outside: \"unknown\" or a remainder", Bar::at_least, 0.75,
+                   0.90, share(strange, left)));
+  l.push_back(line("contrast_unknown_wrong", "contrast, withheld or outside: a wrong name above 0.8", Bar::at_most,
+                   0.08, 0.02, share(strange, [&](const ScoredCase& c) {
+                     return names_effects(c.prediction) && !left(c) && c.prediction.probability > kConfident;
+                   })));
+  Cases unknown = strange;
+  std::erase_if(unknown, [&](const ScoredCase* c) { return !left(*c); });
+  l.push_back(line("contrast_where", "contrast, unknown or a remainder: where it acts is as sealed", Bar::at_least,
+                   0.80, 0.95, share(unknown, described)));
+  ScoreLine ece = calibration_line(cases);
+  ece.key = "contrast_ece", ece.what = "contrast: calibration error (ECE) over all parts";
+  l.push_back(std::move(ece));
+  ScoreLine closed = closure_line(changed);
+  closed.key = "contrast_closure", closed.what = "contrast: closure as a share of the truth's, median";
+  l.push_back(std::move(closed));
+  ScoreLine pairs = pairs_line(of("changed_pairs"), 0.80);
+  pairs.key = "contrast_pairs_f1", pairs.what = "contrast: pairs, F1 of names";
+  l.push_back(std::move(pairs));
+  add_foresight("contrast_plan", "contrast, plan", changed, l);
+  return l;
+}
+
+}  // namespace
+
+}  // namespace flappy::benchmark

@@ -1,0 +1,194 @@
+#include "lab/blind/c/mechanism.hpp"
+
+#include <cstring>
+#include <mutex>
+#include <stdexcept>
+
+#include "lab/blind/c/mjcf.hpp"
+
+namespace flappy::blind::c {
+namespace {
+
+mjModel* compiled(const std::string& text) {
+  static std::mutex one_at_a_time;  // MuJoCo's parser keeps global state
+  const std::lock_guard<std::mutex> lock(one_at_a_time);
+  if (mj_version() != mjVERSION_HEADER)
+    throw std::runtime_error(std::string("family C: MuJoCo's library is ") + mj_versionString() +
+                             ", its headers are of another version");
+  const auto files = std::make_unique<mjVFS>();
+  mj_defaultVFS(files.get());
+  const char* name = "flapper.xml";
+#if mjVERSION_HEADER < 300
+  if (mj_makeEmptyFileVFS(files.get(), name, static_cast<int>(text.size())) != 0)
+    throw std::runtime_error("family C: no room for a model");
+  std::memcpy(files->filedata[mj_findFileVFS(files.get(), name)], text.data(), text.size());
+#else
+  if (mj_addBufferVFS(files.get(), name, text.data(), static_cast<int>(text.size())) != 0)
+    throw std::runtime_error("family C: no room for a model");
+#endif
+  char error[1000] = "";
+  mjModel* model = mj_loadXML(name, files.get(), error, sizeof error);
+  mj_deleteVFS(files.get());
+  if (model == nullptr) throw std::runtime_error(std::string("family C: ") + error);
+  return model;
+}
+
+Eigen::Map<Eigen::Vector3d> vector_at(mjtNum* at) { return Eigen::Map<Eigen::Vector3d>(at); }
+Eigen::Map<const Eigen::Vector3d> vector_of(const mjtNum* at) { return Eigen::Map<const Eigen::Vector3d>(at); }
+
+}  // namespace
+
+Mechanism::Mechanism(const RobotParameters& parameters, const Build& build, double step_s)
+    : model_(compiled(mjcf_text(parameters, build, step_s)), mj_deleteModel),
+      data_(mj_makeData(model_.get()), mj_deleteData),
+      added_mass_(build.added_mass) {
+  mjModel& m = *model_;
+  const std::array<std::string, 2> names = {"left", "right"};
+  for (std::size_t side = 0; side < 2; ++side) {
+    const auto joint = [&](const std::string& what) {
+      return mj_name2id(&m, mjOBJ_JOINT, (names[side] + what).c_str());
+    };
+    const int stroke = joint("_stroke"), rotation = joint("_rotation"), rotor = joint("_rotor"),
+              drive = rotor < 0 ? stroke : rotor;
+    stroke_q_[side] = m.jnt_qposadr[stroke];
+    stroke_v_[side] = m.jnt_dofadr[stroke];
+    rotation_q_[side] = m.jnt_qposadr[rotation];
+    rotation_v_[side] = m.jnt_dofadr[rotation];
+    drive_q_[side] = m.jnt_qposadr[drive];
+    drive_v_[side] = m.jnt_dofadr[drive];
+    for (std::size_t i = 0; i < kStrips; ++i)
+      strips_[side][i] = mj_name2id(&m, mjOBJ_GEOM, (names[side] + "_strip_" + std::to_string(i)).c_str());
+    std::memcpy(strip_quat_[side].data(), m.geom_quat + 4 * strips_[side].back(), sizeof strip_quat_[side]);
+  }
+  // Geoms without aerodynamic force, and the torso, have no virtual mass.
+  for (std::ptrdiff_t geom = 0; geom < m.ngeom; ++geom) {
+    mjtNum* fluid = m.geom_fluid + mjNFLUID * geom;
+    if (fluid[1] == 0 || geom == mj_name2id(&m, mjOBJ_GEOM, "torso")) std::fill(fluid + 6, fluid + mjNFLUID, 0.0);
+  }
+  mj_forward(&m, data_.get());
+}
+
+Motion Mechanism::motion() const {
+  const mjData& d = *data_;
+  Motion now;
+  now.position_W = vector_of(d.qpos);
+  now.q_WB = Eigen::Quaterniond(d.qpos[3], d.qpos[4], d.qpos[5], d.qpos[6]).normalized();
+  now.R_WB = now.q_WB.toRotationMatrix();
+  now.velocity_W = vector_of(d.qvel);
+  now.rate_B = vector_of(d.qvel + 3);
+  now.acceleration_W = vector_of(d.qacc);
+  now.turning_B = vector_of(d.qacc + 3);
+  return now;
+}
+
+Eigen::Vector3d Mechanism::strip_position(std::size_t side, std::size_t strip) const {
+  return vector_of(data_->geom_xpos + 3 * strips_[side][strip]);
+}
+
+bool Mechanism::is_finite() const {
+  for (int i = 0; i < model_->nv; ++i)
+    if (!(std::abs(data_->qvel[i]) < 1e5)) return false;
+  for (int i = 0; i < model_->nq; ++i)
+    if (!(std::abs(data_->qpos[i]) < 1e4)) return false;
+  return true;
+}
+
+void Mechanism::place(const Eigen::Vector3d& position_W, const Eigen::Quaterniond& q_WB) {
+  vector_at(data_->qpos) = position_W;
+  const double q[4] = {q_WB.w(), q_WB.x(), q_WB.y(), q_WB.z()};
+  std::memcpy(data_->qpos + 3, q, sizeof q);
+}
+
+void Mechanism::move_torso(const Motion& motion) {
+  place(motion.position_W, motion.q_WB);
+  vector_at(data_->qvel) = motion.velocity_W;
+  vector_at(data_->qvel + 3) = motion.rate_B;
+}
+
+void Mechanism::set_wind(const Eigen::Vector3d& wind_W) { vector_at(model_->opt.wind) = wind_W; }
+
+void Mechanism::scale_air(std::size_t side, std::size_t strip, double factor) {
+  model_->geom_fluid[mjNFLUID * strips_[side][strip]] = factor;
+}
+
+void Mechanism::twist(std::size_t side, double angle_rad) {
+  const double by[4] = {std::cos(angle_rad / 2), 0, std::sin(angle_rad / 2), 0};
+  mju_mulQuat(model_->geom_quat + 4 * strips_[side].back(), by, strip_quat_[side].data());
+}
+
+void Mechanism::set_friction(std::size_t side, double torque_Nm) {
+  model_->dof_frictionloss[drive_v_[side]] = torque_Nm;
+}
+
+void Mechanism::step(const std::array<double, 2>& motor_Nm, const std::array<double, 2>& spring_Nm,
+                     const Wrench& wrench, const Motion* held) {
+  mjModel* m = model_.get();
+  mjData* d = data_.get();
+  mj_step1(m, d);
+  if (added_mass_ > 0) add_virtual_mass();
+  mju_zero(d->qfrc_applied, static_cast<int>(m->nv));
+  for (std::size_t side = 0; side < 2; ++side) {
+    d->qfrc_applied[drive_v_[side]] += motor_Nm[side];
+    d->qfrc_applied[stroke_v_[side]] += spring_Nm[side];
+  }
+  // forces at the torso's origin in W, but torques in B
+  vector_at(d->qfrc_applied) = wrench.force_W;
+  Eigen::Matrix3d R_WB;
+  mju_quat2Mat(R_WB.data(), d->qpos + 3);  // MuJoCo writes row by row, Eigen reads columns: this is the transpose
+  vector_at(d->qfrc_applied + 3) = R_WB * wrench.torque_W;
+  mj_step2(m, d);
+  if (held != nullptr) hold_torso(*held);
+}
+
+// M += J^T (m_A, I_A) J, virtual masses and moments of each ellipsoid, implicitly.
+void Mechanism::add_virtual_mass() {
+  mjModel* m = model_.get();
+  mjData* d = data_.get();
+  const int nv = static_cast<int>(m->nv);
+  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, 32> along(3, nv), about(3, nv);
+  for (const auto& wing : strips_)
+    for (const std::ptrdiff_t geom : wing) {
+      mj_jac(m, d, along.data(), about.data(), d->geom_xpos + 3 * geom, m->geom_bodyid[geom]);
+      const mjtNum* fluid = m->geom_fluid + mjNFLUID * geom;
+      const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R(d->geom_xmat + 9 * geom);
+      const double scale = added_mass_ * m->opt.density * fluid[0];
+      const Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, 32> v = R.transpose() * along,
+                                                                             w = R.transpose() * about;
+      const Eigen::Vector3d mass = scale * vector_of(fluid + 6), moment = scale * vector_of(fluid + 9);
+      const auto add = [&](int i, int j, mjtNum& to) {
+        double sum = 0;
+        for (int k = 0; k < 3; ++k) sum += mass[k] * v(k, i) * v(k, j) + moment[k] * w(k, i) * w(k, j);
+        to += sum;
+      };
+      for (int i = 0; i < nv; ++i)
+#if mjVERSION_HEADER < 300  // a row of M from its diagonal on, by parents
+        for (int j = i, at = m->dof_Madr[i]; j >= 0; j = m->dof_parentid[j]) add(i, j, d->qM[at++]);
+#else  // its columns as listed
+        for (int at = m->M_rowadr[i]; at < m->M_rowadr[i] + m->M_rownnz[i]; ++at) add(i, m->M_colind[at], d->M[at]);
+#endif
+    }
+  mj_factorM(m, d);
+}
+
+// For a prescribed torso t, all other coordinates w change by M_ww da_w = -M_wt da_t.
+void Mechanism::hold_torso(const Motion& held) {
+  mjModel* m = model_.get();
+  mjData* d = data_.get();
+  const int nv = static_cast<int>(m->nv), rest = nv - 6;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 32, 32> M(nv, nv);
+  for (int k = 0; k < nv; ++k) {  // by columns, as each version keeps M in another form
+    const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 32, 1> unit = Eigen::VectorXd::Unit(nv, k);
+    mj_mulM(m, d, M.col(k).data(), unit.data());
+  }
+  Eigen::Matrix<double, 6, 1> change;
+  change.head<3>() = held.acceleration_W - vector_of(d->qacc);
+  change.tail<3>() = held.turning_B - vector_of(d->qacc + 3);
+  const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 32, 1> other =
+      M.bottomRightCorner(rest, rest).ldlt().solve(-M.bottomLeftCorner(rest, 6) * change);
+  for (int i = 0; i < rest; ++i) {
+    d->qvel[6 + i] += m->opt.timestep * other[i];
+    d->qpos[7 + i] += m->opt.timestep * m->opt.timestep * other[i];  // valid as every joint after the first is a hinge
+  }
+}
+
+}  // namespace flappy::blind::c

@@ -1,0 +1,106 @@
+// One robot in MuJoCo: an MJCF text of its parameters, one mjModel and one mjData. A wing has two ellipsoids of the
+// fluid model [1], at nodes and with areas of the Gauss quadrature for the planform's moments r00, r11, r22, r33: force
+// and moment about the shoulder are the whole planform's where of second degree in the radius. Chord: of an ellipse of
+// the wing's length and area, its middle 0.55 mean chords behind the leading edge. MuJoCo omits the force of the
+// virtual mass under acceleration [1]; only the effect added_mass adds it. Up to 3.13 MuJoCo's lift has a floor of 1e-15 in
+// a denominator, which takes lift from these wings below 0.8 m/s: other versions have other robots (Family::engine).
+// [1] MuJoCo documentation, Computation, Fluid forces: ellipsoid model; after Andersen, Pesavento, Wang, J. Fluid Mech.
+// 541 (2005).
+#pragma once
+
+#include <mujoco/mujoco.h>
+
+#include <memory>
+#include <string>
+
+#include "lab/blind/c/c_effects.hpp"
+#include "lab/blind/c/c_robot_parameters.hpp"
+
+namespace flappy::blind::c {
+
+/// Changes to the bodies by effects, drawn once for a robot.
+struct Build {
+  double damage = 0;                 ///< share of the outer ellipse's area
+  std::size_t damaged = 0;           ///< side with the damage
+  double backlash_rad = 0;           ///< 0: the rotor is rigidly coupled to the stroke hinge
+  double spar_stiffness_Nm_rad = 0;  ///< 0: rigid
+  double leg_mass_kg = 0;            ///< 0: part of the torso
+  double body_drag_m2 = 0;           ///< C_d A of the torso
+  double rotational_lift = 0;        ///< share of pi (0.75 - 0.25)
+  double added_mass = 0;             ///< share of the virtual mass
+  double stop_softness = 1;          ///< divides the stiffness of the stops
+};
+
+struct Wrench {
+  Eigen::Vector3d force_W = Eigen::Vector3d::Zero(), torque_W = Eigen::Vector3d::Zero();
+};
+
+struct Motion {
+  Eigen::Vector3d position_W = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d R_WB = Eigen::Matrix3d::Identity();
+  Eigen::Quaterniond q_WB = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d velocity_W = Eigen::Vector3d::Zero(), rate_B = Eigen::Vector3d::Zero();
+  Eigen::Vector3d acceleration_W = Eigen::Vector3d::Zero(),
+                  turning_B = Eigen::Vector3d::Zero();  ///< accelerations of the previous step
+};
+
+class Mechanism {
+ public:
+  /// Semi-implicit Euler, first order. Errors against a quarter of this step, in hover with the torso held: mean thrust
+  /// 0.2 % of the weight, first harmonics 1 %, stroke 0.06 %.
+  static constexpr double kStep_s = 5e-5;
+  static constexpr double kGravity_m_s2 = 9.81;
+  /// Ellipsoids of a wing; 0 is nearest to the shoulder.
+  static constexpr std::size_t kStrips = 2;
+
+  Mechanism(const RobotParameters& parameters, const Build& build, double step_s = kStep_s);
+
+  mjModel& model() { return *model_; }
+  const mjModel& model() const { return *model_; }
+  const mjData& data() const { return *data_; }
+
+  Motion motion() const;
+  double stroke(std::size_t side) const { return data_->qpos[stroke_q_[side]]; }
+  double stroke_rate(std::size_t side) const { return data_->qvel[stroke_v_[side]]; }
+  double rotation(std::size_t side) const { return data_->qpos[rotation_q_[side]]; }
+  double rotation_rate(std::size_t side) const { return data_->qvel[rotation_v_[side]]; }
+  /// Angle and rate of the rotor, behind the gear.
+  double drive_angle(std::size_t side) const { return data_->qpos[drive_q_[side]]; }
+  double drive_rate(std::size_t side) const { return data_->qvel[drive_v_[side]]; }
+  /// Torque of all passive forces, almost all of the air, about the rotation hinge in the previous step.
+  double hinge_torque(std::size_t side) const { return data_->qfrc_passive[rotation_v_[side]]; }
+  Eigen::Vector3d strip_position(std::size_t side, std::size_t strip) const;
+  bool is_finite() const;
+
+  void place(const Eigen::Vector3d& position_W, const Eigen::Quaterniond& q_WB);
+  void move_torso(const Motion& motion);
+  void set_wind(const Eigen::Vector3d& wind_W);
+  void scale_air(std::size_t side, std::size_t strip, double factor);
+  /// Rotates the outermost ellipsoid about the span.
+  void twist(std::size_t side, double angle_rad);
+  void set_friction(std::size_t side, double torque_Nm);
+
+  /// Advances one step. Motor torques are behind the gear; `wrench` acts on the torso at its origin. `held` prescribes
+  /// the torso's acceleration; motion() still returns that of a free torso.
+  void step(const std::array<double, 2>& motor_Nm, const std::array<double, 2>& spring_Nm, const Wrench& wrench,
+            const Motion* held = nullptr);
+
+ private:
+  void add_virtual_mass();
+  void hold_torso(const Motion& held);
+
+  std::unique_ptr<mjModel, void (*)(mjModel*)> model_;
+  std::unique_ptr<mjData, void (*)(mjData*)> data_;
+  std::array<int, 2> stroke_q_{}, stroke_v_{}, rotation_q_{}, rotation_v_{}, drive_q_{}, drive_v_{};
+  std::array<std::array<std::ptrdiff_t, kStrips>, 2> strips_{};
+  std::array<std::array<double, 4>, 2> strip_quat_{};
+  double added_mass_ = 0;
+};
+
+/// Ellipsoid of a wing: radius over wing length, and area over length times mean chord.
+struct Strip {
+  double radius, area;
+};
+std::array<Strip, Mechanism::kStrips> strips_of(const Planform& planform);
+
+}  // namespace flappy::blind::c

@@ -1,0 +1,821 @@
+// Robots of family C: the engine's model is the vehicle's file, the physics holds where it must, and effects, declarations and
+// arguments do what they say.
+#include "lab/blind/c/family_c.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "lab/blind/c/c_contrast.hpp"
+#include "lab/blind/c/c_escape.hpp"
+#include "lab/blind/c/c_flight.hpp"
+#include "lab/blind/c/mjcf.hpp"
+#include "lab/blind/c/c_session.hpp"
+#include "io/parallel.hpp"
+
+namespace flappy::blind::c {
+namespace {
+
+const std::filesystem::path kVehicle =
+    std::filesystem::path(FLAPPY_SOURCE_DIR) / "configs/vehicles/hummingbird_nominal.toml";
+// Long enough for all effects, short enough for all of them in a test.
+constexpr Length kShort = {0.1, 0.1};
+
+Assignment plain() {
+  Assignment a;
+  a.vehicle_file = kVehicle;
+  a.seed = 5;
+  a.power = a.wings = true;
+  return a;
+}
+
+Assignment with(const std::string& effect, double magnitude) {
+  Assignment a = plain();
+  a.effects = {{effect, magnitude}};
+  return a;
+}
+
+flightlog::FlightLog short_log(const Assignment& a, std::size_t flight = 0) {
+  return fly_one(a, flight, false, kShort).flight.log;
+}
+
+const RobotParameters& nominal() {
+  static const RobotParameters parameters = read_parameters(kVehicle);
+  return parameters;
+}
+
+/// Motors and springs as those of a robot without effects.
+struct Bench {
+  explicit Bench(const RobotParameters& f, double every_s = Mechanism::kStep_s)
+      : parameters(f), mechanism(parameters, {}, every_s), drive(parameters, Magnitudes({}), 1, 0), step_s(every_s) {}
+
+  /// Calls `each` after every step.
+  template <class Each>
+  void run(const Inputs& inputs, double until_s, bool held, const Each& each) {
+    const long steps = std::lround(until_s / step_s), tick = std::lround(1e-3 / step_s);
+    for (long i = 0; i < steps; ++i) {
+      const double now_s = static_cast<double>(i) * step_s;
+      if (i % tick == 0)
+        drive.command(now_s, beat_voltages(inputs, beat_phase(now_s, parameters.flapping_Hz), parameters));
+      const auto torques = drive.torques(now_s, step_s, {mechanism.drive_angle(0), mechanism.drive_angle(1)},
+                                         {mechanism.drive_rate(0), mechanism.drive_rate(1)});
+      const Motion still;
+      mechanism.step(torques,
+                     {-parameters.sides[0].spring.positive_Nm_rad * mechanism.stroke(0),
+                      -parameters.sides[1].spring.positive_Nm_rad * mechanism.stroke(1)},
+                     {}, held ? &still : nullptr);
+      each(now_s);
+      if (held) mechanism.move_torso(still);
+    }
+  }
+  /// Over the robot's weight, with the torso held, over ten beats after ten.
+  double thrust(const Inputs& inputs) {
+    double sum = 0, count = 0;
+    run(inputs, 20 / parameters.flapping_Hz, true, [&](double now_s) {
+      if (now_s < 10 / parameters.flapping_Hz) return;
+      sum += mechanism.motion().acceleration_W.z();
+      ++count;
+    });
+    return 1 + sum / count / Mechanism::kGravity_m_s2;
+  }
+
+  RobotParameters parameters;
+  Mechanism mechanism;
+  Drive drive;
+  double step_s;
+};
+
+struct Momentum {
+  Eigen::Vector3d linear = Eigen::Vector3d::Zero(), place = Eigen::Vector3d::Zero();
+  double of_wings = 0;
+};
+
+Momentum momentum(const Mechanism& mechanism) {
+  Momentum sum;
+  const mjModel& m = mechanism.model();
+  for (int body = 1; body < m.nbody; ++body) {
+    mjtNum velocity[6];
+    mj_objectVelocity(&m, const_cast<mjData*>(&mechanism.data()), mjOBJ_BODY, body, velocity,
+                      0);  // of the centre of mass
+    const Eigen::Vector3d p = m.body_mass[body] * Eigen::Vector3d(velocity[3], velocity[4], velocity[5]);
+    sum.linear += p;
+    if (body > 1) sum.of_wings = std::max(sum.of_wings, p.norm());
+    sum.place += m.body_mass[body] * Eigen::Vector3d(mechanism.data().xipos + 3 * body);
+  }
+  return sum;
+}
+
+TEST(FamilyC, ModelHasTheFilesMassesAndInertias) {
+  const Mechanism mechanism(nominal(), {});
+  const mjModel& m = mechanism.model();
+  double mass = 0;
+  for (int body = 1; body < m.nbody; ++body) mass += m.body_mass[body];
+  EXPECT_NEAR(mass, 12.448e-3, 1e-6);
+  const std::vector<std::pair<std::string, RigidBody>> bodies = {{"torso", nominal().torso},
+                                                                 {"left_edge", nominal().sides[0].leading_edge},
+                                                                 {"right_edge", nominal().sides[1].leading_edge},
+                                                                 {"left_wing", nominal().sides[0].wing},
+                                                                 {"right_wing", nominal().sides[1].wing}};
+  for (const auto& [name, body] : bodies) {
+    const int id = mj_name2id(&m, mjOBJ_BODY, name.c_str());
+    ASSERT_GE(id, 0) << name;
+    EXPECT_NEAR(m.body_mass[id], body.mass_kg, 1e-12) << name;
+    const mjtNum* q = m.body_iquat + 4 * id;
+    const Eigen::Matrix3d R = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
+    const Eigen::Matrix3d inertia = R * Eigen::Vector3d(m.body_inertia + 3 * id).asDiagonal() * R.transpose();
+    EXPECT_LT((inertia - body.inertia_kg_m2).norm(), 1e-6 * body.inertia_kg_m2.norm()) << name;
+    EXPECT_LT((Eigen::Vector3d(m.body_ipos + 3 * id) - body.com_m).norm(), 1e-12) << name;
+  }
+}
+
+TEST(FamilyC, EllipsoidsHaveThePlanformsMoments) {
+  const Planform& p = nominal().sides[0].planform;
+  double r0 = 0, r1 = 0, r2 = 0, r3 = 0;
+  for (const Strip& s : strips_of(p)) {
+    r0 += s.area;
+    r1 += s.area * s.radius;
+    r2 += s.area * s.radius * s.radius;
+    r3 += s.area * s.radius * s.radius * s.radius;
+  }
+  EXPECT_NEAR(r0, p.r00, 1e-12);
+  EXPECT_NEAR(r1, p.r11, 1e-12);
+  EXPECT_NEAR(r2, p.r22, 1e-12);
+  EXPECT_NEAR(r3, p.r33, 1e-12);
+}
+
+TEST(FamilyC, FallsFreelyWithoutAir) {
+  Mechanism mechanism(nominal(), {});
+  mechanism.model().opt.density = mechanism.model().opt.viscosity = 0;
+  const double before = momentum(mechanism).place.z();
+  for (long i = 0; i < std::lround(0.1 / Mechanism::kStep_s); ++i) mechanism.step({0, 0}, {0, 0}, {});
+  const double fallen = (before - momentum(mechanism).place.z()) / nominal().mass_kg();
+  EXPECT_NEAR(fallen, 0.5 * 9.81 * 0.1 * 0.1, 1e-4);
+}
+
+TEST(FamilyC, KeepsMomentumWithoutAirAndWeight) {
+  const auto lost = [](double step_s) {
+    Bench bench(nominal(), step_s);
+    mjOption& option = bench.mechanism.model().opt;
+    option.density = option.viscosity = option.gravity[2] = 0;
+    double wings = 0, all = 0;
+    bench.run({10, 0, 0, 0}, 0.04, false, [&](double) {
+      const Momentum now = momentum(bench.mechanism);
+      wings = std::max(wings, now.of_wings);
+      all = std::max(all, now.linear.norm());
+    });
+    EXPECT_GT(wings, 1e-4);  // kg m/s
+    return all / wings;
+  };
+  const double coarse = lost(Mechanism::kStep_s), fine = lost(Mechanism::kStep_s / 5);
+  EXPECT_LT(fine, 0.02);
+  EXPECT_LT(fine, 0.25 * coarse);
+}
+
+TEST(FamilyC, TenVoltsCarryTheWeightInSteps) {
+  const double thrust = Bench(nominal()).thrust({10, 0, 0, 0});
+  EXPECT_NEAR(thrust, 1.0, 0.03);
+  EXPECT_NEAR(Bench(nominal(), Mechanism::kStep_s / 2).thrust({10, 0, 0, 0}), thrust, 0.005);
+}
+
+TEST(FamilyC, SymmetricRobotFliesSymmetrically) {
+  RobotParameters f = nominal();
+  const auto mirrored = [](RigidBody body) {
+    body.com_m.y() *= -1;
+    for (const auto& [i, j] : {std::pair{0, 1}, std::pair{1, 2}})
+      body.inertia_kg_m2(i, j) = body.inertia_kg_m2(j, i) = -body.inertia_kg_m2(i, j);
+    return body;
+  };
+  f.torso.com_m.y() = 0;
+  for (const auto& [i, j] : {std::pair{0, 1}, std::pair{1, 2}})
+    f.torso.inertia_kg_m2(i, j) = f.torso.inertia_kg_m2(j, i) = 0;
+  f.sides[1].leading_edge = mirrored(f.sides[0].leading_edge);
+  f.sides[1].wing = mirrored(f.sides[0].wing);
+  Bench bench(f);
+  double aside = 0, along = 0, strokes = 0;
+  bench.run({10, 0, 0.2, 0}, 0.15, false, [&](double) {
+    const Motion now = bench.mechanism.motion();
+    aside = std::max({aside, std::abs(now.velocity_W.y()), std::abs(now.rate_B.x()), std::abs(now.rate_B.z())});
+    along = std::max(along, std::abs(now.rate_B.y()));
+    strokes = std::max(strokes, std::abs(bench.mechanism.stroke(0) - bench.mechanism.stroke(1)));
+  });
+  EXPECT_GT(along, 0.5);
+  EXPECT_LT(aside, 1e-5);
+  EXPECT_LT(strokes, 1e-6);
+}
+
+TEST(FamilyC, InputsTurnTheRobotAsPublished) {
+  const auto turned = [](const Inputs& inputs) {
+    Bench bench(nominal());
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    bench.run(inputs, 8 / 34.0, true, [&](double) { sum += bench.mechanism.motion().turning_B; });
+    return sum;
+  };
+  const Eigen::Vector3d none = turned({10, 0, 0, 0});
+  EXPECT_GT((turned({10, 1, 0, 0}) - none).x(), 0);
+  EXPECT_GT((turned({10, 0, 1, 0}) - none).y(), 0);
+  EXPECT_GT((turned({10, 0, 0, 0.1}) - none).z(), 0);
+}
+
+TEST(FamilyC, Hovers) {
+  Assignment a = plain();
+  a.hover = true;
+  a.own_parameters = true;
+  const FamilyFlight flight = fly_one(a, 0, false, {1.5, 2}).flight;
+  EXPECT_FALSE(flight.crashed) << flight.how;
+  EXPECT_EQ(flight.log.command.t_s.size(), 2000U);
+  const flightlog::FlightLog again = flightlog::parse_flight_log(flightlog::flight_log_files(flight.log), "log");
+  EXPECT_EQ(again.command, flight.log.command);
+  EXPECT_GT(flight.log.mocap.t_s.size(), 250U);
+  EXPECT_EQ(flight.log.header.ambient.walls.size(), 1U);
+}
+
+TEST(FamilyC, EffectsOfNoSizeLeaveTheSameBytesAndOthersNot) {
+  const std::vector<FamilyEffect>& effects = effect_table();
+  ASSERT_EQ(effects.size(), static_cast<std::size_t>(Effect::kCount));
+  Assignment none = plain();
+  for (const FamilyEffect& effect : effects) none.effects.emplace_back(effect.id, 0.0);
+  const std::array<flightlog::FlightLog, 3> without = {short_log(plain()), short_log(plain(), 1),
+                                                       short_log(plain(), 2)};
+  EXPECT_EQ(short_log(none), without[0]);
+  std::vector<int> same(effects.size());
+  io::parallel_for(effects.size(), 2, [&](std::size_t i) {
+    const std::size_t flight = effects[i].id == "ceiling_effect" ? 1 : effects[i].id == "wall_effect" ? 2 : 0;
+    same[i] = short_log(with(effects[i].id, 1), flight) == without[flight];
+  });
+  for (std::size_t i = 0; i < effects.size(); ++i) {
+    EXPECT_FALSE(same[i]) << effects[i].id;
+    EXPECT_FALSE(effects[i].typical.empty() || effects[i].channels.empty() || effects[i].regimes.empty())
+        << effects[i].id;
+  }
+}
+
+TEST(FamilyC, DriveLosesWhatItsEffectsTake) {
+  const auto driven = [](const std::string& effect, double until_s) {
+    const Magnitudes magnitudes(effect.empty() ? std::vector<std::pair<std::string, double>>{}
+                                               : std::vector<std::pair<std::string, double>>{{effect, 1}});
+    Drive drive(nominal(), magnitudes, 3, 0);
+    drive.command(0, {5, -5});
+    for (double t = 0; t < until_s; t += 1e-4) drive.torques(t, 1e-4, {0, 0}, {0, 0});
+    return std::pair{drive.currents()[0], drive.battery_V()};
+  };
+  const double current = driven("", 0.01).first;
+  EXPECT_NEAR(current, 5 / 12.4, 1e-12);
+  EXPECT_NEAR(driven("driver_dead_zone", 0.01).first, (5 - 0.4) / 12.4, 0.002);
+  EXPECT_LT(driven("driver_bandwidth", 5e-4).first, 0.5 * current);
+  EXPECT_NEAR(driven("driver_bandwidth", 0.02).first, current, 1e-9);
+  EXPECT_EQ(driven("command_delay", 0.3 / 34 - 2e-4).first, 0);
+  EXPECT_NEAR(driven("command_delay", 0.3 / 34 + 4e-4).first, current, 1e-12);
+  EXPECT_LT(driven("winding_heating", 3).first, 0.98 * current);
+  EXPECT_LT(driven("battery_sag", 0.1).second, Drive::kBattery_V);
+  EXPECT_LT(driven("outside_shared_supply", 0.01).first, current);
+}
+
+TEST(FamilyC, AirActsWhereItsEffectsAre) {
+  struct Acted {
+    Wrench wrench;
+    double factor;
+  };
+  const auto acted = [](const std::string& effect, const Eigen::Vector3d& at) {
+    Mechanism mechanism(nominal(), {});
+    Air air(nominal(), Magnitudes({{effect, 1}}), 3, 0);
+    mechanism.place(at, Eigen::Quaterniond::Identity());
+    mj_kinematics(&mechanism.model(), const_cast<mjData*>(&mechanism.data()));
+    const Wrench wrench = air.act(mechanism, 1e-4);
+    const int strip = mj_name2id(&mechanism.model(), mjOBJ_GEOM, "left_strip_1");
+    return Acted{wrench, mechanism.model().geom_fluid[mjNFLUID * strip]};
+  };
+  EXPECT_GT(acted("ground_effect", {0, 0, 0.03}).factor, 1.02);
+  EXPECT_LT(acted("ground_effect", {0, 0, 0.03}).factor, 1.10);
+  EXPECT_NEAR(acted("ground_effect", {0, 0, 1}).factor, 1, 1e-5);
+  EXPECT_GT(acted("ceiling_effect", {0, 0, 1.95}).factor, 1.02);
+  EXPECT_LT(acted("wall_effect", {0, 0.9, 1}).factor, 0.99);
+  EXPECT_GT(acted("wall_effect", {0, 0.9, 1}).wrench.force_W.y(), 1e-3);
+  EXPECT_LT(acted("wall_effect", {0, 0, 1}).wrench.force_W.y(), 1e-5);
+  EXPECT_NEAR(acted("tether", {0, 0, 1.01}).wrench.force_W.z(), -0.2e-3 * 9.81, 1e-6);
+  EXPECT_NEAR(acted("tether", {0, 0, 0.01}).wrench.force_W.z(), 0, 1e-9);
+}
+
+TEST(FamilyC, SensorsErrAsTheirEffectsSay) {
+  const flightlog::FlightLog log = short_log(plain()), late = short_log(with("mocap_delay", 1));
+  EXPECT_EQ(late.command, log.command);
+  EXPECT_EQ(late.imu, log.imu);
+  EXPECT_EQ(late.header, log.header);
+  // samples from before t = 0 arrive later by 5 ms: those that are in both logs are the same poses
+  const std::size_t more = static_cast<std::size_t>(
+      std::find(late.mocap.x_m.begin(), late.mocap.x_m.end(), log.mocap.x_m[0]) - late.mocap.x_m.begin());
+  ASSERT_LT(more, late.mocap.x_m.size());
+  EXPECT_NEAR(late.mocap.t_s[more], log.mocap.t_s[0] + 5e-3, 1e-12);
+  const flightlog::FlightLog tilted = short_log(with("mocap_tilt", 1)), offset = short_log(with("marker_offset", 1));
+  const auto place = [](const flightlog::FlightLog& of) {
+    return Eigen::Vector3d(of.mocap.x_m[3], of.mocap.y_m[3], of.mocap.z_m[3]);
+  };
+  EXPECT_NEAR((place(tilted) - place(log)).norm(), 0.01 * place(log).norm(), 0.01 * place(log).norm());
+  EXPECT_GT((place(tilted) - place(log)).norm(), 1e-4);
+  EXPECT_NEAR((place(offset) - place(log)).norm(), 2e-3, 1e-6);
+  EXPECT_EQ(short_log(with("gyro_bias", 1)).imu.accel_x_m_s2, log.imu.accel_x_m_s2);
+  EXPECT_EQ(short_log(with("vibration_rectification", 1)).imu.gyro_x_rad_s, log.imu.gyro_x_rad_s);
+}
+
+TEST(FamilyC, SwapsTheWingsWithTheirFaults) {
+  const auto wing = [](const Robot& robot, const char* side) {
+    const mjModel& m = robot.mechanism().model();
+    const int id = mj_name2id(&m, mjOBJ_BODY, (side + std::string("_wing")).c_str());
+    return std::array<double, 2>{m.body_mass[id], m.body_ipos[3 * id + 1]};
+  };
+  Assignment a = with("wing_damage", 2);
+  for (const bool own : {false, true}) {
+    a.own_parameters = own;
+    a.changes = {};
+    const Robot before(a, 0);
+    a.changes.swapped_wings = true;
+    const Robot after(a, 0);
+    const auto left = wing(before, "left"), right = wing(before, "right"), swapped = wing(after, "left");
+    EXPECT_NE(left[0], right[0]) << "one is damaged";
+    EXPECT_NEAR(swapped[0], right[0], 1e-15);
+    EXPECT_NEAR(swapped[1], -right[1], 1e-15);
+    EXPECT_NEAR(wing(after, "right")[0], left[0], 1e-15);
+    const auto &was = before.parameters().sides, &is = after.parameters().sides;
+    EXPECT_EQ(is[0].leading_edge.inertia_kg_m2(0, 1), -was[1].leading_edge.inertia_kg_m2(0, 1));
+    EXPECT_EQ(is[0].leading_edge.inertia_kg_m2(1, 1), was[1].leading_edge.inertia_kg_m2(1, 1));
+    EXPECT_EQ(is[1].fluid, was[0].fluid);
+    EXPECT_EQ(is[0].rotation.lower_rad, was[1].rotation.lower_rad);
+    EXPECT_EQ(is[0].motor.resistance_ohm, was[0].motor.resistance_ohm) << "motors stay";
+  }
+}
+
+TEST(FamilyC, CarriesAWeightAndLosesWhatIsTakenAway) {
+  Assignment a = with("tether", 1);
+  const RigidBody before = Robot(a, 0).parameters().torso;
+  a.changes.added_mass_kg = 0.5e-3;
+  a.changes.added_at_m = {0.02, 0, -0.01};
+  a.changes.without = {"tether"};
+  const Robot robot(a, 0);
+  const RigidBody& after = robot.parameters().torso;
+  EXPECT_NEAR(after.mass_kg, before.mass_kg + 0.5e-3, 1e-15);
+  EXPECT_NEAR(after.mass_kg * after.com_m.x(), before.mass_kg * before.com_m.x() + 0.5e-3 * 0.02, 1e-15);
+  EXPECT_EQ(robot.magnitudes()[Effect::kTether], 0);
+  EXPECT_EQ(short_log(a).header.changes, a.changes);
+}
+
+TEST(FamilyC, ContrastIsWhatTheEffectDoes) {
+  const Length length = {0.12, 0.2};
+  const auto mean = [&](const std::string& effect, double magnitude) {
+    const Contrast contrast = contrast_of(plain(), 0, effect, magnitude, length);
+    EXPECT_EQ(contrast.beat_s.size(), 6U);
+    Eigen::Matrix<double, 6, 1> sum = Eigen::Matrix<double, 6, 1>::Zero();
+    for (const auto& beat : contrast.change)
+      for (int channel = 0; channel < 6; ++channel) sum[channel] += beat[static_cast<std::size_t>(channel) * 5] / 6;
+    return sum;
+  };
+  const auto com = mean("com_offset", 1);  // 1 mm under the weight: about 31 rad/s^2
+  EXPECT_NEAR(std::hypot(com[3], com[4]), 31, 9);
+  EXPECT_NEAR(mean("com_offset", 2).segment<2>(3).norm() / com.segment<2>(3).norm(), 2, 0.15);
+  EXPECT_EQ(mean("com_offset", 0).norm(), 0);
+  EXPECT_EQ(mean("gyro_bias", 1).norm(), 0);
+  EXPECT_LT(mean("driver_dead_zone", 1)[2], -0.2);
+  const auto damage = mean("wing_damage", 1);
+  EXPECT_NEAR(std::abs(damage[3]), 24, 8);
+  EXPECT_LT(damage[2], 0);
+}
+
+TEST(FamilyC, WingsFollowATorsoThatIsHeld) {
+  Mechanism mechanism(nominal(), {});
+  Motion spinning;
+  spinning.turning_B.z() = 1000;
+  mechanism.step({0, 0}, {0, 0}, {}, &spinning);
+  // without its rotor's inertia a wing would stay where it was: the left one's stroke goes back as fast, the right one's forth
+  EXPECT_LT(mechanism.stroke_rate(0), -500 * Mechanism::kStep_s);
+  EXPECT_GT(mechanism.stroke_rate(0), -3000 * Mechanism::kStep_s);
+  EXPECT_NEAR(mechanism.stroke_rate(1), -mechanism.stroke_rate(0), 1e-3);
+}
+
+TEST(FamilyC, PilotRemembersWhereItWasCarried) {
+  Pilot pilot(nominal(), 1, 0);
+  Motion still;
+  still.position_W = {0.1, 0, 1};
+  still.velocity_W = {0.2, 0, 0};
+  for (int i = 0; i < 60; ++i) pilot.look(still, 1e-3);
+  pilot.carry(still.position_W, M_PI / 2, {0, 0.5, 0});
+  still.position_W = {0.1, 0.5, 1};
+  still.velocity_W = {0, 0.2, 0};
+  still.q_WB = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ());
+  still.R_WB = still.q_WB.toRotationMatrix();
+  pilot.look(still, 1e-3);
+  EXPECT_LT((pilot.view().position_W - still.position_W).norm(), 0.01);
+  EXPECT_LT((pilot.view().velocity_W - still.velocity_W).norm(), 1e-9);
+  EXPECT_NEAR(heading_of(pilot.view().R_WB), M_PI / 2, 0.02);
+}
+
+TEST(FamilyC, EscapeKeepsItsRules) {
+  EscapeAssignment rules;
+  rules.observation = {"goal_rotation", "position_error", "velocity", "body_rate",
+                       "beat_phase",    "time",           "trim",     "previous_action"};
+  std::vector<double> first;
+  std::size_t calls = 0;
+  rules.policy = [&](const std::vector<double>& observation) {
+    if (calls == 0) first = observation;
+    ++calls;
+    return std::array<double, 4>{};
+  };
+  rules.start_m = {-0.02, 0, 0};
+  rules.hand_back = {0.01, 0.1, 1, 0.1, 0.1};
+  rules.hand_back_at_s = 0.1;
+  rules.capture = {0.1, 1, 15, 0.7, 0.8};
+  rules.capture_by_s = 0.35;
+  rules.keep = {0.1, 0, 0, 0.8, 0.8};
+  rules.keep_from_s = 0.3;
+  rules.keep_until_s = 0.5;
+  const FamilyEscape escape = escape_of(plain(), 0, rules, 1);
+  EXPECT_TRUE(escape.success);
+  ASSERT_EQ(first.size(), 9U + 3 + 3 + 3 + 2 + 1 + 4 + 4) << "numbers as a task has them (flight/task.cpp)";
+  for (const std::size_t diagonal : {0, 4, 8}) EXPECT_NEAR(first[diagonal], 1, 0.05) << "upright, heading for the goal";
+  EXPECT_NEAR(first[9], -0.02, 0.01) << "behind the goal";
+  EXPECT_LE(calls, 10U);
+  EXPECT_LT(escape.captured_s, 0.02);
+  EXPECT_EQ(escape.log.header.ambient.ground_z_m, -1);
+  rules.capture.distance_m = 1e-6;  // it stays near, but never captures
+  EXPECT_FALSE(escape_of(plain(), 0, rules, 1).success);
+  rules.capture.distance_m = 0.1;
+  rules.heading_rad = M_PI;
+  rules.start_m = {0.05, 0, 0};
+  const FamilyEscape turned = escape_of(plain(), 1, rules, 0.2);
+  EXPECT_NEAR(std::abs(turned.log.mocap.qz[0]), 1, 0.02);
+  EXPECT_NEAR(turned.log.mocap.x_m[0], 0.05, 5e-3);
+  EXPECT_NEAR(turned.log.mocap.z_m[0], 0, 0.02);
+  rules.policy = [](const std::vector<double>&) { return std::array<double, 4>{-5, 3, 0, 0}; };
+  rules.hand_back_at_s = 0.3;
+  rules.capture = {0.001, 0.01, 15, 0.7, 0.8};
+  EXPECT_FALSE(escape_of(plain(), 0, rules, 0.5).success);
+}
+
+TEST(FamilyC, ConventionsChangeDeclarationsWithinTheirBounds) {
+  double latencies = 0, places = 0;
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    Assignment a = plain();
+    a.seed = seed;
+    const Robot robot(a, 0);
+    const SensorParameters exact = sensor_parameters(a, robot);
+    a.conventions = true;
+    const SensorParameters loose = sensor_parameters(a, robot);
+    const flightlog::FlightHeader &e = exact.declared, &l = loose.declared;
+    EXPECT_EQ(e.imu.latency_s, exact.imu.latency_s);
+    EXPECT_EQ(e.imu.position_m[1], exact.imu.position_m.y());
+    EXPECT_EQ(e.mocap.latency_s, exact.mocap.latency_s);
+    EXPECT_EQ(exact.fast_imu + exact.fast_mocap, 0);
+    EXPECT_EQ(exact.imu.sampling, Sampling::kInstant);
+    EXPECT_EQ(loose.imu.latency_s, exact.imu.latency_s);
+    EXPECT_EQ(loose.imu.gyro_noise, exact.imu.gyro_noise);
+    const double half_s = loose.imu.sampling == Sampling::kInstant ? 0 : 0.5 / e.imu.rate_hz;
+    EXPECT_LE(std::abs(l.imu.latency_s - (exact.imu.latency_s + half_s)), 0.5e-3 + 1e-12);
+    EXPECT_LE(std::abs(l.mocap.latency_s - e.mocap.latency_s), 0.5e-3);
+    EXPECT_LE((Eigen::Vector3d(l.imu.position_m.data()) - exact.imu.position_m).norm(), 2e-3 + 1e-12);
+    EXPECT_LE(Eigen::AngleAxisd(Eigen::Matrix3d(exact.imu.gyro_axes.inverse() * loose.imu.gyro_axes)).angle(),
+              M_PI / 180 + 1e-9);
+    EXPECT_NEAR(l.imu.rate_hz / e.imu.rate_hz, 1, 0.01);
+    EXPECT_NEAR(l.mocap.rate_hz / e.mocap.rate_hz, 1, 0.02);
+    for (const double ratio :
+         {l.imu.gyro_noise_rad_s / e.imu.gyro_noise_rad_s, l.mocap.position_noise_m / e.mocap.position_noise_m}) {
+      EXPECT_GE(ratio, 0.7);
+      EXPECT_LE(ratio, 1.5);
+    }
+    EXPECT_LE(loose.fast_imu + loose.fast_mocap, 50e-6);
+    EXPECT_EQ(l.ambient, e.ambient);
+    latencies += l.mocap.latency_s != e.mocap.latency_s;
+    places += l.imu.position_m != e.imu.position_m;
+  }
+  EXPECT_EQ(latencies, 12);
+  EXPECT_EQ(places, 12);
+  Assignment a = plain();
+  const flightlog::FlightLog exact = short_log(a);
+  a.conventions = true;
+  EXPECT_EQ(short_log(a).command, exact.command);
+}
+
+TEST(FamilyC, DeclaredNoiseIsThatOfTheSamples) {
+  // a robot at rest: what varies from pose to pose is noise
+  Assignment a = plain();
+  const Robot robot(a, 0);
+  const SensorParameters parameters = sensor_parameters(a, robot);
+  Sensors sensors(a, 0, robot, parameters);
+  for (int i = 0; i < 120000; ++i) sensors.after_step(robot, robot.step_s() * i);
+  flightlog::FlightLog log;
+  sensors.finish(log, 1e9);
+  double position = 0, attitude = 0;
+  for (std::size_t i = 0; i < log.mocap.t_s.size(); ++i) {
+    position +=
+        log.mocap.x_m[i] * log.mocap.x_m[i] + log.mocap.y_m[i] * log.mocap.y_m[i] + log.mocap.z_m[i] * log.mocap.z_m[i];
+    attitude +=
+        4 * (log.mocap.qx[i] * log.mocap.qx[i] + log.mocap.qy[i] * log.mocap.qy[i] + log.mocap.qz[i] * log.mocap.qz[i]);
+  }
+  const double count = 3 * static_cast<double>(log.mocap.t_s.size());
+  EXPECT_NEAR(std::sqrt(position / count) / parameters.declared.mocap.position_noise_m, 1, 0.1);
+  EXPECT_NEAR(std::sqrt(attitude / count) / parameters.declared.mocap.attitude_noise_rad, 1, 0.1);
+}
+
+TEST(FamilyC, FiguresAreDrawnApartAndPhysical) {
+  Eigen::Vector3d spread = Eigen::Vector3d::Zero();
+  constexpr int count = 200;
+  for (std::uint64_t seed = 0; seed < count; ++seed) {
+    const RobotParameters drawn = drawn_parameters(nominal(), seed);
+    for (const Side& side : drawn.sides) {
+      EXPECT_TRUE(is_physical(side.wing.inertia_kg_m2) && is_physical(side.leading_edge.inertia_kg_m2));
+      EXPECT_GT(side.rotation.upper_rad, 0.6);
+    }
+    EXPECT_NE(drawn.sides[0].motor.resistance_ohm, drawn.sides[1].motor.resistance_ohm);
+    spread += Eigen::Vector3d(drawn.torso.mass_kg / nominal().torso.mass_kg - 1,
+                              drawn.sides[0].motor.resistance_ohm / 12.4 - 1,
+                              drawn.torso.com_m.x() - nominal().torso.com_m.x())
+                  .cwiseAbs2();
+  }
+  spread = (spread / count).cwiseSqrt();
+  EXPECT_NEAR(spread[0], 0.03, 0.005);
+  EXPECT_NEAR(spread[1], 0.07, 0.01);
+  EXPECT_NEAR(spread[2], 0.3e-3, 0.05e-3);
+}
+
+/// A robot whose every random stream acts.
+Assignment busy(std::size_t session) {
+  Assignment a = plain();
+  a.effects = {{"wind", 1}, {"gyro_bias", 1}, {"outside_driver_jitter", 1}};
+  a.own_parameters = a.conventions = true;
+  a.session = session;
+  return a;
+}
+
+/// Sum of voltages, positions, IMU, power and wings.
+std::array<double, 5> sums(const flightlog::FlightLog& log) {
+  const auto sum = [](std::initializer_list<const flightlog::Column*> columns) {
+    double all = 0;
+    for (const flightlog::Column* column : columns) all = std::accumulate(column->begin(), column->end(), all);
+    return all;
+  };
+  const flightlog::ImuStream& i = log.imu;
+  return {sum({&log.command.left_voltage_V, &log.command.right_voltage_V}),
+          sum({&log.mocap.x_m, &log.mocap.y_m, &log.mocap.z_m}),
+          sum({&i.gyro_x_rad_s, &i.gyro_y_rad_s, &i.gyro_z_rad_s, &i.accel_x_m_s2, &i.accel_y_m_s2, &i.accel_z_m_s2}),
+          sum({&log.power->battery_V, &log.power->left_current_A, &log.power->right_current_A}),
+          sum({&log.wings->left_stroke_rad, &log.wings->right_rotation_rad})};
+}
+
+TEST(FamilyC, SessionZeroFliesAsBeforeThereWereSessions) {
+  // Recorded then. Last bits differ between processors, and may change a few of a converter's digits.
+  const std::array<std::array<double, 5>, 3> before = {{{6.84122008, 13.5307602, 470.904819, 1849.23176, 9.42088043},
+                                                        {2.24850082, 11.5664431, 510.253421, 1849.39732, 8.64324231},
+                                                        {-25.1292884, 9.66115198, 527.784637, 1848.51096, 7.4074262}}};
+  const std::array<double, 5> near = {1e-5, 1e-6, 0.02, 2e-3, 1e-6};
+  for (std::size_t flight = 0; flight < 3; ++flight) {
+    const std::array<double, 5> now = sums(short_log(busy(0), flight));
+    for (std::size_t i = 0; i < 5; ++i) EXPECT_NEAR(now[i], before[flight][i], near[i]) << flight << " " << i;
+  }
+  // the robot to the last bit
+  const Robot robot(busy(0), 0);
+  const RobotParameters drawn = drawn_parameters(nominal(), busy(0).seed);
+  EXPECT_EQ(mjcf_text(robot.parameters(), {}, 1e-4), mjcf_text(drawn, {}, 1e-4));
+  EXPECT_EQ(session_change(busy(0)).air, 1);
+  EXPECT_EQ(stream_of(busy(0), 2), 2U);
+  EXPECT_NE(stream_of(busy(1), 2), 2U);
+}
+
+TEST(FamilyC, SessionsDifferInAllRowsButDeclareTheSame) {
+  for (std::size_t flight = 0; flight < 3; ++flight) {
+    const flightlog::FlightLog first = short_log(busy(0), flight), second = short_log(busy(1), flight);
+    EXPECT_EQ(second, short_log(busy(1), flight));
+    EXPECT_EQ(second.header, first.header);
+    const auto zeroth = sums(first), one = sums(second), two = sums(short_log(busy(2), flight));
+    for (std::size_t i = 0; i < 5; ++i)
+      EXPECT_TRUE(zeroth[i] != one[i] && one[i] != two[i] && two[i] != zeroth[i]) << i;
+  }
+}
+
+TEST(FamilyC, FlightsOfEverySessionKeepTheirKind) {
+  for (std::size_t session = 0; session < 6; ++session) {
+    Assignment a = plain();
+    a.session = session;
+    std::array<double, 3> clearance = {1, 1, 1};
+    for (std::size_t flight = 0; flight < 3; ++flight) {
+      const Programme programme(a, flight, nominal());
+      EXPECT_EQ(programme.start_W() == Programme(plain(), flight, nominal()).start_W(), session == 0);
+      for (double t = 0; t < 10; t += 0.01) {
+        const Eigen::Vector3d at = programme.target(t).position_W;
+        clearance[flight] = std::min(clearance[flight], std::array{at.z(), 2 - at.z(), 1 - at.y()}[flight]);
+      }
+    }
+    for (const double closest : clearance) EXPECT_LT(closest, 0.22) << session;
+  }
+}
+
+TEST(FamilyC, SessionChangesAreBoundedAndAsWideAsStated) {
+  struct Spread {
+    double bound, sd, rms = 0, largest = 0, smallest = 1;
+  };
+  // in the order of `values`
+  std::vector<Spread> spreads = {{0.027, 0.0109},  {0.007, 0.0040},    {0.0296, 0.0107}, {0.12, 0.04},
+                                 {0.165, 0.048},   {0.0062, 0.0035},   {3.5e-5, 2.0e-5}, {6e-4, 3.5e-4},
+                                 {4e-4, 2.3e-4},   {4e-4, 2.3e-4},     {0.0035, 0.0027}, {5e-3, 3.9e-3},
+                                 {3.5e-4, 2.7e-4}, {0.00175, 0.00135}, {1e-4, 0.58e-4},  {3e-4, 1.73e-4}};
+  constexpr int count = 200;
+  for (std::uint64_t seed = 0; seed < count; ++seed) {
+    Assignment a = plain();
+    a.seed = seed;
+    a.session = 1 + seed % 3;
+    const SessionChange day = session_change(a);
+    const std::vector<double> values = {day.air - 1,
+                                        day.supply - 1,
+                                        day.winding[seed % 2] - 1,
+                                        day.friction[seed % 2] - 1,
+                                        day.damping[seed % 2] - 1,
+                                        day.rest_rad[seed % 2],
+                                        day.tape_kg,
+                                        day.battery_m.x(),
+                                        day.battery_m.y(),
+                                        day.battery_m.z(),
+                                        day.imu_turn_rad.norm(),
+                                        day.gyro_bias_rad_s.norm(),
+                                        day.markers_m.norm(),
+                                        day.markers_turn_rad.norm(),
+                                        day.imu_late_s,
+                                        day.mocap_late_s};
+    ASSERT_EQ(values.size(), spreads.size());
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      spreads[i].rms += values[i] * values[i] / count;
+      spreads[i].largest = std::max(spreads[i].largest, std::abs(values[i]));
+      spreads[i].smallest = std::min(spreads[i].smallest, std::abs(values[i]));
+    }
+    EXPECT_NE(day.winding[0], day.winding[1]);
+    EXPECT_NE(day.rest_rad[0], day.rest_rad[1]);
+  }
+  for (std::size_t i = 0; i < spreads.size(); ++i) {
+    EXPECT_LE(spreads[i].largest, spreads[i].bound) << i;
+    EXPECT_GT(spreads[i].smallest, 0) << i;
+    EXPECT_NEAR(std::sqrt(spreads[i].rms) / spreads[i].sd, 1, 0.15) << i;
+  }
+}
+
+TEST(FamilyC, SessionsChangeTheRobotAndItsSensorsAsDrawn) {
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    Assignment a = plain(), b = plain();
+    a.own_parameters = a.conventions = b.own_parameters = b.conventions = true;
+    a.seed = b.seed = seed;
+    b.session = 2;
+    const SessionChange day = session_change(b);
+    const Robot first(a, 0), second(b, 0);
+    const RobotParameters &f = first.parameters(), &g = second.parameters();
+    EXPECT_NEAR(second.mechanism().model().opt.density, f.density_kg_m3 * day.air, 1e-12);
+    EXPECT_NEAR(second.drive().battery_V(), Drive::kBattery_V * day.supply, 1e-12);
+    for (std::size_t side = 0; side < 2; ++side) {
+      const Side &s = f.sides[side], &t = g.sides[side];
+      EXPECT_NEAR(t.motor.resistance_ohm / s.motor.resistance_ohm, day.winding[side], 1e-12);
+      EXPECT_NEAR(t.motor.friction_Nm / s.motor.friction_Nm, day.friction[side], 1e-12);
+      EXPECT_NEAR(t.stroke.friction_Nm / s.stroke.friction_Nm, day.friction[side], 1e-12);
+      EXPECT_NEAR(t.motor.damping_Nm_s / s.motor.damping_Nm_s, day.damping[side], 1e-12);
+      EXPECT_NEAR(t.stroke.damping_Nm_s / s.stroke.damping_Nm_s, day.damping[side], 1e-12);
+      EXPECT_NEAR(t.spring.rest_rad - s.spring.rest_rad, day.rest_rad[side], 1e-12);
+    }
+    // 0.3 of the torso moves with the battery; effects of magnitude 0.2 are larger
+    EXPECT_NEAR(g.torso.mass_kg - f.torso.mass_kg, day.tape_kg, 1e-12);
+    const Eigen::Vector3d moved = g.torso.com_m - f.torso.com_m;
+    EXPECT_LT((moved - 0.3 * day.battery_m).norm(), 0.05e-3);
+    EXPECT_LT(moved.head<2>().norm() * f.torso.mass_kg / f.mass_kg(), 0.2e-3);
+    const Eigen::Matrix3d inertia = g.torso.inertia_kg_m2 - f.torso.inertia_kg_m2;
+    EXPECT_GT(std::abs(inertia(0, 2)), 0);
+    EXPECT_LT(std::max(std::abs(inertia(0, 1)), std::abs(inertia(0, 2))), 0.01 * f.torso.inertia_kg_m2(0, 0));
+    EXPECT_TRUE(is_physical(g.torso.inertia_kg_m2));
+
+    const SensorParameters s = sensor_parameters(a, first), t = sensor_parameters(b, second);
+    EXPECT_EQ(t.declared, s.declared);
+    EXPECT_EQ(t.mocap.model_m, s.mocap.markers_m);
+    for (std::size_t i = 0; i < 4; ++i)
+      EXPECT_LT((t.mocap.markers_m[i] - s.mocap.markers_m[i] - day.markers_m -
+                 day.markers_turn_rad.cross(s.mocap.markers_m[i]))
+                    .norm(),
+                1e-7);
+    const auto turn = [](const Eigen::Matrix3d& from, const Eigen::Matrix3d& to) {
+      const Eigen::AngleAxisd by(Eigen::Matrix3d(from.inverse() * to));
+      return Eigen::Vector3d(by.angle() * by.axis());
+    };
+    EXPECT_LT((turn(s.imu.gyro_axes, t.imu.gyro_axes) - day.imu_turn_rad).norm(), 1e-9);
+    EXPECT_LT((turn(s.imu.accel_axes, t.imu.accel_axes) - day.imu_turn_rad).norm(), 1e-9);
+    EXPECT_LT((t.imu.gyro_bias - s.imu.gyro_bias - day.gyro_bias_rad_s).norm(), 1e-12);
+    EXPECT_NEAR(t.imu.latency_s - s.imu.latency_s, day.imu_late_s, 1e-12);
+    EXPECT_NEAR(t.mocap.latency_s - s.mocap.latency_s, day.mocap_late_s, 1e-12);
+
+    // an effect keeps its direction
+    a.effects = b.effects = {{"com_offset", 1}};
+    const Eigen::Vector3d off = Robot(a, 0).parameters().torso.com_m - f.torso.com_m,
+                          still = Robot(b, 0).parameters().torso.com_m - g.torso.com_m;
+    EXPECT_LT((off - still).norm(), 0.01 * off.norm());
+  }
+}
+
+TEST(FamilyC, SessionsHaveNoiseOfTheirOwnAndGluedMarkersShiftThePose) {
+  // one robot at rest, with the same sensors in both sessions
+  const Robot robot(with("gyro_bias", 1), 0);
+  SensorParameters parameters = sensor_parameters(plain(), robot);
+  const auto log = [&](std::size_t session) {
+    Assignment a = plain();
+    a.session = session;
+    Sensors sensors(a, 0, robot, parameters);
+    for (int i = 0; i < 1000; ++i) sensors.after_step(robot, robot.step_s() * i);
+    flightlog::FlightLog seen;
+    sensors.finish(seen, 1);
+    return seen;
+  };
+  const flightlog::FlightLog first = log(0), second = log(1);
+  EXPECT_EQ(log(1), second);
+  EXPECT_NE(second.imu.accel_x_m_s2, first.imu.accel_x_m_s2);
+  EXPECT_NE(second.mocap.x_m, first.mocap.x_m);
+  EXPECT_NE(second.power->battery_V, first.power->battery_V);
+  EXPECT_NE(second.wings->left_stroke_rad, first.wings->left_stroke_rad);
+  parameters.imu.gyro_noise = parameters.mocap.marker_noise_m = 0;
+  EXPECT_NE(log(1).imu.gyro_x_rad_s, log(0).imu.gyro_x_rad_s) << "the walk of the gyro's bias";
+  EXPECT_NEAR(log(1).mocap.x_m[0], 0, 1e-9);
+  for (Eigen::Vector3d& marker : parameters.mocap.markers_m) marker.x() += 1e-3;
+  EXPECT_NEAR(log(1).mocap.x_m[0], 1e-3, 1e-9);
+}
+
+TEST(FamilyC, CalmFlightsAreSlowSmoothAndSafe) {
+  Assignment a = plain();
+  a.calm = true;
+  Assignment hover = plain();
+  hover.hover = true;
+  EXPECT_EQ(short_log(a, 0), short_log(hover, 0));
+  for (a.seed = 0; a.seed < 60; ++a.seed)
+    for (std::size_t flight = 1; flight < 3; ++flight) {
+      const Programme programme(a, flight, nominal());
+      double way_m = 0, turned_rad = 0;
+      Target last = programme.target(0);
+      for (int i = 1; i <= 2000; ++i) {
+        const double t = 0.005 * i;
+        const Target now = programme.target(t);
+        EXPECT_LE(now.velocity_W.norm(), 0.2 + 1e-9);
+        EXPECT_LT((now.position_W - last.position_W).norm(), 0.0011);
+        EXPECT_LT((now.velocity_W - last.velocity_W).norm(), 0.005 * 0.3);
+        EXPECT_LE(std::abs(now.heading_rad - last.heading_rad), 0.005 * 0.3 + 1e-9);
+        EXPECT_TRUE(std::abs(now.position_W.x()) <= 0.6 && std::abs(now.position_W.y() + 0.05) <= 0.45 &&
+                    std::abs(now.position_W.z() - 1) <= 0.5);
+        const Inputs more = programme.excitation(t);
+        EXPECT_EQ(std::abs(more.amplitude_V) + std::abs(more.difference_V) + std::abs(more.bias_V) +
+                      std::abs(more.split_cycle),
+                  0);
+        way_m += (now.position_W - last.position_W).norm();
+        turned_rad += std::abs(now.heading_rad - last.heading_rad);
+        last = now;
+      }
+      EXPECT_GT(way_m, 0.3);
+      EXPECT_GT(turned_rad, 0);
+    }
+  a.own_parameters = true;
+  io::parallel_for(4, 2, [&](std::size_t i) {
+    Assignment one = a;
+    one.seed = i;
+    one.session = i % 2;
+    const Flown flown = fly_one(one, 1 + i / 2, true, {0.7, 2.3});
+    EXPECT_FALSE(flown.flight.crashed) << flown.flight.how;
+    const std::size_t beat = 588, start = 14000;  // steps; t = 0
+    for (std::size_t step = start; step + beat < flown.path.size(); step += beat)
+      EXPECT_LT((flown.path[step + beat].position_W - flown.path[step].position_W).norm() * 34, 0.25);
+  });
+}
+
+TEST(FamilyC, SameBytesOnAnyNumberOfThreads) {
+  const auto flown = [](int threads) {
+    std::vector<flightlog::FlightLog> logs(4);
+    io::parallel_for(logs.size(), threads, [&](std::size_t i) {
+      Assignment a = with(i % 2 == 0 ? "wind" : "gear_backlash", 1);
+      a.own_parameters = a.conventions = true;
+      a.seed = i / 2;
+      logs[i] = short_log(a, i % 3);
+    });
+    return logs;
+  };
+  const auto one = flown(1);
+  EXPECT_EQ(one, flown(2));
+  EXPECT_NE(one[0].mocap.x_m, one[2].mocap.x_m);
+}
+
+TEST(FamilyC, RefusesWhatItDoesNotKnow) {
+  const auto refusal = [](const auto& call) -> std::string {
+    try {
+      call();
+    } catch (const io::InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const auto family = make_family_c();
+  EXPECT_EQ(refusal([&] { family->fly(with("wnid", 1), 0); }),
+            "effect wnid: family C has no such effect; did you mean \"wind\"?");
+  EXPECT_EQ(refusal([&] { family->fly(with("wind", 4.5), 0); }),
+            "effect wind: magnitude 4.5 is out of range; accepted: a number from 0 to 4");
+  EXPECT_EQ(refusal([&] { family->fly(with("wind", std::nan("")), 0); }),
+            "effect wind: magnitude nan is out of range; accepted: a number from 0 to 4");
+  EXPECT_EQ(refusal([&] { family->contrast(plain(), 0, "wind", -1); }),
+            "effect wind: magnitude -1 is out of range; accepted: a number from 0 to 4");
+  EXPECT_NE(refusal([&] { family->fly(plain(), 3); }).find("flight 3"), std::string::npos);
+  EscapeAssignment rules;
+  rules.observation = {"velocty"};
+  EXPECT_NE(refusal([&] { escape_of(plain(), 0, rules, 0.1); }).find("did you mean \"velocity\""), std::string::npos);
+}
+
+}  // namespace
+}  // namespace flappy::blind::c
