@@ -1,5 +1,6 @@
 #include "dart_peer.hpp"
 
+#include <dart/config.hpp>
 #include <dart/dynamics/BodyNode.hpp>
 #include <dart/dynamics/FreeJoint.hpp>
 #include <dart/dynamics/RevoluteJoint.hpp>
@@ -47,6 +48,8 @@ RevoluteJoint* add_hinged(BodyNode* parent, const std::string& name, const model
 
 }  // namespace
 
+std::string dart_version() { return DART_VERSION; }
+
 struct DartPeer::Engine {
   dart::simulation::WorldPtr world = dart::simulation::World::create();
   dart::dynamics::SkeletonPtr skeleton = dart::dynamics::Skeleton::create();
@@ -67,11 +70,16 @@ DartPeer::DartPeer(const model::Vehicle& vehicle, const PeerOptions& options, co
   for (std::size_t i : {0u, 1u}) {
     const model::Side& side = side_of(vehicle, i);
     const std::string name = i == 0 ? "left " : "right ";
-    engine.stroke[i] = add_hinged(engine.torso, name + "leading edge", side.leading_edge, vector(side.shoulder_m),
+    model::RigidBody edge = side.leading_edge;
+    if (!settings.rotor_lags) edge.inertia_kg_m2.zz += reflected_rotor_inertia(side.motor);
+    engine.stroke[i] = add_hinged(engine.torso, name + "leading edge", edge, vector(side.shoulder_m),
                                   side_sign(i) * Vector3d::UnitZ(), side.stroke, options.dry_friction);
     engine.stroke[i]->setRestPosition(0, side.spring.rest_angle_rad);
     engine.rotation[i] = add_hinged(engine.stroke[i]->getChildBodyNode(), name + "wing", side.wing, Vector3d::Zero(),
                                     Vector3d::UnitY(), side.rotation, options.dry_friction);
+    if (!settings.joint_damping) continue;
+    engine.stroke[i]->setDampingCoefficient(0, stroke_damping(side));
+    engine.rotation[i]->setDampingCoefficient(0, side.rotation.damping_Nm_s);
   }
   engine.world->setTimeStep(options.step_s);
   engine.world->setGravity({0, 0, -options.gravity_m_s2});
@@ -91,16 +99,37 @@ void DartPeer::step(double left_V, double right_V) {
       stroke->setSpringStiffness(0, spring_stiffness(side.spring, start_.stroke_rad[i]));
       spring_Nm = 0;
     }
-    const double rotor_Nm = -reflected_rotor_inertia(side.motor) * stroke->getAcceleration(0);
-    stroke->setForce(0, loads_.stroke_Nm[i] + spring_Nm + rotor_Nm);
-    rotation->setForce(0, loads_.rotation_Nm[i]);
+    double stroke_Nm = loads_.stroke_Nm[i] + spring_Nm, rotation_Nm = loads_.rotation_Nm[i];
+    if (settings_.joint_damping) {  // what the joint's damping adds is no load
+      stroke_Nm += stroke_damping(side) * start_.stroke_rate_rad_s[i];
+      rotation_Nm += side.rotation.damping_Nm_s * start_.rotation_rate_rad_s[i];
+    }
+    if (settings_.rotor_lags) stroke_Nm -= reflected_rotor_inertia(side.motor) * stroke->getAcceleration(0);
+    stroke->setForce(0, stroke_Nm);
+    rotation->setForce(0, rotation_Nm);
 
     const WingLoad& load = loads_.wing[i];
     BodyNode* wing = rotation->getChildBodyNode();
     wing->addExtForce({load.normal_force_N, 0, 0}, {0, side_sign(i) * load.span_m, -load.depth_m}, true, true);
     wing->addExtTorque({0, load.damping_moment_Nm, 0}, true);
   }
+  if (!settings_.rotor_lags && !options_.torso_welded) relieve_torso();
   engine_->world->step();
+}
+
+// The leading edge carries J about the stroke axis, +-z of the torso, so its hinge resists with J (psi'' +- w_z'), and the
+// torso with d/dt of J (w_z +- psi') z. A rotor behind a gear resists with J psi'' at the hinge alone: the rest is taken back.
+void DartPeer::relieve_torso() {
+  const Vector3d w = engine_->torso->getAngularVelocity(dart::dynamics::Frame::World(), engine_->torso);
+  const double turning = engine_->torso->getAngularAcceleration(dart::dynamics::Frame::World(), engine_->torso).z();
+  for (std::size_t i : {0u, 1u}) {
+    RevoluteJoint* stroke = engine_->stroke[i];
+    const double J = reflected_rotor_inertia(side_of(vehicle_, i).motor), sign = side_sign(i);
+    const Vector3d z = Vector3d::UnitZ();
+    const Vector3d spin = J * (w.z() + sign * stroke->getVelocity(0)) * z;
+    stroke->setForce(0, stroke->getForce(0) + sign * J * turning);
+    engine_->torso->addExtTorque(J * (turning + sign * stroke->getAcceleration(0)) * z + w.cross(spin), true);
+  }
 }
 
 PeerState DartPeer::state() const {

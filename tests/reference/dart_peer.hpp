@@ -1,16 +1,24 @@
-// The vehicle in DART: articulated bodies, hard stops by impulse, the rotor's inertia from the previous
-// step's acceleration as in the published simulator. Built with -march=native, Debian's library segfaults.
+// The vehicle in DART: articulated bodies, hard stops by impulse. DART's joints have no rotor: its inertia
+// stands in the leading edge, where stops feel it, too; what the torso feels of it besides is taken back, by the previous
+// step's accelerations.
+// Built with -march=native, Debian's library segfaults.
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "peer.hpp"
 
 namespace flappy::reference {
 
+/// "6.12.1"
+std::string dart_version();
+
 struct DartSettings {
   /// DART's own stroke spring, as published; it is implicit, which damps the stroke.
   bool implicit_spring = false;
+  bool joint_damping = false;  ///< linear damping of motors and hinges as the joints' own, which DART takes implicitly
+  bool rotor_lags = false;     ///< all of the rotor's torque from the previous step's acceleration, as published
 };
 
 class DartPeer {
@@ -23,7 +31,7 @@ class DartPeer {
   void step(double left_V, double right_V);
 
   PeerState state() const;
-  /// A welded torso stays where it is; the step that follows knows no rotor inertia.
+  /// A welded torso stays where it is; the step that follows knows no accelerations.
   void set_state(const PeerState& state);
   double time_s() const;
 
@@ -32,6 +40,8 @@ class DartPeer {
   Wrench wrench() const;
 
  private:
+  void relieve_torso();
+
   struct Engine;  // keeps DART and Eigen out of programs built for newer processors
   model::Vehicle vehicle_;
   PeerOptions options_;

@@ -5,14 +5,13 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <cstring>
 #include <iomanip>
 #include <memory>
 #include <sstream>
-#include <stdexcept>
 
 #include "model/derive_jointed.hpp"
 #include "model/jointed_kane.hpp"
+#include "mujoco_peer.hpp"
 
 namespace flappy::reference {
 namespace {
@@ -48,16 +47,7 @@ mjModel* load(const Vehicle& v, const Vector3d& gravity) {
   xml << std::setprecision(17) << "<mujoco><compiler angle='radian' balanceinertia='false'/><option gravity='"
       << gravity.transpose() << "'/><worldbody><body><freejoint/>" << inertial(v.torso) << wing(v.left, 1)
       << wing(v.right, -1) << "</body></worldbody></mujoco>";
-  const std::string text = xml.str();
-  const auto files = std::make_unique<mjVFS>();
-  mj_defaultVFS(files.get());
-  mj_makeEmptyFileVFS(files.get(), "vehicle.xml", static_cast<int>(text.size()));
-  std::memcpy(files->filedata[0], text.data(), text.size());
-  char error[1000] = "";
-  mjModel* loaded = mj_loadXML("vehicle.xml", files.get(), error, sizeof error);
-  mj_deleteVFS(files.get());
-  if (loaded == nullptr) throw std::runtime_error(std::string("MuJoCo: ") + error);
-  return loaded;
+  return mujoco_model(xml.str());
 }
 
 TEST(Jointed, AcceleratesAsMujocoSays) {
@@ -78,7 +68,12 @@ TEST(Jointed, AcceleratesAsMujocoSays) {
       }
     mj_forward(m.get(), d.get());
     Eigen::Matrix<double, kAll, kAll, Eigen::RowMajor> M;
-    mj_fullM(m.get(), M.data(), d->qM);
+    for (int k = 0; k < kAll; ++k) {  // by columns, as each version keeps M in another form
+      const Eigen::Matrix<double, kAll, 1> unit = Eigen::Matrix<double, kAll, 1>::Unit(k);
+      Eigen::Matrix<double, kAll, 1> column;
+      mj_mulM(m.get(), d.get(), column.data(), unit.data());
+      M.col(k) = column;
+    }
     Eigen::Matrix<double, kAll, 1> f = -Eigen::Map<Eigen::Matrix<double, kAll, 1>>(d->qfrc_bias), u, applied;
     applied.setZero();
     u.setZero();

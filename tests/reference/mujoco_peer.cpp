@@ -36,43 +36,64 @@ std::string inertial(const model::RigidBody& body) {
   return xml.str();
 }
 
-std::string hinge(const char* axis, const model::Joint& joint, double armature, bool friction) {
+std::string hinge(const char* axis, const model::Joint& joint, double armature, double damping, bool friction) {
   std::ostringstream xml;
   xml << std::setprecision(17) << "<joint axis='" << axis << "' limited='true' range='" << joint.lower_rad << ' '
-      << joint.upper_rad << "' armature='" << armature << "' frictionloss='" << (friction ? joint.friction_Nm : 0)
-      << "'/>";
+      << joint.upper_rad << "' armature='" << armature << "' damping='" << damping << "' frictionloss='"
+      << (friction ? joint.friction_Nm : 0) << "'/>";
   return xml.str();
 }
 
-std::string wing(const model::Side& side, const char* stroke_axis, bool friction) {
+std::string wing(const model::Side& side, const char* stroke_axis, bool damping, bool friction) {
   const auto& [x, y, z] = side.shoulder_m;
   std::ostringstream xml;
   xml << std::setprecision(17) << "<body pos='" << x << ' ' << y << ' ' << z << "'>" << inertial(side.leading_edge)
-      << hinge(stroke_axis, side.stroke, reflected_rotor_inertia(side.motor), friction) << "<body>"
-      << inertial(side.wing) << hinge("0 1 0", side.rotation, 0, friction) << "</body></body>";
+      << hinge(stroke_axis, side.stroke, reflected_rotor_inertia(side.motor), damping ? stroke_damping(side) : 0,
+               friction)
+      << "<body>" << inertial(side.wing)
+      << hinge("0 1 0", side.rotation, 0, damping ? side.rotation.damping_Nm_s : 0, friction) << "</body></body>";
   return xml.str();
 }
 
-/// Dampers and springs come with the loads, so MuJoCo's own passive forces are off.
+/// Springs come with the loads.
 std::string vehicle_xml(const model::Vehicle& vehicle, const PeerOptions& options, const MujocoSettings& settings) {
   const bool friction = options.dry_friction == DryFriction::constraint;
   std::ostringstream xml;
   xml << std::setprecision(17) << "<mujoco><compiler angle='radian'/><option timestep='" << options.step_s
       << "' gravity='0 0 " << -options.gravity_m_s2 << "' integrator='" << settings.integrator << "' solver='"
-      << settings.solver << "'><flag contact='disable' passive='disable'/></option>"
-      << "<default><joint solimplimit='0.9 0.999 0.001' solreflimit='" << settings.stop_time_s << ' '
-      << settings.stop_damping_ratio << "' solreffriction='" << settings.stop_time_s << " 1'/></default>"
+      << settings.solver << "'><flag contact='disable'/></option>"
+      << "<default><joint solimplimit='0.9 " << settings.stop_impedance << " 0.001' solreflimit='"
+      << settings.stop_time_s << ' ' << settings.stop_damping_ratio << "' solreffriction='" << settings.stop_time_s
+      << " 1'/></default>"
       << "<worldbody><body>" << (options.torso_welded ? "" : "<freejoint/>") << inertial(vehicle.torso)
-      << wing(vehicle.left, "0 0 1", friction) << wing(vehicle.right, "0 0 -1", friction)
-      << "</body></worldbody></mujoco>";
+      << wing(vehicle.left, "0 0 1", settings.joint_damping, friction)
+      << wing(vehicle.right, "0 0 -1", settings.joint_damping, friction) << "</body></worldbody></mujoco>";
   return xml.str();
 }
 
-mjModel* load(const std::string& xml) {
-  const auto files = std::make_unique<mjVFS>();  // two megabytes, too big for the stack
+thread_local MujocoPeer* stepping = nullptr;  // MuJoCo's callback is global
+
+}  // namespace
+
+std::string mujoco_version() {
+  if (mj_version() != mjVERSION_HEADER)
+    throw std::runtime_error(std::string("MuJoCo: the library is ") + mj_versionString() +
+                             ", the headers are of another");
+  return mj_versionString();
+}
+
+bool mujoco_has_implicitfast() { return mjVERSION_HEADER >= 235; }
+
+mjModel* mujoco_model(const std::string& xml) {
+  mujoco_version();
+  const auto files = std::make_unique<mjVFS>();  // two megabytes in 2.2, too big for the stack
   mj_defaultVFS(files.get());
+#if mjVERSION_HEADER < 300
   mj_makeEmptyFileVFS(files.get(), "vehicle.xml", static_cast<int>(xml.size()));
   std::memcpy(files->filedata[0], xml.data(), xml.size());
+#else
+  mj_addBufferVFS(files.get(), "vehicle.xml", xml.data(), static_cast<int>(xml.size()));
+#endif
   char error[1000] = "";
   mjModel* model = mj_loadXML("vehicle.xml", files.get(), error, sizeof error);
   mj_deleteVFS(files.get());
@@ -80,26 +101,39 @@ mjModel* load(const std::string& xml) {
   return model;
 }
 
-}  // namespace
-
 MujocoPeer::MujocoPeer(const model::Vehicle& vehicle, const PeerOptions& options, const MujocoSettings& settings)
     : vehicle_(vehicle),
       options_(options),
-      model_(load(vehicle_xml(vehicle, options, settings)), mj_deleteModel),
-      data_(mj_makeData(model_.get()), mj_deleteData) {}
+      joint_damping_(settings.joint_damping),
+      model_(mujoco_model(vehicle_xml(vehicle, options, settings)), mj_deleteModel),
+      data_(mj_makeData(model_.get()), mj_deleteData) {
+  mjcb_control = load_stage;
+  mju_user_warning = [](const char*) {};  // else MuJoCo writes them to a file in the working folder
+}
 
 void MujocoPeer::step(double left_V, double right_V) {
-  mj_step1(model_.get(), data_.get());
-  start_ = state();
-  loads_ = loads_at(vehicle_, options_, start_, {left_V, right_V});
+  voltage_V_ = {left_V, right_V};
+  first_stage_ = true;
+  stepping = this;
+  mj_step(model_.get(), data_.get());
+  stepping = nullptr;
+}
 
-  double* torque = data_->qfrc_applied;
-  double* joint_torque = torque + (options_.torso_welded ? 0 : 6);
-  mju_zero(torque, model_->nv);
+void MujocoPeer::load_stage(const mjModel* model, mjData* data) {
+  if (stepping == nullptr) return;
+  MujocoPeer& peer = *stepping;
+  const PeerState state = peer.state();
+  const Loads loads = loads_at(peer.vehicle_, peer.options_, state, peer.voltage_V_);
+  if (peer.first_stage_) peer.start_ = state, peer.loads_ = loads;
+  peer.first_stage_ = false;
+
+  double* torque = data->qfrc_applied;
+  double* joint_torque = torque + (peer.options_.torso_welded ? 0 : 6);
+  mju_zero(torque, static_cast<int>(model->nv));
   for (std::size_t i : {0u, 1u}) {
-    const WingLoad& load = loads_.wing[i];
-    const double* R = data_->xmat + 9 * wing_body(i);
-    const double* shoulder = data_->xpos + 3 * wing_body(i);
+    const WingLoad& load = loads.wing[i];
+    const double* R = data->xmat + 9 * wing_body(i);
+    const double* shoulder = data->xpos + 3 * wing_body(i);
     double force[3], moment[3], point[3];
     for (int k : {0, 1, 2}) {
       const double x = R[3 * k], y = R[3 * k + 1], z = R[3 * k + 2];
@@ -107,11 +141,14 @@ void MujocoPeer::step(double left_V, double right_V) {
       moment[k] = load.damping_moment_Nm * y;
       point[k] = shoulder[k] + side_sign(i) * load.span_m * y - load.depth_m * z;
     }
-    mj_applyFT(model_.get(), data_.get(), force, moment, point, wing_body(i), torque);
-    joint_torque[stroke_joint(i)] += loads_.stroke_Nm[i] + loads_.spring_Nm[i];
-    joint_torque[rotation_joint(i)] += loads_.rotation_Nm[i];
+    mj_applyFT(model, data, force, moment, point, wing_body(i), torque);
+    joint_torque[stroke_joint(i)] += loads.stroke_Nm[i] + loads.spring_Nm[i];
+    joint_torque[rotation_joint(i)] += loads.rotation_Nm[i];
+    if (!peer.joint_damping_) continue;
+    const model::Side& side = side_of(peer.vehicle_, i);  // what the joint's damping adds is no load
+    joint_torque[stroke_joint(i)] += stroke_damping(side) * state.stroke_rate_rad_s[i];
+    joint_torque[rotation_joint(i)] += side.rotation.damping_Nm_s * state.rotation_rate_rad_s[i];
   }
-  mj_step2(model_.get(), data_.get());
 }
 
 PeerState MujocoPeer::state() const {
@@ -149,7 +186,12 @@ void MujocoPeer::set_state(const PeerState& state) {
     v[stroke_joint(i)] = state.stroke_rate_rad_s[i];
     v[rotation_joint(i)] = state.rotation_rate_rad_s[i];
   }
-  mju_zero(data_->qacc_warmstart, model_->nv);
+  mju_zero(data_->qacc_warmstart, static_cast<int>(model_->nv));
+}
+
+bool MujocoPeer::diverged() const {
+  const auto met = [&](mjtWarning what) { return data_->warning[what].number > 0; };
+  return met(mjWARN_BADQPOS) || met(mjWARN_BADQVEL) || met(mjWARN_BADQACC);
 }
 
 double MujocoPeer::time_s() const { return data_->time; }

@@ -89,6 +89,12 @@ double reflected_rotor_inertia(const model::Motor& motor) {
   return motor.efficiency * motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia_kg_m2;
 }
 
+double stroke_damping(const model::Side& side) {
+  const model::Motor& m = side.motor;
+  const double N = m.gear_ratio, K = m.torque_constant_Nm_A;
+  return side.stroke.damping_Nm_s + m.efficiency * N * N * (K * K / m.resistance_ohm + m.damping_Nm_s);
+}
+
 double spring_stiffness(const model::Spring& spring, double stroke_rad) {
   return stroke_rad > spring.rest_angle_rad ? spring.stiffness_positive_Nm_rad : spring.stiffness_negative_Nm_rad;
 }

@@ -69,6 +69,9 @@ constexpr const model::Side& side_of(const model::Vehicle& vehicle, std::size_t 
 /// Rotor inertia as the stroke joint feels it, kg m^2.
 double reflected_rotor_inertia(const model::Motor& motor);
 
+/// Linear damping of the stroke, N m s: its hinge, the motor's own, and its back EMF.
+double stroke_damping(const model::Side& side);
+
 /// Stiffness in force at that stroke, N m/rad.
 double spring_stiffness(const model::Spring& spring, double stroke_rad);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "accuracy.hpp"
@@ -153,27 +154,41 @@ std::pair<Flight, double> fly_peer(const OwnFlight& own, const std::vector<std::
   for (const auto& [left_V, right_V] : voltages)
     for (int i = 0; i < each; ++i) peer.step(left_V, right_V);
   const double took_s = processor_seconds() - begin_s;
-  const reference::PeerState s = peer.state();
+  reference::PeerState s = peer.state();
+  if constexpr (requires { peer.diverged(); })
+    if (peer.diverged()) s.p_WB_W_m[0] = std::numeric_limits<double>::infinity();
   return {{s.p_WB_W_m[0], s.p_WB_W_m[1], s.p_WB_W_m[2], s.q_WB}, took_s};
 }
 
-/// Settings that a user would try: integrators, solvers, and stops with MuJoCo's defaults or as hard as the step allows.
+/// Settings that a careful user would try: all integrators, linear damping given as a load or as the joints' own, and of
+/// MuJoCo stops of its defaults, as stiff as the step allows, or damped so much that they do not throw back.
 std::vector<PeerSettings> peer_settings() {
   std::vector<PeerSettings> all;
-  for (const char* integrator : {"Euler", "implicit"})
-    for (const bool hard : {false, true})
-      all.push_back({"MuJoCo", std::string(integrator) + (hard ? ", hard stops" : ", default stops"),
+  const auto add_mujoco = [&](const std::string& integrator, bool joint_damping) {
+    for (const char* stops : {"default", "stiff", "hard"})
+      all.push_back({"MuJoCo", integrator + (joint_damping ? ", joint damping, " : ", ") + stops + " stops",
                      [=](const OwnFlight& own, const auto& voltages, double step_s) {
-                       const reference::MujocoSettings settings{
-                           .integrator = integrator, .stop_time_s = 2 * step_s, .stop_damping_ratio = hard ? 4.0 : 1.0};
+                       reference::MujocoSettings settings{
+                           .integrator = integrator, .joint_damping = joint_damping, .stop_time_s = 2 * step_s};
+                       if (stops == std::string("hard")) settings.stop_damping_ratio = 4;
+                       if (stops == std::string("default")) settings = reference::with_default_stops(settings);
                        return fly_peer<reference::MujocoPeer>(own, voltages, step_s, settings);
                      }});
+  };
+  for (const bool joint_damping : {false, true}) add_mujoco("Euler", joint_damping);
+  add_mujoco("implicit", true);
+  if (reference::mujoco_has_implicitfast()) add_mujoco("implicitfast", true);
+  add_mujoco("RK4", true);
   for (const bool implicit_spring : {false, true})
-    all.push_back({"DART", implicit_spring ? "implicit spring" : "explicit spring",
-                   [=](const OwnFlight& own, const auto& voltages, double step_s) {
-                     return fly_peer<reference::DartPeer>(own, voltages, step_s,
-                                                          reference::DartSettings{implicit_spring});
-                   }});
+    for (const bool joint_damping : {false, true})
+      all.push_back({"DART",
+                     std::string(implicit_spring ? "implicit" : "explicit") + " spring" +
+                         (joint_damping ? ", joint damping" : ""),
+                     [=](const OwnFlight& own, const auto& voltages, double step_s) {
+                       return fly_peer<reference::DartPeer>(
+                           own, voltages, step_s,
+                           reference::DartSettings{.implicit_spring = implicit_spring, .joint_damping = joint_damping});
+                     }});
   return all;
 }
 
@@ -222,7 +237,12 @@ std::vector<WorkPrecisionRow> work_precision(const model::Vehicle& vehicle, [[ma
   const std::vector<OwnFlight> flights = draw(vehicle, kAboutHover);
   const std::vector<Flight> exact = free_flights(flights, kAboutHover.exact_step_s);
   std::vector<WorkPrecisionRow> rows;
-  const double most = peers ? 68 : 8;  // largest number of rows
+  double most = 8;  // largest number of rows
+#ifdef FLAPPY_HAVE_PEERS
+  constexpr double kPeerSteps_us[] = {1000, 500, 250, 200, 125, 100, 50, 25, 20, 10, 5};
+  const std::vector<PeerSettings> settings = peers ? peer_settings() : std::vector<PeerSettings>();
+  most += static_cast<double>(settings.size() * std::size(kPeerSteps_us));
+#endif
   const auto print_time = [&](const std::string& engine, double us) {
     tell(static_cast<double>(rows.size()) / most, engine + " at " + std::to_string(static_cast<int>(us)) + " us");
   };
@@ -235,12 +255,17 @@ std::vector<WorkPrecisionRow> work_precision(const model::Vehicle& vehicle, [[ma
 #ifdef FLAPPY_HAVE_PEERS
   if (!peers) return rows;
   const auto voltages = voltages_of(flights);
-  for (const PeerSettings& peer : peer_settings())
-    for (const double us : {500, 250, 200, 125, 100, 50, 25, 20, 10, 5}) {
+  for (const PeerSettings& peer : settings) {
+    double before_m = 0;
+    for (const double us : kPeerSteps_us) {
       print_time(peer.engine + ", " + peer.name, us);
       rows.push_back(row_of(peer, us * 1e-6, flights, voltages, exact));
-      if (rows.back().position_error_m < enough_m / 2) break;
+      const double error_m = rows.back().position_error_m;
+      const bool settled = us <= 100 && std::abs(error_m / before_m - 1) < 0.02;  // at another limit than ours
+      if (error_m < enough_m / 2 || settled) break;
+      before_m = error_m;
     }
+  }
 #endif
   return rows;
 }
