@@ -66,14 +66,14 @@ class Tree:
         self.commands = commands_of(build)
         self.files = sorted(p for folder in FOLDERS for p in (self.root / folder).rglob("*.[ch]pp")
                             if str(p.relative_to(self.root)) not in ELSEWHERE)
-        known = set(self.files)
+        known = {str(p): p for p in self.files}
         searched = {Path(word[2:]).resolve() for flags in self.commands.values() for word in flags if word.startswith("-I")}
         searched = sorted(p for p in searched if p.is_relative_to(self.root))
         self.text = {p: p.read_text(encoding="utf-8") for p in self.files}
-        self.includes = {}
+        self.includes = {}  # None: a file that is not the project's
         for file, text in self.text.items():
-            places = [[(folder / name).resolve() for folder in (file.parent, *searched)] for name in INCLUDE.findall(text)]
-            self.includes[file] = [next((p for p in some if p in known), None) for some in places]
+            places = [[os.path.normpath(f"{folder}/{name}") for folder in (file.parent, *searched)] for name in INCLUDE.findall(text)]
+            self.includes[file] = [next((known[p] for p in some if p in known), None) for some in places]
         self.compiled = {p: None for p in self.files if p in self.commands}
         self.ages = self.ages_of_files()
 
@@ -121,7 +121,7 @@ class Tree:
         if namesake in self.compiled:
             return self.commands[namesake]
         near = next((p for p in self.compiled if file in self.includes[p]), None)
-        near = near or next((p for folder in file.parents for p in self.compiled if folder in p.parents), None)
+        near = near or next((p for folder in file.parents for p in self.compiled if str(p).startswith(f"{folder}/")), None)
         return self.commands[near] if near else None
 
     def units(self):
@@ -181,15 +181,15 @@ def faults(root, build, whole):
 
 def self_test():
     """Includes that a unity build and a precompiled header hide, in a source and in headers."""
-    good = {"src/a.hpp": "#pragma once\n#include <string>\ninline std::string a() { return {}; }\n",
-            "src/a.cpp": "#include \"a.hpp\"\nstd::string b() { return a(); }\n",
-            "src/c.cpp": "#include \"a.hpp\"\nstd::string c() { return a(); }\n",
-            "src/late.hpp": "#pragma once\n#include \"a.hpp\"\nstd::string late();\n"}
+    good = {"src/a.hpp": "#pragma once\n#include <cstdint>\ninline std::int64_t a() { return {}; }\n",
+            "src/a.cpp": "#include \"a.hpp\"\nstd::int64_t b() { return a(); }\n",
+            "src/c.cpp": "#include \"a.hpp\"\nstd::int64_t c() { return a(); }\n",
+            "src/late.hpp": "#pragma once\n#include \"a.hpp\"\nstd::int64_t late();\n"}
     cases = [({}, None),
-             ({"src/c.cpp": "std::string c() { return a(); }\n"}, "src/c.cpp: does not compile by itself: src/c.cpp:1:6: error"),
-             ({"src/a.hpp": "#pragma once\ninline std::string a() { return {}; }\n", "src/c.cpp": "#include <string>\n#include \"a.hpp\"\n",
+             ({"src/c.cpp": "std::int64_t c() { return a(); }\n"}, "src/c.cpp: does not compile by itself: src/c.cpp:1:6: error"),
+             ({"src/a.hpp": "#pragma once\ninline std::int64_t a() { return {}; }\n", "src/c.cpp": "#include <cstdint>\n#include \"a.hpp\"\n",
                "src/late.hpp": "#pragma once\n"}, "src/a.cpp: does not compile by itself: src/a.hpp:2:13: error"),
-             ({"src/late.hpp": "#pragma once\nstd::string late();\n"}, "src/late.hpp: does not compile by itself: src/late.hpp:2:6: error")]
+             ({"src/late.hpp": "#pragma once\nstd::int64_t late();\n"}, "src/late.hpp: does not compile by itself: src/late.hpp:2:6: error")]
 
     def in_order(root):
         """What changed last comes first, then what includes it."""
@@ -212,7 +212,7 @@ def self_test():
         unity = build / "Unity/unity_0_cxx.cxx"
         unity.parent.mkdir(parents=True)
         unity.write_text(f"#include \"{root}/src/a.cpp\"\n#include \"{root}/src/c.cpp\"\n", encoding="utf-8")
-        (build / "cmake_pch.hxx").write_text("#include <string>\n", encoding="utf-8")
+        (build / "cmake_pch.hxx").write_text("#include <cstdint>\n", encoding="utf-8")
         command = f"/usr/bin/ccache g++ -std=c++20 -I{root}/src -Winvalid-pch -include {build}/cmake_pch.hxx -o u.o -c {unity}"
         entry = {"directory": str(build), "command": command, "file": str(unity)}
         (build / "compile_commands.json").write_text(json.dumps([entry]), encoding="utf-8")
