@@ -62,6 +62,9 @@ struct Sym3 {
   friend FLAPPY_INLINE Sym3 operator+(const Sym3& a, const Sym3& b) {
     return {a.xx + b.xx, a.yy + b.yy, a.zz + b.zz, a.xy + b.xy, a.yz + b.yz, a.xz + b.xz};
   }
+  friend FLAPPY_INLINE Sym3 operator*(const T& s, const Sym3& m) {
+    return {s * m.xx, s * m.yy, s * m.zz, s * m.xy, s * m.yz, s * m.xz};
+  }
   friend FLAPPY_INLINE Vec3<T> operator*(const Sym3& m, const Vec3<T>& v) {
     return {m.xx * v.x + (m.xy * v.y + m.xz * v.z), m.xy * v.x + (m.yy * v.y + m.yz * v.z),
             m.xz * v.x + (m.yz * v.y + m.zz * v.z)};
@@ -75,11 +78,27 @@ struct Inverse {
   T scale;
 };
 
+/// The power of two that brings a positive number into [1, 2). To multiply by it rounds nothing.
 template <class T>
-FLAPPY_INLINE Inverse<Sym3<T>, T> inverse(const Sym3<T>& m) {
+FLAPPY_INLINE T to_one(const T& x) {
+  return half_to(exponent(x));
+}
+
+/// The same of the geometric mean of two positive numbers, to a factor of 2.
+template <class T>
+FLAPPY_INLINE T to_one_between(const T& x, const T& y) {
+  return half_to(nearest(T(T(0.5) * T(exponent(x) + exponent(y)))));
+}
+
+/// Of a positive definite matrix. The adjugate is that of m / tr(m), but for a power of two: products of three inertias
+/// of an insect would leave the range of single precision.
+template <class T>
+FLAPPY_INLINE Inverse<Sym3<T>, T> inverse(const Sym3<T>& original) {
+  const T s = to_one(T(T(original.xx + original.yy) + original.zz));
+  const Sym3<T> m = s * original;
   const Sym3<T> a{m.yy * m.zz - m.yz * m.yz, m.xx * m.zz - m.xz * m.xz, m.xx * m.yy - m.xy * m.xy,
                   m.xz * m.yz - m.xy * m.zz, m.xy * m.xz - m.xx * m.yz, m.xy * m.yz - m.xz * m.yy};
-  return {a, T(1) / T(m.xx * a.xx + (m.xy * a.xy + m.xz * a.xz))};
+  return {a, s / T(m.xx * a.xx + (m.xy * a.xy + m.xz * a.xz))};
 }
 
 /// Inertia tensor of a second-moment tensor (integral of r r^T): tr(P) 1 - P.

@@ -93,17 +93,16 @@ struct Hinge {
 };
 
 template <int side, class T>
-FLAPPY_INLINE Hinge<T> stroke_hinge(const SideParameters<T>& p, const SideState<T>& q) {
+FLAPPY_INLINE Hinge<T> stroke_hinge(const SideParameters<T>& p, const SideState<T>& q, const T& friction) {
   const T lowest = p.stroke_lower_rad - q.stroke_rad, highest = p.stroke_upper_rad - q.stroke_rad;
-  if constexpr (side > 0)
-    return {q.stroke_rate_rad_s, q.stroke_rate_before_rad_s, lowest, highest, p.stroke_friction_Nm};
-  else return {-q.stroke_rate_rad_s, -q.stroke_rate_before_rad_s, -highest, -lowest, p.stroke_friction_Nm};
+  if constexpr (side > 0) return {q.stroke_rate_rad_s, q.stroke_rate_before_rad_s, lowest, highest, friction};
+  else return {-q.stroke_rate_rad_s, -q.stroke_rate_before_rad_s, -highest, -lowest, friction};
 }
 
 template <class T>
-FLAPPY_INLINE Hinge<T> rotation_hinge(const SideParameters<T>& p, const SideState<T>& q) {
+FLAPPY_INLINE Hinge<T> rotation_hinge(const SideParameters<T>& p, const SideState<T>& q, const T& friction) {
   return {q.rotation_rate_rad_s, q.rotation_rate_before_rad_s, p.rotation_lower_rad - q.rotation_rad,
-          p.rotation_upper_rad - q.rotation_rad, p.rotation_friction_Nm};
+          p.rotation_upper_rad - q.rotation_rad, friction};
 }
 
 template <class T>
@@ -120,6 +119,8 @@ FLAPPY_INLINE T stopped(const Hinge<T>& q, const T& turn) {
 template <class T>
 struct Sym2 {
   T ll, rr, lr;
+
+  friend FLAPPY_INLINE Sym2 operator*(const T& s, const Sym2& m) { return {s * m.ll, s * m.rr, s * m.lr}; }
 };
 template <class T>
 FLAPPY_INLINE Inverse<Sym2<T>, T> inverse(const Sym2<T>& m) {
@@ -186,13 +187,15 @@ FLAPPY_INLINE BodyDrive<T> drive_body(const Parameters<T>& p, const State<T>& x,
   return drive;
 }
 
-/// The hinges after the body is eliminated.
+/// The hinges after the body is eliminated. Inertias and torques are multiplied by `scale`, a power of two that brings
+/// the inertias near 1: products of three of an insect's would leave the range of single precision.
 template <class T>
 struct HingeSystem {
-  Vec3<T> stroke_l, stroke_r, rotation_l, rotation_r;  // columns of G
-  Sym2<T> strokes, rotations;                          // blocks of H - G^T I^-1 G
-  T ll, rr, lr, rl;                                    // coupling of strokes and rotations: (stroke, rotation)
-  T s_l, s_r, r_l, r_r;                                // torques on strokes and rotations, without dry friction
+  Vec3<T> stroke_l, stroke_r, rotation_l, rotation_r;  // columns of G, not scaled
+  T scale;
+  Sym2<T> strokes, rotations;  // blocks of H - G^T I^-1 G
+  T ll, rr, lr, rl;            // coupling of strokes and rotations: (stroke, rotation)
+  T s_l, s_r, r_l, r_r;        // torques on strokes and rotations, without dry friction
 };
 
 template <class T>
@@ -219,19 +222,23 @@ FLAPPY_INLINE HingeSystem<T> eliminate_body(const Parameters<T>& p, const Sides<
     return T((own - body.inverse_mass * dot(e, f)) - scale * dot(g, x));
   };
   const SideParameters<T>&pl = p.left, &pr = p.right;
-  h.strokes = {left(l.stroke_inertia + (pl.rotor_kg_m2 + pl.stroke_stiffening_kg_m2), esl, esl, h.stroke_l, xsl),
-               left(r.stroke_inertia + (pr.rotor_kg_m2 + pr.stroke_stiffening_kg_m2), esr, esr, h.stroke_r, xsr),
-               left(T(0), esl, esr, h.stroke_l, xsr)};
-  h.rotations = {left(l.rotation_inertia + load.left.rotation_stiffening_kg_m2, erl, erl, h.rotation_l, xrl),
-                 left(r.rotation_inertia + load.right.rotation_stiffening_kg_m2, err, err, h.rotation_r, xrr),
-                 left(T(0), erl, err, h.rotation_l, xrr)};
-  h.ll = left(l.cross_inertia, esl, erl, h.stroke_l, xrl);
-  h.rr = left(r.cross_inertia, esr, err, h.stroke_r, xrr);
-  h.lr = left(T(0), esl, err, h.stroke_l, xrr);
-  h.rl = left(T(0), esr, erl, h.stroke_r, xrl);
+  const Sym2<T> strokes{
+      left(l.stroke_inertia + (pl.rotor_kg_m2 + pl.stroke_stiffening_kg_m2), esl, esl, h.stroke_l, xsl),
+      left(r.stroke_inertia + (pr.rotor_kg_m2 + pr.stroke_stiffening_kg_m2), esr, esr, h.stroke_r, xsr),
+      left(T(0), esl, esr, h.stroke_l, xsr)};
+  const Sym2<T> rotations{left(l.rotation_inertia + load.left.rotation_stiffening_kg_m2, erl, erl, h.rotation_l, xrl),
+                          left(r.rotation_inertia + load.right.rotation_stiffening_kg_m2, err, err, h.rotation_r, xrr),
+                          left(T(0), erl, err, h.rotation_l, xrr)};
+  const T s = h.scale = to_one_between(T(strokes.ll + strokes.rr), T(rotations.ll + rotations.rr));
+  h.strokes = s * strokes;
+  h.rotations = s * rotations;
+  h.ll = s * left(l.cross_inertia, esl, erl, h.stroke_l, xrl);
+  h.rr = s * left(r.cross_inertia, esr, err, h.stroke_r, xrr);
+  h.lr = s * left(T(0), esl, err, h.stroke_l, xrr);
+  h.rl = s * left(T(0), esr, erl, h.stroke_r, xrl);
 
   const auto driven = [&](const T& torque, const auto& e, const Vec3<T>& shoulder, const Vec3<T>& x) {
-    return T((torque - dot(e, shoulder)) - scale * dot(x, drive.moment));
+    return T(s * T((torque - dot(e, shoulder)) - scale * dot(x, drive.moment)));
   };
   h.s_l = driven(load.left.stroke_torque_Nm - l.stroke_bias, esl, drive.shoulder_left, xsl);
   h.s_r = driven(load.right.stroke_torque_Nm - r.stroke_bias, esr, drive.shoulder_right, xsr);
@@ -275,8 +282,10 @@ struct Motion {
 template <class T>
 FLAPPY_INLINE Motion<T> move(const Parameters<T>& p, const State<T>& x, const BodyInertia<T>& body,
                              const BodyDrive<T>& drive, const HingeSystem<T>& h, const T& step, const T& per_step) {
-  const Hinge<T> stroke_l = stroke_hinge<+1>(p.left, x.left), stroke_r = stroke_hinge<-1>(p.right, x.right);
-  const Hinge<T> rotation_l = rotation_hinge(p.left, x.left), rotation_r = rotation_hinge(p.right, x.right);
+  const Hinge<T> stroke_l = stroke_hinge<+1>(p.left, x.left, T(h.scale * p.left.stroke_friction_Nm));
+  const Hinge<T> stroke_r = stroke_hinge<-1>(p.right, x.right, T(h.scale * p.right.stroke_friction_Nm));
+  const Hinge<T> rotation_l = rotation_hinge(p.left, x.left, T(h.scale * p.left.rotation_friction_Nm));
+  const Hinge<T> rotation_r = rotation_hinge(p.right, x.right, T(h.scale * p.right.rotation_friction_Nm));
   const T s_l = h.s_l + dry_friction(h.strokes.ll, stroke_l, h.s_l, per_step);
   const T s_r = h.s_r + dry_friction(h.strokes.rr, stroke_r, h.s_r, per_step);
 

@@ -307,7 +307,7 @@ void step_mean_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& 
     x.attitude = body.attitude;
     x.position_m = body.com_m - rotation_matrix(x.attitude) * from_origin_m;
     look_around(x, p, plan, block, first);
-    const typename L::Mask moves = freeze_implausible(x, block, first);
+    const typename L::Mask moves = freeze_implausible(x, plan.step_s, block, first);
     if (rarely(!moves)) keep(!moves, load_rows<State<L>>(block.state, first), x);
     store_rows(x, block.state, first);
     lanes.store(moves);

@@ -10,10 +10,12 @@ inline namespace FLAPPY_ISA {
 
 using namespace model;
 
-/// A flapper that moves faster than this does not fly but diverges.
+/// A flapper that moves faster than this does not fly but diverges. A small vehicle turns fast, and is flown with short
+/// steps: its rates may also turn it by kPlausibleBodyTurn_rad, or a hinge by kPlausibleHingeTurn_rad, within a step.
 inline constexpr double kPlausibleSpeed_m_s = 100;
-inline constexpr double kPlausibleBodyRate_rad_s = 1000;
-inline constexpr double kPlausibleHingeRate_rad_s = 20000;  // the published limit of the rotation joint is 2000
+inline constexpr double kPlausibleBodyRate_rad_s = 1000, kPlausibleBodyTurn_rad = 0.1;
+// the published limit of the rotation joint is 2000 rad/s
+inline constexpr double kPlausibleHingeRate_rad_s = 20000, kPlausibleHingeTurn_rad = 2;
 inline constexpr double kPlausiblePosition_m = 10000;
 /// A flapper that rose by this height has left its support: from then on, touching the ground is an event.
 inline constexpr double kTakeOffClearance_m = 0.005;
@@ -48,24 +50,25 @@ FLAPPY_INLINE void look_around(State<L>& x, const Parameters<L>& p, const StepPl
 }
 
 template <class L>
-FLAPPY_INLINE typename L::Mask plausible(const State<L>& x) {
+FLAPPY_INLINE typename L::Mask plausible(const State<L>& x, double step_s) {
+  const double body_rad_s = max(kPlausibleBodyRate_rad_s, kPlausibleBodyTurn_rad / step_s);
+  const double hinge_rad_s = max(kPlausibleHingeRate_rad_s, kPlausibleHingeTurn_rad / step_s);
   const auto within = [](const L& v, double limit) { return abs(v) <= L(limit); };  // false for NaN
   const auto all = [&](const Vec3<L>& v, double limit) {
     return within(v.x, limit) & within(v.y, limit) & within(v.z, limit);
   };
   const auto side = [&](const SideState<L>& q) {
     return within(q.stroke_rad, kLargestAngle_rad) & within(q.rotation_rad, kLargestAngle_rad) &
-           within(q.stroke_rate_rad_s, kPlausibleHingeRate_rad_s) &
-           within(q.rotation_rate_rad_s, kPlausibleHingeRate_rad_s);
+           within(q.stroke_rate_rad_s, hinge_rad_s) & within(q.rotation_rate_rad_s, hinge_rad_s);
   };
   return all(x.position_m, kPlausiblePosition_m) & all(x.com_velocity_m_s, kPlausibleSpeed_m_s) &
-         all(x.body_rate_rad_s, kPlausibleBodyRate_rad_s) & within(x.attitude.w, 2) & side(x.left) & side(x.right);
+         all(x.body_rate_rad_s, body_rad_s) & within(x.attitude.w, 2) & side(x.left) & side(x.right);
 }
 
 /// Marks implausible flappers as frozen; true for lanes that are not frozen.
 template <class T, class L>
-FLAPPY_INLINE typename L::Mask freeze_implausible(const State<L>& x, Block<T>& block, int first) {
-  typename L::Mask moves = plausible(x);
+FLAPPY_INLINE typename L::Mask freeze_implausible(const State<L>& x, double step_s, Block<T>& block, int first) {
+  typename L::Mask moves = plausible(x, step_s);
   std::uint32_t any_status = 0;
   for (int i = 0; i < kWidth<T>; ++i) any_status |= block.status[first + i];
   if (!any(!moves) && !(any_status & kFrozen)) return moves;

@@ -367,7 +367,7 @@ void step_jointed_block(Block<T>& block, BlockEffects<T> in_force, const StepPla
     if (rarely(!possible))
       for (int i = 0; i < kWidth<T>; ++i)
         if (!possible.raw[i]) block.status[first + i] |= kFrozen;
-    const typename L::Mask moves = freeze_implausible(x, block, first);
+    const typename L::Mask moves = freeze_implausible(x, plan.step_s, block, first);
     if (rarely(!moves)) keep(!moves, load_rows<State<L>>(block.state, first), x);
     store_rows(x, block.state, first);
     lanes.store(moves, block);

@@ -140,7 +140,7 @@ FLAPPY_INLINE void finish(State<L>& x, const Vec3<L>& com_m, const Voltages<L>& 
                           bool touches_with_points, int first) {
   x.position_m = where(x.support > L(0), x.position_m, com_m - rotation_matrix(x.attitude) * centre_of_mass(p, x));
   if (!touches_with_points) look_around(x, p, plan, block, first);
-  const typename L::Mask moves = freeze_implausible(x, block, first);
+  const typename L::Mask moves = freeze_implausible(x, plan.step_s, block, first);
   if (rarely(!moves)) keep(!moves, load_rows<State<L>>(block.state, first), x);
   store_rows(x, block.state, first);
   meter.add(moves);

@@ -544,6 +544,116 @@ TEST(Mirror, MirroredVehicleMovesMirrored) {
   }
 }
 
+// ---- scale
+
+/// The vehicle in other units: lengths and times times `a`, masses times a^3. Speeds, densities, angles and voltages
+/// keep their numbers.
+model::Vehicle scaled(model::Vehicle v, double a) {
+  const std::pair<const char*, int> powers[] = {{"flapping_Hz", -1},
+                                                {"hold_s", 1},
+                                                {"mass_kg", 3},
+                                                {"inertia_kg_m2", 5},
+                                                {"com_m", 1},
+                                                {"shoulder_m", 1},
+                                                {"below_m", 1},
+                                                {"above_m", 1},
+                                                {"around_m", 1},
+                                                {"wing_length_m", 1},
+                                                {"mean_chord_m", 1},
+                                                {"damping_Nm_s", 4},
+                                                {"friction_Nm", 3},
+                                                {"stiffness_positive_Nm_rad", 3},
+                                                {"stiffness_negative_Nm_rad", 3},
+                                                {"resistance_ohm", -2},
+                                                {"torque_constant_Nm_A", 1},
+                                                {"compliance_rad_Nm", -3},
+                                                {"twist_rad_N", -2},
+                                                {"drag_area_m2", 2},
+                                                {"centre_z_m", 1}};
+  for (const model::Parameter& p : model::parameters(v))
+    for (const auto& [name, power] : powers)
+      if (("." + p.path + ".").find("." + std::string(name) + ".") != std::string::npos ||
+          p.path.ends_with("." + std::string(name)) || p.path.ends_with("rotor_" + std::string(name)))
+        *p.value *= std::pow(a, power);
+  return v;
+}
+
+FlapperState scaled(FlapperState s, double a) {
+  for (double& x : s.position_m) x *= a;
+  for (auto* rates : {s.stroke_rate_rad_s, s.rotation_rate_rad_s})
+    for (int i = 0; i < 2; ++i) rates[i] /= a;
+  for (double& w : s.body_rate_rad_s) w /= a;
+  return s;
+}
+
+const FlapperState kTumbling = [] {
+  FlapperState s;
+  s.velocity_m_s[0] = 0.3, s.velocity_m_s[1] = -0.2;
+  s.body_rate_rad_s[0] = 2, s.body_rate_rad_s[1] = -1, s.body_rate_rad_s[2] = 3;
+  return s;
+}();
+
+/// The flight of a scaled vehicle in the units of the vehicle itself, step by step.
+template <class T>
+std::vector<FlapperState> scaled_flight(const model::Vehicle& v, double a, int steps,
+                                        const FlapperState& start = kTumbling,
+                                        const Input& input = {10, 1, 0.5, 0.08}) {
+  Batch<T> b(1, scaled(v, a), options(kStep * a, kGravity / a));
+  b.reset(0, scaled(start, a));
+  b.set_input(0, input);
+  std::vector<FlapperState> flight;
+  for (int n = 0; n < steps; ++n) b.step(1), flight.push_back(scaled(b.state(0), 1 / a));
+  return flight;
+}
+
+/// The shipped vehicles, and one with effects that bring inertias, springs and air of their own.
+std::vector<model::Vehicle> vehicles_to_scale() {
+  model::Vehicle v = test::identified();
+  v.effects["added_mass"] = {{"factor", 1}};
+  v.effects["gear_backlash"] = {{"gap_rad", 0.02}};
+  v.effects["stop_compliance"] = {{"compliance_rad_Nm", 50}, {"damping_ratio", 0.5}};
+  v.effects["wing_flexibility"] = {{"twist_rad_N", 0.5}};
+  v.effects["rotational_lift"] = {{"factor", 1}};
+  v.effects["wake_capture"] = {{"gain", 0.1}, {"decay", 0.15}};
+  v.effects["clap_and_fling"] = {{"gain", 0.5}, {"contact_rad", 1.3}};
+  v.effects["body_drag"] = {{"drag_area_m2", 0.0015}, {"centre_z_m", 0.01}};
+  return {test::nominal(), test::identified(), v};
+}
+
+// A change of units by powers of two rounds nothing, unless a number leaves the normal range of single precision.
+TEST(Scale, OfUnitsChangesNoBitOfAFlight) {
+  for (const model::Vehicle& v : vehicles_to_scale()) {
+    const std::vector<FlapperState> flight = scaled_flight<float>(v, 1, 2000);
+    for (const double a : {8.0, 0x1p-3, 0x1p-4, 0x1p-6}) {  // from a hummingbird of 6 kg to one of 0.05 mg
+      const std::vector<FlapperState> other = scaled_flight<float>(v, a, 2000);
+      std::size_t n = 0;
+      while (n < flight.size() && largest_difference(flight[n], other[n]) == 0) ++n;
+      EXPECT_EQ(n, flight.size()) << v.name << " at " << a << " differs from this step on";
+    }
+  }
+}
+
+TEST(Scale, OfAVehicleOf5MilligrammesIsFlownInFloatAsInDouble) {
+  const double a = std::cbrt(5e-6 / mechanics(test::nominal(), {}).mass);  // no power of two
+  for (const model::Vehicle& v : vehicles_to_scale()) {
+    const auto flight = [&]<class T>(T) { return scaled_flight<T>(v, a, 300, {}, {9, 0.3, 0.2, 0.02}); };  // a beat
+    const std::vector<FlapperState> single = flight(1.0F), twice = flight(1.0);
+    double error[2] = {0, 0}, largest[2] = {0, 0};
+    for (std::size_t n = 19; n < single.size(); n += 20)
+      for (std::size_t i = 0; i < 2; ++i) {
+        const auto compare = [&](std::size_t k, double x, double y) {
+          error[k] = std::max(error[k], std::abs(x - y)), largest[k] = std::max(largest[k], std::abs(y));
+        };
+        compare(0, single[n].rotation_rate_rad_s[i], twice[n].rotation_rate_rad_s[i]);
+        compare(0, single[n].stroke_rate_rad_s[i], twice[n].stroke_rate_rad_s[i]);
+        compare(1, single[n].body_rate_rad_s[i], twice[n].body_rate_rad_s[i]);
+      }
+    // 300 roundings of 6e-8, which add up like noise, 1e-6, and grow a little
+    expect_below(v.name + "_5_mg_hinges", error[0] / largest[0], 1e-5);
+    expect_below(v.name + "_5_mg_body", error[1] / largest[1], 1e-5);
+  }
+}
+
 // ---- stops
 
 /// Follows one hinge from step to step.
