@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "io/installation.hpp"
+#include "io/log.hpp"
 #include "io/schema.hpp"
 #include "io/toml.hpp"
 #include "io/toml_writer.hpp"
@@ -75,11 +76,16 @@ std::string place(const Entry& entry) {
   return written ? place(entry.node->source(), entry.section->document->name) : place(*entry.section);
 }
 
-[[noreturn]] void refuse(const std::string& where, const std::string& path, std::string_view what,
-                         std::string_view accepted) {
+std::string line_of(const std::string& where, const std::string& path, std::string_view what,
+                    std::string_view accepted) {
   std::string line = where + ": " + (path.empty() ? "" : path + ": ") + std::string(what);
   if (!accepted.empty()) line += "; accepted: " + std::string(accepted);
-  throw InputError(line);
+  return line;
+}
+
+[[noreturn]] void refuse(const std::string& where, const std::string& path, std::string_view what,
+                         std::string_view accepted) {
+  throw InputError(line_of(where, path, what, accepted));
 }
 
 [[noreturn]] void refuse(const Entry& entry, std::string_view what, std::string_view accepted) {
@@ -518,6 +524,11 @@ std::string Table::path() const { return section_->path; }
 void Table::fail(std::string_view key, std::string_view what, std::string_view accepted) const {
   if (key.empty()) refuse(place(*section_), section_->path, what, accepted);
   refuse(find(*section_, key), what, accepted);
+}
+
+void Table::warn(std::string_view key, std::string_view what) const {
+  const Entry entry = find(*section_, key);
+  log(LogLevel::warning, line_of(place(entry), entry.path, what, ""));
 }
 
 void Table::finish() const { refuse_unasked(*section_); }

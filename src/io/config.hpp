@@ -73,6 +73,8 @@ class Table {
   std::string path() const;               ///< full dotted path; empty for the root
   /// Throws an InputError of the caller's choice about a key, or about this table where `key` is empty.
   [[noreturn]] void fail(std::string_view key, std::string_view what, std::string_view accepted) const;
+  /// Logs a warning with the place of the key, which is accepted all the same.
+  void warn(std::string_view key, std::string_view what) const;
   /// Refuses every key, in this table and in tables below, that was not read.
   void finish() const;
 

@@ -4,8 +4,10 @@
 #include <cmath>
 
 #include "io/config.hpp"
+#include "io/text.hpp"
 #include "io/toml_writer.hpp"
 #include "model/beat_averaged.hpp"
+#include "model/coarse_step.hpp"
 #include "model/contact.hpp"
 #include "model/effects/registry.hpp"
 #include "model/jointed.hpp"
@@ -130,6 +132,10 @@ Vehicle read_vehicle_for_steps(const std::filesystem::path& path, double step_s)
   if (std::abs(steps - std::round(steps)) > 1e-6 || steps < 0.5)
     io::Config::load(path).root().table("driver").fail(
         "hold_s", "physics goes by steps of " + io::shortest_digits(step_s) + " s here", "a multiple of that");
+  if (const auto coarse = coarse_step(vehicle, step_s); coarse && coarse->refused)
+    io::Config::load(path).root().table("driver").fail(
+        "flapping_Hz", "the step of " + io::shortest_digits(step_s) + " s here " + coarse->what,
+        "a beat of at most " + io::format("%.4g", vehicle.driver.flapping_Hz * coarse->enough_s / step_s) + " Hz");
   return vehicle;
 }
 

@@ -6,8 +6,10 @@
 #include "flappy/vehicle_file.hpp"
 #include "flight/schedule.hpp"
 #include "io/sha256.hpp"
+#include "io/text.hpp"
 #include "io/toml_writer.hpp"
 #include "model/beat_averaged.hpp"
+#include "model/coarse_step.hpp"
 #include "model/contact.hpp"
 #include "model/effects/registry.hpp"
 
@@ -274,6 +276,7 @@ class Reader {
         c_.vehicle.driver.hold_s * c_.vehicle.driver.flapping_Hz > 0.25)
       root_.fail("vehicle", "its driver.hold_s is longer than a quarter of a beat",
                  "a hold_s of at most 0.25 / flapping_Hz");
+    check_beat(step);
     for (const flight::Wave& w : c_.excitation.waves)
       if (std::max(w.from_hz, w.to_hz) > 0.5 * o.control_hz)
         root_.fail(
@@ -311,6 +314,21 @@ class Reader {
                        std::to_string(kKeptSteps) + " steps are kept",
                    "a longer step, or a shorter delay");
     }
+  }
+
+  /// Refuses, or warns of, a step that is long for the beat of the wings.
+  void check_beat(double step_s) const {
+    const auto coarse = model::coarse_step(c_.vehicle, step_s);
+    if (!coarse) return;
+    // the longest step that does, and is a whole share of the control period and of the driver's hold
+    const double period_s = 1 / c_.fleet.control_hz, hold_s = c_.vehicle.jointed ? period_s : c_.vehicle.driver.hold_s;
+    double shares = std::ceil(period_s / coarse->enough_s - 1e-6);
+    constexpr double kMostShares = 1e6;
+    while (shares < kMostShares && !whole(hold_s * shares / period_s)) ++shares;
+    const double fits_s = period_s / shares;
+    const std::string what = coarse->what + " (vehicle " + io::toml_string(c_.vehicle.name) + ")";
+    if (coarse->refused) root_.fail("flight.step_s", what, "at most " + io::format("%.6g", fits_s));
+    root_.warn("flight.step_s", what + " for a lift within a per cent; " + io::format("%.6g", fits_s) + " does");
   }
 
   void keep_texts() {

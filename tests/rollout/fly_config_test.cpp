@@ -114,6 +114,14 @@ TEST(FlyConfig, RefusesInOneLine) {
   EXPECT_EQ(
       refusal({"flight.step_s=4e-4"}),
       "--set flight.step_s=4e-4: flight.step_s: does not divide the driver's hold of 0.001 s; accepted: hold_s / n");
+  // a step that divides the control period and the driver's hold: 2 ms / 34 for 120 Hz, as 30 steps to a beat of 8.3 ms
+  EXPECT_EQ(refusal({"flight.step_s=1e-3", "vehicle.driver.flapping_Hz=150"}),
+            "--set flight.step_s=1e-3: flight.step_s: is 6.67 steps per beat of 150 Hz, whose wings need 16 (vehicle "
+            "\"hummingbird_identified\"); accepted: at most 0.000333333");
+  EXPECT_EQ(refusal({"vehicle.gait.frequency_Hz=717"}, source_path("configs/fly/hummingbird_driven.toml")),
+            source_path("configs/fly/hummingbird_driven.toml") +
+                ":9:1: flight.step_s: is 5.58 steps per beat of 717 Hz, whose wings need 16 (vehicle "
+                "\"hummingbird_driven\"); accepted: at most 8.69565e-05");
   EXPECT_EQ(refusal({"flight.step_s=5e-5", "vehicle.effects.command_delay.delay_s=0.02"}),
             "--set flight.step_s=5e-5: flight.step_s: is too short for a command_delay of 0.02 s, of which 254 steps "
             "are kept; accepted: a longer step, or a shorter delay");

@@ -10,6 +10,8 @@
 #include "flappy/vehicle_file.hpp"
 #include "io/config.hpp"
 #include "io/statistics.hpp"
+#include "io/text.hpp"
+#include "model/coarse_step.hpp"
 #include "sim/randomise.hpp"
 
 namespace flappy::bench {
@@ -59,6 +61,11 @@ Job read_job(const std::filesystem::path& path, const std::vector<std::string>& 
     char what[64];
     std::snprintf(what, sizeof what, "does not divide the driver's hold of %g s", vehicle.driver.hold_s);
     root.fail("step_s", what, "hold_s / n");
+  }
+  if (const auto coarse = model::coarse_step(vehicle, job.options.step_s)) {
+    const std::string enough = "at most " + io::shortest_digits(coarse->enough_s);
+    if (coarse->refused) root.fail("step_s", coarse->what, enough);
+    root.warn("step_s", coarse->what + "; enough is " + enough);
   }
   return job;
 }
