@@ -222,4 +222,8 @@ struct PhysicalFault {
 /// The first body whose inertia is not positive definite or violates the triangle inequality, if any.
 std::optional<PhysicalFault> physical_fault(const Vehicle& vehicle);
 
+/// What no robot that flaps can be, and a slip in a file makes: a side that is not the mirror image of the other, an
+/// inertia that needs mass outside the vehicle. Files are held to it, draws are not.
+std::optional<PhysicalFault> layout_fault(const Vehicle& vehicle);
+
 }  // namespace flappy::model

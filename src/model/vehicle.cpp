@@ -3,6 +3,8 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <tuple>
 
 #include "io/text.hpp"
 #include "model/effects/registry.hpp"
@@ -224,6 +226,60 @@ std::optional<PhysicalFault> physical_fault(const Vehicle& v) {
         return PhysicalFault{
             std::string(path) + ".inertia_kg_m2", "no rigid body has this inertia: " + why,
             "positive principal moments, none above the sum of the other two, but for 0.01 % of rounding"};
+  return std::nullopt;
+}
+
+namespace {
+
+/// A body whose radius of gyration, sqrt(I / m), is longer than `reach_m`, the farthest that its mass can be.
+std::optional<PhysicalFault> spread_fault(const std::string& path, const RigidBody& b, double reach_m,
+                                          const std::string& reach) {
+  const InertiaTensor& i = b.inertia_kg_m2;
+  const double largest = std::max({i.xx, i.yy, i.zz}), radius_m = std::sqrt(largest / b.mass_kg);
+  if (!(reach_m > 0) || radius_m <= reach_m) return std::nullopt;
+  return PhysicalFault{
+      path + ".inertia_kg_m2",
+      io::format("needs mass %.3g m from the centre of mass, and ", radius_m) + reach +
+          io::format(" ends at %.3g m; is it in g mm^2, which are 1e-9 kg m^2?", reach_m),
+      io::format("moments of at most %.3g kg m^2, mass times that squared", b.mass_kg * reach_m * reach_m)};
+}
+
+double span_m(const Side& side, const Jointed::Wing* strips) {
+  double span = side.planform.wing_length_m;
+  if (strips != nullptr)
+    for (const Jointed::Strip& s : strips->strips) span = std::max(span, s.span_m + s.width_m / 2);
+  return span;
+}
+
+}  // namespace
+
+std::optional<PhysicalFault> layout_fault(const Vehicle& v) {
+  const Extent& e = v.extent;
+  if (auto fault = spread_fault("torso", v.torso, std::hypot(e.around_m, std::max(e.below_m, e.above_m)), "extent"))
+    return fault;
+  if (v.beat_averaged) return std::nullopt;
+  const char* const kMirror =
+      "y to the left of B: on the right, shoulder_m.y and com_m.y, inertia xy and yz have the other sign";
+  const double left_m = v.left.shoulder_m.y, right_m = v.right.shoulder_m.y;
+  if (right_m > left_m || (right_m == left_m && left_m != 0))
+    return PhysicalFault{left_m < 0 ? "left.shoulder_m.y" : "right.shoulder_m.y",
+                         "the right shoulder is not right of the left one", kMirror};
+  const std::pair<const char*, const Side*> sides[] = {{"left", &v.left}, {"right", &v.right}};
+  for (const auto& [name, side] : sides) {
+    const std::string path = name;
+    if ((side == &v.left ? 1 : -1) * side->wing.com_m.y < 0)
+      return PhysicalFault{path + ".wing.com_m.y", "is on the other side of the hinge than the wing", kMirror};
+    const Jointed::Wing* const strips = v.jointed ? &(side == &v.left ? v.jointed->left : v.jointed->right) : nullptr;
+    if (auto fault = spread_fault(path + ".wing", side->wing, span_m(*side, strips), "the wing")) return fault;
+  }
+  if (v.left.leading_edge.com_m.y * v.right.leading_edge.com_m.y > 0)
+    return PhysicalFault{"right.leading_edge.com_m.y", "is on the same side of its hinge as on the left", kMirror};
+  const std::tuple<const char*, const InertiaTensor*, const InertiaTensor*> tensors[] = {
+      {"right.wing", &v.left.wing.inertia_kg_m2, &v.right.wing.inertia_kg_m2},
+      {"right.leading_edge", &v.left.leading_edge.inertia_kg_m2, &v.right.leading_edge.inertia_kg_m2}};
+  for (const auto& [path, left, right] : tensors)
+    if (left->yz != 0 && left->yz == right->yz)
+      return PhysicalFault{std::string(path) + ".inertia_kg_m2.yz", "is that of the left, not mirrored", kMirror};
   return std::nullopt;
 }
 

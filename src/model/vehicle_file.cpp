@@ -91,6 +91,8 @@ Vehicle vehicle_of(const io::Config& config) {
   root.finish();
   if (const std::optional<PhysicalFault> fault = physical_fault(vehicle))
     root.fail(fault->path, fault->what, fault->accepted);
+  if (const std::optional<PhysicalFault> fault = layout_fault(vehicle))
+    root.fail(fault->path, fault->what, fault->accepted);
   return vehicle;
 }
 

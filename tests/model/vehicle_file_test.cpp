@@ -405,6 +405,36 @@ TEST_F(VehicleFile, RefusesAnInertiaOfNoBody) {
             refused("torso", "smallest principal moment is -1.601e-09"));
 }
 
+// The slips of a right side that was copied from the left, and of g mm^2 in place of kg m^2.
+TEST_F(VehicleFile, RefusesASideThatIsNoMirrorImage) {
+  const std::string accepted =
+      "; accepted: y to the left of B: on the right, shoulder_m.y and com_m.y, inertia xy and yz have the other sign";
+  EXPECT_EQ(edited("[right]", "y = -13.95e-3", "y = ^13.96e-3"),
+            "^: right.shoulder_m.y: the right shoulder is not right of the left one" + accepted);
+  EXPECT_EQ(edited("[right]", "y = -13.95e-3", "y = ^13.95e-3"),
+            "^: right.shoulder_m.y: the right shoulder is not right of the left one" + accepted);
+  EXPECT_EQ(edited("[right.wing]", "y = -37.3242e-3", "y = ^37.3242e-3"),
+            "^: right.wing.com_m.y: is on the other side of the hinge than the wing" + accepted);
+  EXPECT_EQ(edited("[right.leading_edge]", "y = -3.3023e-3", "y = ^3.3023e-3"),
+            "^: right.leading_edge.com_m.y: is on the same side of its hinge as on the left" + accepted);
+  EXPECT_EQ(edited("[right.wing]", "yz = -0.1968e-9", "yz = ^0.1968e-9"),
+            "^: right.wing.inertia_kg_m2.yz: is that of the left, not mirrored" + accepted);
+}
+
+TEST_F(VehicleFile, RefusesAnInertiaThatReachesOutOfTheVehicle) {
+  // sqrt(0.0042381285 / 0.0109067) m; the extent is hypot(84, 18.9913) mm, and 0.0109067 times its square the limit
+  EXPECT_EQ(
+      edited("[torso]", "inertia_kg_m2 = { xx = 4238.1285e-9, yy = 3970.1646e-9, zz = 2440.9505e-9",
+             "inertia_kg_m2 = ^{ xx = 4238.1285e-6, yy = 3970.1646e-6, zz = 2440.9505e-6"),
+      "^: torso.inertia_kg_m2: needs mass 0.623 m from the centre of mass, and extent ends at 0.0861 m; is it in g "
+      "mm^2, which are 1e-9 kg m^2?; accepted: moments of at most 8.09e-05 kg m^2, mass times that squared");
+  EXPECT_EQ(
+      edited("[left.wing]", "inertia_kg_m2 = { xx = 21.4402e-9, yy = 2.2204e-9, zz = 19.2209e-9",
+             "inertia_kg_m2 = ^{ xx = 21.4402e-6, yy = 2.2204e-6, zz = 19.2209e-6"),
+      "^: left.wing.inertia_kg_m2: needs mass 0.585 m from the centre of mass, and the wing ends at 0.07 m; is it "
+      "in g mm^2, which are 1e-9 kg m^2?; accepted: moments of at most 3.07e-07 kg m^2, mass times that squared");
+}
+
 TEST_F(VehicleFile, RefusesWhatIsNoVehicle) {
   EXPECT_EQ(edited("", "schema = 1", "schema = ^2"),
             "^: schema: 2 is read by a newer flappy than this one; accepted: 1");
