@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <ranges>
 #include <stdexcept>
 #include <utility>
 
@@ -14,6 +15,10 @@ namespace {
 /// Cut of the draw of a coefficient whose vehicle file declares a standard deviation.
 constexpr double kDeclaredCut_sd = 4;
 constexpr std::uint32_t kIndicesPerDraw = 64;  // a cut at 1 sd is redrawn 63 times once in 1e31
+/// Draws that together make no body are drawn again. The indices of an attempt are apart from those of 16,384 draws of
+/// another. A table of which kTried attempts in a row fail is refused, so at least about 5 % succeed, and kAttempts in a
+/// row fail once in 1e5 vehicles or less.
+constexpr std::uint32_t kIndicesPerAttempt = 1U << 20, kAttempts = 256, kTried = 64;
 
 std::string six_digits(double value) {
   char text[32];
@@ -38,7 +43,8 @@ Randomisation::Randomisation(model::Vehicle nominal, const io::Table& config) : 
       table.fail("minor", "a draw before this one is minor", "minor draws behind all others");
     check_bodies(table, draws_.back());
   };
-  for (const io::Table& table : config.tables("randomise")) {
+  const std::vector<io::Table> tables = config.tables("randomise");
+  for (const io::Table& table : tables) {
     Draw draw = read_draw(table, parameters);
     if (!table.boolean_or("each", false)) {
       add(table, std::move(draw));
@@ -49,6 +55,12 @@ Randomisation::Randomisation(model::Vehicle nominal, const io::Table& config) : 
       add(table, draw);
     }
   }
+  const auto possible = [&](std::uint32_t attempt) { return !model::physical_fault(drawn({}, attempt)); };
+  if (!tables.empty() && std::ranges::none_of(std::views::iota(0U, kTried), possible))
+    tables.back().fail(
+        "",
+        "with all draws before it, hardly ever makes a body that can be: " + model::physical_fault(drawn({}, 0))->path,
+        "draws that make a possible inertia together, as one draw for all of its moments");
   if (!vehicle.beat_averaged) return;
   // standard deviations that the vehicle file declares, for coefficients that the table does not name
   for (const model::BeatAveraged::Coefficient& c : vehicle.beat_averaged->coefficients) {
@@ -171,10 +183,16 @@ model::Vehicle Randomisation::sample(RandomKey key) const {
     for (std::uint32_t i = 0; i < posterior_.size(); ++i) variates.push_back(normal(key, i));
     return from_posterior(std::move(variates));
   }
+  if (draws_.empty()) return nominal_;
+  for (std::uint32_t attempt = 0; attempt < kAttempts; ++attempt)
+    if (model::Vehicle vehicle = drawn(key, attempt); !model::physical_fault(vehicle)) return vehicle;
+  return nominal_;
+}
+
+model::Vehicle Randomisation::drawn(const RandomKey& key, std::uint32_t attempt) const {
   model::Vehicle vehicle = nominal_;
-  if (draws_.empty()) return vehicle;
   const std::vector<model::Parameter> parameters = model::parameters(vehicle);
-  std::uint32_t base = 0;
+  std::uint32_t base = attempt * kIndicesPerAttempt;
   for (const Draw& draw : draws_) {
     if (draw.minor) break;
     double variate = 0;

@@ -10,7 +10,8 @@
 //
 // With n a normal draw and u a uniform one: scale_normal x (1 + sd n), scale_half_normal x (1 + |sd n|), replace_normal
 // mean + sd n, add_normal + sd n, scale_uniform x u, replace_uniform u in [low, high]. Minor draws come after all
-// others; sample() leaves them out, and they may give a body an impossible inertia to one side.
+// others; sample() leaves them out, and they may give a body an impossible inertia to one side. Draws that are possible
+// one by one, and together give a body an impossible inertia, are all drawn again.
 //
 // Alternatively, the posterior of a vehicle file: its parameters are drawn jointly from one normal distribution,
 // whatever their nominal values, and clipped to their accepted ranges.
@@ -29,7 +30,7 @@ class Randomisation {
   explicit Randomisation(model::Vehicle nominal) : nominal_(std::move(nominal)) { nominal_.posterior.reset(); }
 
   /// Reads the array `randomise` of a configuration. Throws io::InputError if a parameter is unknown, or if a draw
-  /// could leave its accepted range or give a body an impossible inertia.
+  /// could leave its accepted range or give a body an impossible inertia, or if draws together nearly always do so.
   Randomisation(model::Vehicle nominal, const io::Table& config);
 
   /// Draws from the posterior of `vehicle`. std::invalid_argument without one, or if it is not positive semidefinite.
@@ -67,6 +68,8 @@ class Randomisation {
   static void check_reach(const io::Table& table, const Draw& draw, const std::vector<model::Parameter>& parameters,
                           std::vector<Reach>& reach);
   void check_bodies(const io::Table& table, const Draw& draw) const;
+  /// The vehicle of a key at the first attempt, or at the next one.
+  model::Vehicle drawn(const RandomKey& key, std::uint32_t attempt) const;
   model::Vehicle from_posterior(std::vector<double> variates) const;
   static double apply(const Draw& draw, double nominal, double variate);
 

@@ -293,6 +293,23 @@ TEST(Sample, OfTheShippedTableIsPhysicalAndUncorrelated) {
     for (std::size_t b = 0; b < a; ++b) EXPECT_LT(std::abs(correlation(x[a], x[b])), limit) << a << " " << b;
 }
 
+// Moments that are possible one by one, and together not in some vehicles: these are drawn again, the others are not.
+TEST(Sample, DrawsBodiesThatCanBeTogether) {
+  const std::string law = "law = \"scale_uniform\"\nlow = 0.7\nhigh = 1.45";
+  const std::string xx = table("\"torso.inertia_kg_m2.xx\"", law), zz = table("\"torso.inertia_kg_m2.zz\"", law);
+  const auto one = randomisation(xx), two = randomisation(xx + zz);
+  int again = 0;
+  for (std::uint32_t i = 0; i < 1000; ++i) {
+    const RandomKey key{.seed = 5, .flapper = i};
+    const model::Vehicle v = two.sample(key);
+    EXPECT_FALSE(model::physical_fault(v)) << i;
+    again += v.torso.inertia_kg_m2.xx != one.sample(key).torso.inertia_kg_m2.xx;
+  }
+  // xx = 4.24 x > yy + zz = 3.97 + 2.44 z, roughly: where x > 0.94 + 0.58 z, in 0.75^2: z < 0.88, x from 1.35 on
+  EXPECT_GT(again, 10);
+  EXPECT_LT(again, 100);
+}
+
 // ---- what is refused
 
 std::string message(const std::string& tables) {
@@ -406,6 +423,13 @@ TEST(RandomisationTable, RefusesDrawsThatMakeAnInertiaOfNoBody) {
             "largest principal moment exceeds the sum of the other two by 10.4 % of it; accepted: positive principal "
             "moments, none above the sum of the other two, but for 0.01 % of rounding");
   EXPECT_EQ(message(table("\"left.wing.inertia_kg_m2\"", "law = \"scale_normal\"\nsd = 0.1")), "accepted");
+  // possible alone, and hardly ever together: 4.24 x < 3.97 y + 2.44
+  const std::string far = "law = \"scale_uniform\"\nlow = ";
+  EXPECT_EQ(message(table("\"torso.inertia_kg_m2.xx\"", far + "1.4\nhigh = 1.5") +
+                    table("\"torso.inertia_kg_m2.yy\"", far + "0.6\nhigh = 0.7")),
+            "r.toml:6:1: randomise[1]: with all draws before it, hardly ever makes a body that can be: "
+            "torso.inertia_kg_m2; accepted: draws that make a possible inertia together, as one draw for all of its "
+            "moments");
 }
 
 // ---- the random numbers beneath
