@@ -322,6 +322,13 @@ void Fleet<T>::Storage::start(std::size_t i, std::uint32_t episode, const Snapsh
   x.attitude = rotated_q(x.attitude);
   x.com_velocity_m_s = rotated_z(x.com_velocity_m_s);
   put(x, block.state, lane);
+  if (T* const weight = sim::storage_of(batch).hanging_weight(i)) {  // on its line it moves too
+    constexpr std::size_t kNext = kLanes<T>;
+    const Vec3<double> hangs = at_m + rotated_z(Vec3<double>{weight[0], weight[kNext], 0} - from);
+    const Vec3<double> swings = rotated_z(Vec3<double>{weight[2 * kNext], weight[3 * kNext], 0});
+    weight[0] = static_cast<T>(hangs.x), weight[kNext] = static_cast<T>(hangs.y);
+    weight[2 * kNext] = static_cast<T>(swings.x), weight[3 * kNext] = static_cast<T>(swings.y);
+  }
   auto contact = s.contact;  // friction anchors are points in W: they move too
   for (std::size_t k = 0; k + 3 < contact.second.size(); k += 4) {
     T* const anchor = &contact.second[k];

@@ -224,6 +224,12 @@ struct Batch<T>::Storage {
   /// Rows and memory of a beat-averaged robot, for put_beat_averaged() into any batch; empty for other vehicles.
   std::pair<std::vector<T>, std::vector<T>> get_beat_averaged(std::size_t i) const;
   void put_beat_averaged(std::size_t i, const std::vector<T>& rows, const std::vector<T>& memory);
+  /// The numbers of model::Hanging, kLanes apart, of a robot with a weight on a line; else null.
+  T* hanging_weight(std::size_t i) {
+    if (!beat_averaged || !(beat_averaged->row_of(i)[beat_averaged->program.hanging_row() * kLanes<T>] > 0))
+      return nullptr;
+    return beat_averaged->memory_of(i) + kLanes<T>;
+  }
   /// Throws std::invalid_argument unless the vehicle shares the batch's modes, harmonics, strips and modulations.
   void put_jointed(std::size_t i, const model::Vehicle& v);
   std::pair<std::vector<T>, std::vector<T>> get_jointed(std::size_t i) const;

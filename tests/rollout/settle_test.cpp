@@ -3,11 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "flight/fleets.hpp"
 #include "model/effects/registry.hpp"
 #include "sim/randomise.hpp"
+#include "sim/storage.hpp"
 
 namespace flappy::flight::settle_test {
 namespace {
@@ -102,6 +104,33 @@ TEST(Settle, NothingIsNearTheHover) {
   // half a metre away, surfaces change the air's force by less than 1e-4
   for (std::size_t r = 0; r < far[0].body.size(); ++r)
     EXPECT_NEAR(near[0].body[r], far[0].body[r], 1e-4 + 1e-3 * std::abs(far[0].body[r])) << r;
+}
+
+// The weight hangs as far from the robot, in the robot's heading, and swings as it did, wherever the flight is put.
+TEST(Settle, ASlungLoadComesAlong) {
+  model::Vehicle v = model::read_any_vehicle(test::source_path("configs/vehicles/flapper_nimble.toml"));
+  v.effects["slung_load"] = {
+      {"mass_kg", 0.01}, {"length_m", 0.3}, {"moment_x_kg_m", 0}, {"moment_y_kg_m", 0}, {"z_m", -0.02}};
+  FleetOptions o = fleet_options(sensors("flapper_nimble"), controller("pid_flapper_nimble"), task(holding(-20, 1.5)));
+  o.batch.step_s = 1e-3;
+  const auto pool = rollout::settle<double>(o, 1, 1, [&](std::uint32_t) { return v; });
+  Fleet<double> there(1, v, o);
+  o.task = task(holding(0, 0));
+  Fleet<double> settled(1, v, o);
+  settled.start(0, 1, pool[0]), there.start(0, 1, pool[0]);
+  const auto hangs = [](Fleet<double>& fleet) {
+    const double* const weight = sim::storage_of(fleet.batch()).hanging_weight(0);
+    const auto next = static_cast<std::ptrdiff_t>(sim::kLanes<double>);
+    const Motion m = fleet.truth(0);
+    const double yaw = 2 * std::atan2(m.attitude[3], m.attitude[0]), c = std::cos(yaw), s = std::sin(yaw);
+    const double x = weight[0] - m.position_m[0], y = weight[next] - m.position_m[1];
+    const double u = weight[2 * next], w = weight[3 * next];
+    return std::array{c * x + s * y, c * y - s * x, c * u + s * w, c * w - s * u};
+  };
+  const auto at_origin = hangs(settled), far_off = hangs(there);
+  EXPECT_GT(std::hypot(at_origin[2], at_origin[3]), 1e-6) << "it swings";
+  // positions of 20 m round to 4e-15, angles of small rolls and pitches to their square
+  for (std::size_t k = 0; k < 4; ++k) EXPECT_NEAR(far_off[k], at_origin[k], 1e-12) << k;
 }
 
 TEST(Trim, IsAllThatActsUntilHandedBack) {
