@@ -94,6 +94,27 @@ TEST(Support, LetsGoOfAVehicleThatLifts) {
   EXPECT_EQ(b.status(0), 0u) << "leaving the ground is no contact";
 }
 
+// What carried it off for a moment does not do so again at once: it stands until its wings carry it anew.
+TEST(Support, StartsOverAfterAFallBack) {
+  Batch<double> b(1, test::nominal(), one_thread(ground_at(0)));
+  b.reset(0, {}, Start::standing);
+  b.set_input(0, {14, 0, 0, 0});  // 1.7 times the weight
+  const auto steps_until = [&](Start support, int most) {
+    int steps = 0;
+    while (b.support(0) != support && steps < most) b.step(1), ++steps;
+    return steps;
+  };
+  const int first = steps_until(Start::flying, 2000);
+  ASSERT_LT(first, 2000);
+  b.set_input(0, {0, 0, 0, 0});
+  ASSERT_LT(steps_until(Start::standing, 2000), 2000);
+  EXPECT_LT(b.state(0).position_m[2], 1e-9);
+  b.step(400);  // without voltage it stays
+  EXPECT_EQ(b.support(0), Start::standing);
+  b.set_input(0, {14, 0, 0, 0});
+  EXPECT_GT(steps_until(Start::flying, 2000), first / 2);
+}
+
 TEST(Support, WeldedNeverMoves) {
   Batch<double> b(1, test::nominal(), one_thread());
   b.reset(0, {}, Start::welded);
