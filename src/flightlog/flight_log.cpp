@@ -21,7 +21,8 @@ using io::shortest_digits;
 
 constexpr double kUnitTolerance = 1e-3;
 
-/// A column and the largest absolute value accepted; improbable values are left to the checks.
+/// A column and the largest absolute value accepted: what a vehicle file and a flight may bring about. Improbable values
+/// are left to the checks.
 template <class Stream>
 struct Field {
   const char* name;
@@ -30,12 +31,14 @@ struct Field {
 };
 
 constexpr double kLatest = 1e10;  // s; allows clocks that count from 1970
-const std::vector<Field<CommandStream>> kCommandFields = {{"t_s", &CommandStream::t_s, kLatest},
-                                                          {"left_voltage_V", &CommandStream::left_voltage_V, 100},
-                                                          {"right_voltage_V", &CommandStream::right_voltage_V, 100}};
-const std::vector<Field<BeatInputs>> kInputFields = {{"amplitude_V", &BeatInputs::amplitude_V, 100},
-                                                     {"difference_V", &BeatInputs::difference_V, 100},
-                                                     {"bias_V", &BeatInputs::bias_V, 100},
+constexpr double kMost_V = 1e3, kMost_A = 1e7, kMost_rad_s = 1e6, kMost_m_s2 = 1e9;
+const std::vector<Field<CommandStream>> kCommandFields = {
+    {"t_s", &CommandStream::t_s, kLatest},
+    {"left_voltage_V", &CommandStream::left_voltage_V, kMost_V},
+    {"right_voltage_V", &CommandStream::right_voltage_V, kMost_V}};
+const std::vector<Field<BeatInputs>> kInputFields = {{"amplitude_V", &BeatInputs::amplitude_V, kMost_V},
+                                                     {"difference_V", &BeatInputs::difference_V, kMost_V},
+                                                     {"bias_V", &BeatInputs::bias_V, kMost_V},
                                                      {"split_cycle", &BeatInputs::split_cycle, 0.5}};
 const std::string kPhase = "phase_rad";
 constexpr double kPhaseLimit = 1e9, kInputLimit = 1e6;
@@ -44,17 +47,17 @@ const std::vector<Field<MocapStream>> kMocapFields = {
     {"z_m", &MocapStream::z_m, 1e6},     {"qw", &MocapStream::qw, 2},     {"qx", &MocapStream::qx, 2},
     {"qy", &MocapStream::qy, 2},         {"qz", &MocapStream::qz, 2}};
 const std::vector<Field<ImuStream>> kImuFields = {{"t_s", &ImuStream::t_s, kLatest},
-                                                  {"gyro_x_rad_s", &ImuStream::gyro_x_rad_s, 1e5},
-                                                  {"gyro_y_rad_s", &ImuStream::gyro_y_rad_s, 1e5},
-                                                  {"gyro_z_rad_s", &ImuStream::gyro_z_rad_s, 1e5},
-                                                  {"accel_x_m_s2", &ImuStream::accel_x_m_s2, 1e5},
-                                                  {"accel_y_m_s2", &ImuStream::accel_y_m_s2, 1e5},
-                                                  {"accel_z_m_s2", &ImuStream::accel_z_m_s2, 1e5}};
+                                                  {"gyro_x_rad_s", &ImuStream::gyro_x_rad_s, kMost_rad_s},
+                                                  {"gyro_y_rad_s", &ImuStream::gyro_y_rad_s, kMost_rad_s},
+                                                  {"gyro_z_rad_s", &ImuStream::gyro_z_rad_s, kMost_rad_s},
+                                                  {"accel_x_m_s2", &ImuStream::accel_x_m_s2, kMost_m_s2},
+                                                  {"accel_y_m_s2", &ImuStream::accel_y_m_s2, kMost_m_s2},
+                                                  {"accel_z_m_s2", &ImuStream::accel_z_m_s2, kMost_m_s2}};
 const std::vector<Field<ImuStream>> kAccelFields = {kImuFields[0], kImuFields[4], kImuFields[5], kImuFields[6]};
 const std::vector<Field<PowerStream>> kPowerFields = {{"t_s", &PowerStream::t_s, kLatest},
-                                                      {"battery_V", &PowerStream::battery_V, 100},
-                                                      {"left_current_A", &PowerStream::left_current_A, 100},
-                                                      {"right_current_A", &PowerStream::right_current_A, 100}};
+                                                      {"battery_V", &PowerStream::battery_V, kMost_V},
+                                                      {"left_current_A", &PowerStream::left_current_A, kMost_A},
+                                                      {"right_current_A", &PowerStream::right_current_A, kMost_A}};
 const std::vector<Field<PowerStream>> kBatteryFields = {kPowerFields[0], kPowerFields[1]};
 const std::vector<Field<AttitudeStream>> kAttitudeFields = {{"t_s", &AttitudeStream::t_s, kLatest},
                                                             {"qw", &AttitudeStream::qw, 2},
@@ -104,8 +107,8 @@ ImuHeader parse_imu_header(const io::Table& imu, bool declared_inputs) {
   h.accel_noise_m_s2 = imu.number("accel_noise_m_s2", non_negative(1e3));
   h.gyro = read_gyro(imu, declared_inputs);
   if (!h.gyro) return h;
-  h.gyro_noise_rad_s = imu.number("gyro_noise_rad_s", non_negative(10));
-  std::ranges::copy(imu.numbers("gyro_bias_sd_rad_s", 3, non_negative(10)), h.gyro_bias_sd_rad_s.begin());
+  h.gyro_noise_rad_s = imu.number("gyro_noise_rad_s", non_negative(100));
+  std::ranges::copy(imu.numbers("gyro_bias_sd_rad_s", 3, non_negative(100)), h.gyro_bias_sd_rad_s.begin());
   return h;
 }
 
@@ -516,10 +519,16 @@ double column_limit(const std::string& column) {
   return kInputLimit;
 }
 
+bool is_sparse(const Column& t_s) {
+  for (std::size_t i = 1; i < t_s.size(); ++i)
+    if (t_s[i] - t_s[i - 1] > kLongestGap_s) return true;
+  return static_cast<double>(t_s.size()) < kSlowest_Hz * (t_s.back() - t_s.front());
+}
+
 LogAmbient read_ambient(const io::Table& ambient) {
   LogAmbient a;
   const io::Range place = {-1e6, 1e6};
-  a.air_density_kg_m3 = ambient.number("air_density_kg_m3", positive(100));
+  a.air_density_kg_m3 = ambient.number("air_density_kg_m3", non_negative(100));
   a.ground_z_m = ambient.number("ground_z_m", place);
   a.ceiling_z_m = ambient.number("ceiling_z_m", place);
   if (a.ceiling_z_m <= a.ground_z_m)
@@ -572,7 +581,7 @@ std::vector<std::string> read_policy_numbers(const io::Table& policy) {
 }
 
 double read_flapping(const io::Table& root, const std::vector<std::string>& inputs) {
-  return inputs.empty() || root.has("flapping_Hz") ? root.number("flapping_Hz", positive(1e3)) : 0;
+  return inputs.empty() || root.has("flapping_Hz") ? root.number("flapping_Hz", positive(1e4)) : 0;
 }
 
 PoseSource read_pose_source(const io::Table& mocap, bool declared_inputs) {

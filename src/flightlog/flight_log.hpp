@@ -39,6 +39,9 @@ namespace flappy::flightlog {
 /// Longest gap and lowest mean rate of a stream. They bound a log's duration, and so the work of all programs.
 inline constexpr double kLongestGap_s = 600, kSlowest_Hz = 0.1;
 
+/// Whether a stream, whose times increase, has a longer gap or a lower rate.
+bool is_sparse(const std::vector<double>& t_s);
+
 /// The largest absolute value that a log may have in a column; a name that no stream has is taken for a declared input.
 double column_limit(const std::string& column);
 

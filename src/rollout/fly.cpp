@@ -33,6 +33,9 @@ std::string log_name(std::size_t i, std::size_t count) {
 void prepare_log_folder(const fs::path& folder, std::size_t count, const std::string& vehicle) {
   if (std::ranges::count(flightlog::log_file::kAll, vehicle) > 0)
     throw io::InputError("vehicle: " + vehicle + " is also the name of a file of the log; accepted: another name");
+  if (vehicle.find('\\') != std::string::npos)
+    throw io::InputError("vehicle: " + vehicle +
+                         " has a backslash, as folders of other systems; accepted: another name");
   std::error_code error;
   const auto refuse = [&](const std::string& what) {
     throw io::InputError(folder.string() + ": " + what +

@@ -50,6 +50,7 @@ auto for_file(const std::string& name, const Read& read) {
 
 void read_shapes(const io::Table& world, sim::World& w) {
   constexpr io::Range kPlace{-1e4, 1e4}, kAngle{-100, 100};
+  constexpr double kShortest_m = 1e-6;  // else rounding could join the ends of an axis
   double a[3], b[3], c[3];
   const auto read = [](const io::Table& t, const char* key, io::Range range, double(&to)[3]) {
     std::ranges::copy(t.numbers(key, 3, range), to);
@@ -68,7 +69,8 @@ void read_shapes(const io::Table& world, sim::World& w) {
   for (const io::Table& t : world.tables("cylinder")) {
     read(t, "from_m", kPlace, a);
     read(t, "to_m", kPlace, b);
-    if (std::ranges::equal(a, b)) t.fail("to_m", "is where from_m is", "the other end of the axis");
+    if (std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]) < kShortest_m)
+      t.fail("to_m", "is where from_m is", "the other end of the axis");
     w.shapes.push_back(sim::cylinder(a, b, t.number("radius_m", io::positive(1e4))));
   }
 }

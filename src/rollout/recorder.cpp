@@ -359,14 +359,14 @@ struct Recorder<T>::Storage {
     }
   }
 
-  /// Whether every stream has at least two samples, and all streams overlap in time.
+  /// Whether every stream has at least two samples and no gap that a log may not have, and all overlap in time.
   bool complete() const {
     std::vector<const flightlog::Column*> times = {&log.command.t_s, &log.mocap.t_s, &log.imu.t_s};
     if (log.power) times.push_back(&log.power->t_s);
     if (log.wings) times.push_back(&log.wings->t_s);
     double from = 0, to = 1e300;
     for (const flightlog::Column* t : times) {
-      if (t->size() < 2) return false;
+      if (t->size() < 2 || flightlog::is_sparse(*t)) return false;
       from = std::max(from, t->front());
       to = std::min(to, t->back());
     }

@@ -161,7 +161,7 @@ TEST(FlightLog, OfDeclaredInputsIsRefusedWhereItIsFaulty) {
   EXPECT_EQ(header("lamp2", "left_flap"),
             "log/flight.toml:13:10: command.inputs: \"left_flap\" is there twice; accepted: each once");
   EXPECT_EQ(header("[command]\ninputs = " + inputs, ""),
-            "log/flight.toml: flapping_Hz: is missing; accepted: a number above 0, at most 1000");
+            "log/flight.toml: flapping_Hz: is missing; accepted: a number above 0, at most 10000");
   EXPECT_EQ(header("[command]\ninputs = " + inputs, "[command]"),
             "log/flight.toml:12:1: command.inputs: is missing; accepted: an array of strings");
   EXPECT_EQ(edited("command.csv", "lamp2", "lamp"),
@@ -170,7 +170,7 @@ TEST(FlightLog, OfDeclaredInputsIsRefusedWhereItIsFaulty) {
   EXPECT_EQ(edited("command.csv", "65535", "6553500"),
             "log/command.csv:2: lamp2: 6553500 is out of range; accepted: a number from -1e+06 to 1e+06");
   EXPECT_EQ(header("gyro = false", "gyro = true"),
-            "log/flight.toml:21:1: imu.gyro_noise_rad_s: is missing; accepted: a number from 0 to 10");
+            "log/flight.toml:21:1: imu.gyro_noise_rad_s: is missing; accepted: a number from 0 to 100");
   EXPECT_EQ(edited("imu.csv", "accel_x_m_s2", "gyro_x_rad_s"),
             "log/imu.csv:1: gyro_x_rad_s: unknown column; accepted: t_s, accel_x_m_s2, accel_y_m_s2, accel_z_m_s2");
   EXPECT_EQ(header("[attitude]\nrate_hz = 100.0\nlatency_s = 0.0033333333333333335\nnoise_rad = 0.02\n", ""),
@@ -274,7 +274,7 @@ TEST(FlightLog, RefusesFaultyHeaders) {
   EXPECT_EQ(header("gravity_m_s2 = 9.8", "# "),
             "log/flight.toml: gravity_m_s2: is missing; accepted: a number from 0 to 100");
   EXPECT_EQ(header("flapping_Hz = 34.0", "flapping_Hz = -34.0"),
-            "log/flight.toml:4:15: flapping_Hz: -34 is out of range; accepted: a number above 0, at most 1000");
+            "log/flight.toml:4:15: flapping_Hz: -34 is out of range; accepted: a number above 0, at most 10000");
   EXPECT_EQ(
       header("\"hummingbird", "\"../hummingbird"),
       "log/flight.toml:2:11: vehicle: \"../hummingbird \"seven\".toml\" is no file name; accepted: the name of the "
@@ -337,11 +337,11 @@ TEST(FlightLog, RefusesFaultySamples) {
   EXPECT_EQ(with_line("mocap.csv", 5, "0.01,0,0,0,0,0,0,0"),
             "log/mocap.csv:5: qw, qx, qy, qz: length is 0; accepted: a quaternion of length 1 to within 0.001");
   EXPECT_EQ(with_line("command.csv", 6, "1,9000,0,0,0,0,0,0"),
-            "log/command.csv:6: left_voltage_V: 9000 is out of range; accepted: a number from -100 to 100");
+            "log/command.csv:6: left_voltage_V: 9000 is out of range; accepted: a number from -1000 to 1000");
   EXPECT_EQ(with_line("command.csv", 6, "1,0,0,0,0,0,0.6,0"),
             "log/command.csv:6: split_cycle: 0.6 is out of range; accepted: a number from -0.5 to 0.5");
-  EXPECT_EQ(with_line("power.csv", 2, "0,7,250,0"),
-            "log/power.csv:2: left_current_A: 250 is out of range; accepted: a number from -100 to 100");
+  EXPECT_EQ(with_line("power.csv", 2, "0,7000,2,0"),
+            "log/power.csv:2: battery_V: 7000 is out of range; accepted: a number from -1000 to 1000");
   EXPECT_EQ(with_line("imu.csv", 3, "0.001,0,0,0,0,0"),
             "log/imu.csv:3:16: row has 6 cells; accepted: 7, as in the header");
 }

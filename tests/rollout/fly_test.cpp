@@ -289,6 +289,75 @@ TEST(Recorder, ImuIsDeclaredAsItIs) {
   }
 }
 
+/// "accepted", or why the log of a short flight is refused.
+std::string logged(rollout::FlyConfig c, double duration_s = 0.05) {
+  c.duration_s = duration_s;
+  return message([&] {
+    rollout::Rollout<double> flight(std::move(c), 1);
+    flight.record();
+    while (!flight.over()) flight.step();
+    const auto log = flight.recorders()[0].log();
+    if (!log) throw io::InputError("no log");
+    flightlog::parse_flight_log(flightlog::flight_log_files(*log), "log");
+  });
+}
+
+// A log holds what any vehicle file and any flight may have: nothing is flown to its end, and then lost.
+TEST(Recorder, LogsWhateverAVehicleFileMayHave) {
+  for (const char* name : {"hover", "hummingbird_driven", "flapper_nimble"}) {
+    const std::string path = source_path("configs/fly/" + std::string(name) + ".toml");
+    const rollout::FlyConfig c = rollout::read_fly_config(path);
+    model::Vehicle list = c.vehicle;
+    const std::size_t count = model::parameters(list).size();
+    for (std::size_t k = 0; k < count; ++k)
+      for (const bool high : {false, true}) {
+        rollout::FlyConfig one = c;
+        const model::Parameter p = model::parameters(one.vehicle)[k];
+        if (p.path == "driver.hold_s") continue;  // of which step_s is a share
+        *p.value = high ? p.high : p.low;
+        EXPECT_EQ(logged(one), "accepted") << name << " " << p.path << " = " << *p.value;
+      }
+    if (!c.vehicle.beat_averaged) continue;
+    for (const double hz : {1e-3, 1e4}) {
+      rollout::FlyConfig one = c;
+      one.vehicle.beat_averaged->nominal_Hz = hz;
+      EXPECT_EQ(logged(one), "accepted") << hz;
+    }
+  }
+}
+
+TEST(Recorder, LogsWhateverAFlightMayHave) {
+  const std::vector<std::vector<std::string>> flights = {
+      {"world.gravity_m_s2=0", "vehicle.air.density_kg_m3=0"},
+      {"world.gravity_m_s2=100", "world.ground_z_m=-1e4", "world.ceiling_z_m=1e4"},
+      {"world.walls=[[1e4, -1e4, 0, 1.0009]]"},
+      {"world.sphere=[{centre_m=[1e4, 0, 1e4], radius_m=1e4}, {centre_m=[1, 0, 1], radius_m=1e-9}]"},
+      {"world.box=[{centre_m=[1e4, 0, 0], edges_m=[1e4, 1e-9, 1], rotation_rad=[100, -100, 7]}]"},
+      {"world.cylinder=[{from_m=[1e4, 1e4, 1e4], to_m=[1e4, 1e4, 9999.999998], radius_m=1e4}]"},
+      {"flight.control_hz=10"},
+      {"flight.control_hz=10000", "flight.step_s=1e-4"},
+      {"flight.step_s=1e-5", "vehicle.driver.flapping_Hz=1000", "vehicle.driver.hold_s=1e-5"},
+      {"flight.support=welded"},
+      {"constant_input.amplitude_V=18", "constant_input.bias_V=-18", "constant_input.split_cycle=18"},
+      {"sensors.imu.rate_hz=10", "sensors.mocap.rate_hz=10", "sensors.imu.latency_s=0.1",
+       "sensors.mocap.latency_s=0.5"},
+      {"sensors.imu.rate_hz=4000", "sensors.mocap.rate_hz=4000", "sensors.imu.low_pass_hz=10000"},
+      {"sensors.imu.low_pass_hz=1e-3", "sensors.imu.position_m.x=-1", "sensors.imu.position_m.y=1"},
+      {"sensors.imu.gyro_noise_rad_s=100", "sensors.imu.accel_noise_m_s2=100", "sensors.imu.gyro_bias_sd_rad_s.x=100",
+       "sensors.imu.gyro_bias_sd_rad_s.y=100", "sensors.imu.gyro_bias_sd_rad_s.z=100"},
+      {"sensors.mocap.position_noise_m=1", "sensors.mocap.attitude_noise_rad=0.05"},
+      {"log.power={battery_nominal_V=100, rate_hz=500, latency_s=10, voltage_noise_V=10, current_noise_A=10}",
+       "log.wings={rate_hz=500, noise_rad=1}", "vehicle.left.motor.resistance_ohm=1e-3"}};
+  for (const std::vector<std::string>& flight : flights)
+    EXPECT_EQ(logged(rollout::read_fly_config(kHover, flight), 12 * (flight[0].find("log.power") == 0) + 1.5),
+              "accepted")
+        << flight[0];
+  // and the longest of a gait
+  EXPECT_EQ(logged(rollout::read_fly_config(source_path("configs/fly/hummingbird_driven.toml"),
+                                            {"flight.step_s=1e-5", "vehicle.gait.frequency_Hz=2000"})),
+            "accepted");
+}
+
 TEST(Recorder, LogReadsBackAsFlown) {
   const Folder folder;
   std::vector<std::string> overrides = {"flight.duration_s=0.5",       "excitation=[]",

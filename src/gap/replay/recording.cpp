@@ -36,13 +36,24 @@ TorsoAt torso_at(const flightlog::TorsoMotion& m) {
   return t;
 }
 
+double density_over(const model::Vehicle& nominal, const flightlog::FlightHeader& h,
+                    const std::filesystem::path& folder) {
+  const double file = nominal.air_density_kg_m3, here = h.ambient.air_density_kg_m3;
+  if (file == 0 && here > 0)
+    throw io::InputError((folder / flightlog::log_file::kHeader).string() + ": ambient.air_density_kg_m3: is " +
+                         io::shortest_digits(here) +
+                         ", and the vehicle's file is of a vacuum; accepted: 0, or a vehicle "
+                         "file with the density of air");
+  return file > 0 ? here / file : 1;
+}
+
 }  // namespace
 
 Recording::Recording(const std::filesystem::path& folder, flightlog::FlightLog flight_log,
                      const model::Vehicle& nominal)
     : name(io::folder_name(folder)),
       least_z_m(flight_log.header.ambient.ground_z_m + nominal.extent.below_m + kMinClearance_m),
-      density_ratio(flight_log.header.ambient.air_density_kg_m3 / nominal.air_density_kg_m3),
+      density_ratio(density_over(nominal, flight_log.header, folder)),
       log(flightlog::on_its_clocks(std::move(flight_log))),
       smoother(log, folder),
       begin_s(std::max(smoother.begin_s(), log.command.t_s.front()) + kMargin_s),
