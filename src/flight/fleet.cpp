@@ -335,6 +335,23 @@ std::uint32_t Fleet<T>::tick(std::size_t i) const {
   return f.tick[lane];
 }
 template <class T>
+std::vector<double> Fleet<T>::remembered(std::size_t i) const {
+  const auto [f, lane] = storage_->at(i);
+  std::vector<double> all;
+  const auto add = [&, lane = lane](const auto& rows, int count) {
+    for (int r = 0; r < count; ++r) all.push_back(static_cast<double>(rows[r][lane]));
+  };
+  add(f.estimator, kEstimatorRows);
+  add(f.estimate, kEstimateRows);
+  const int kind = options().controller.kind;
+  if (kind == kNoController) return all.push_back(0), all;  // C has no empty struct
+  bool exported = false;
+  with_controller(kind, [&]<class C>(C) {
+    if constexpr (requires { C::kSource; }) exported = true, add(f.controller, model::kRows<C::template Memory>);
+  });
+  return exported ? all : std::vector<double>{};
+}
+template <class T>
 std::vector<double> Fleet<T>::observation(std::size_t i) const {
   std::vector<T> row(static_cast<std::size_t>(storage_->plan.observed + storage_->plan.past));
   observation(i, row.data());

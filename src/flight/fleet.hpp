@@ -85,6 +85,9 @@ class Fleet {
   /// Restarts flapper `i`: at the start state that its task samples for `episode`, or at `state`.
   void start(std::size_t i, std::uint32_t episode);
   void start(std::size_t i, std::uint32_t episode, const sim::FlapperState& state, sim::Start kind);
+  /// What estimator, estimate and controller of flapper `i` remember, in the order of the exported C (src/deploy/c:
+  /// flappy_estimator, flappy_motion, flappy_feedback); empty where the controller cannot be exported.
+  std::vector<double> remembered(std::size_t i) const;
   /// Restarts flapper `i` from a snapshot, moved and turned about z of W to the start of the episode.
   void start(std::size_t i, std::uint32_t episode, const Snapshot<T>& snapshot);
   Snapshot<T> snapshot(std::size_t i) const;

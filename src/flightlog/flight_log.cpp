@@ -31,6 +31,7 @@ struct Field {
 };
 
 constexpr double kLatest = 1e10;  // s; allows clocks that count from 1970
+constexpr double kMostRemembered = 1e30;
 constexpr double kMost_V = 1e3, kMost_A = 1e7, kMost_rad_s = 1e6, kMost_m_s2 = 1e9;
 const std::vector<Field<CommandStream>> kCommandFields = {
     {"t_s", &CommandStream::t_s, kLatest},
@@ -121,16 +122,23 @@ PowerHeader parse_power_header(const io::Table& power, bool declared_inputs) {
 }
 
 FlownHeader parse_flown(const io::Table& flown) {
-  flown.accept({"start_s", "start_pose", "mode", "begin_s", "hand_back_s", "policy_crc32", "controller_crc32"});
+  flown.accept({"start_s", "start_pose", "start_memory", "start_phase", "imu_latency_s", "mode", "begin_s",
+                "hand_back_s", "policy_crc32", "controller_crc32"});
   const io::Range time{-kLatest, kLatest};
   FlownHeader h{.start_s = flown.number("start_s", time)};
   if (flown.has("start_pose"))
     std::ranges::copy(flown.numbers("start_pose", 7, {-1e6, 1e6}), h.start_pose.emplace().begin());
+  constexpr std::int64_t kWord = 0xffffffff;
+  if (flown.has("start_memory")) {
+    h.start_memory = flown.numbers("start_memory", {-kMostRemembered, kMostRemembered});
+    h.start_phase = static_cast<std::uint32_t>(flown.integer_or("start_phase", 0, 0, kWord));
+  }
+  if (flown.has("imu_latency_s")) h.imu_latency_s = flown.number("imu_latency_s", non_negative(10));
   h.mode = flown.choice_or("mode", "", {"hover", "stay", "task"});
   if (flown.has("begin_s")) h.begin_s = flown.number("begin_s", time);
   if (flown.has("hand_back_s")) h.hand_back_s = flown.number("hand_back_s", time);
   const auto crc = [&](const char* key, std::optional<std::uint32_t>& to) {
-    if (flown.has(key)) to = static_cast<std::uint32_t>(flown.integer_or(key, 0, 0, 0xffffffff));
+    if (flown.has(key)) to = static_cast<std::uint32_t>(flown.integer_or(key, 0, 0, kWord));
   };
   crc("policy_crc32", h.policy_crc32);
   crc("controller_crc32", h.controller_crc32);
@@ -271,6 +279,11 @@ std::string header_text(const FlightHeader& h) {
     text += "\n[flown]\n";
     number("start_s", h.flown->start_s);
     if (h.flown->start_pose) line("start_pose", array(*h.flown->start_pose));
+    if (!h.flown->start_memory.empty()) {
+      line("start_memory", array(h.flown->start_memory));
+      line("start_phase", std::to_string(h.flown->start_phase));
+    }
+    if (h.flown->imu_latency_s) number("imu_latency_s", *h.flown->imu_latency_s);
     if (!h.flown->mode.empty()) line("mode", io::toml_string(h.flown->mode));
     if (h.flown->begin_s) number("begin_s", *h.flown->begin_s);
     if (h.flown->hand_back_s) number("hand_back_s", *h.flown->hand_back_s);

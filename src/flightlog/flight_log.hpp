@@ -106,6 +106,12 @@ struct AttitudeHeader {
 struct FlownHeader {
   double start_s = 0;                               ///< flappy_controller_start()
   std::optional<std::array<double, 7>> start_pose;  ///< told to it: m; attitude w, x, y, z
+  /// What estimator and feedback remembered then, if they did not start anew: the numbers of flappy_estimator,
+  /// flappy_motion and flappy_feedback; and the phase of the beat, 2^32 each.
+  std::vector<double> start_memory;
+  std::uint32_t start_phase = 0;
+  /// By how much the robot takes samples of the IMU to be late, where that is not ImuHeader::latency_s.
+  std::optional<double> imu_latency_s;
   std::string mode;  ///< "hover", "stay": flappy_controller_hover(), _stay() after it; "task": neither; "": not known
   std::optional<double> begin_s;                                ///< flappy_controller_begin(): the policy acts
   std::optional<double> hand_back_s;                            ///< when the policy handed back

@@ -138,6 +138,10 @@ struct Recorder<T>::Storage {
     std::vector<T> effect_states, contact_memory;
   } metered;  // copy of the block at the last control tick, for add_power(); unused without power.csv
   double step_hz;
+  struct {
+    bool acts = false;  // the policy acts in the period that comes, and so from then on:
+    std::vector<double> observation;
+  } next;
 
   Storage(const FlyConfig& config, flight::Fleet<T>& f, std::size_t i, const model::Vehicle& vehicle)
       : fleet(f), flapper(i) {
@@ -174,6 +178,50 @@ struct Recorder<T>::Storage {
     }
     look();
     add_truth(time_s(sim::storage_of(f.batch()).steps));
+    if (config.actor) tell_policy(o.task);
+  }
+
+  /// For flappy-gap check --flown: how the policy and its controller begin, and all that it gets and gives.
+  void tell_policy(const flight::Task& task) {
+    for (const flight::Signal& s : task.observation()) log.header.policy.push_back("observation_" + s.name);
+    for (const flight::Signal& s : task.action()) log.header.policy.push_back("action_" + s.name);
+    log.policy.emplace().numbers.resize(log.header.policy.size());
+    look_ahead();
+    const auto& body = sim::storage_of(fleet.batch());
+    std::vector<double> memory = fleet.remembered(flapper);
+    // from there on alone the exported C can go on as this flapper does
+    if (body.steps != 0 || fleet.tick(flapper) != 0 || memory.empty() || task.sets_voltages()) return;
+    flightlog::FlownHeader& flown = log.header.flown.emplace();
+    const flight::Motion estimate = fleet.estimate(flapper);
+    auto& pose = flown.start_pose.emplace();
+    std::ranges::copy(estimate.position_m, pose.begin());
+    std::ranges::copy(estimate.attitude, pose.begin() + 3);
+    flown.start_memory = std::move(memory);
+    const auto [block, lane] = sim::storage_of(fleet.batch()).at(flapper);
+    flown.start_phase = block.phase[lane];
+    flown.imu_latency_s = fleet.options().sensors.imu.latency_s;
+    flown.mode = "task";
+    flown.begin_s = 0;
+  }
+
+  /// Before a control period.
+  void look_ahead() {
+    const auto repeat = static_cast<std::uint32_t>(fleet.options().task.action_repeat);
+    next.acts = fleet.tick(flapper) % repeat == 0 && !fleet.handed_back(flapper);
+    if (next.acts) next.observation = fleet.observation(flapper);
+  }
+
+  void add_inference(double t_s) {
+    if (next.acts) {
+      log.policy->t_s.push_back(t_s);
+      std::size_t k = 0;
+      for (const double x : next.observation) log.policy->numbers[k++].push_back(x);
+      for (const T x : fleet.adds(flapper)) {
+        if (k == log.policy->numbers.size()) break;
+        log.policy->numbers[k++].push_back(static_cast<double>(x));
+      }
+    }
+    look_ahead();
   }
 
   void look() {
@@ -332,6 +380,7 @@ struct Recorder<T>::Storage {
       }
     add_power_once();
     if (log.wings) add_wings(time_s(begin));
+    if (log.policy) add_inference(time_s(begin));
 
     look();
     add_truth(time_s(end));
@@ -397,13 +446,17 @@ const flightlog::FlightLog& Recorder<T>::so_far() const {
 template <class T>
 std::optional<flightlog::FlightLog> Recorder<T>::log() const {
   if (!storage_->complete()) return {};
-  return storage_->log;
+  flightlog::FlightLog log = storage_->log;
+  if (log.policy && (log.policy->t_s.size() < 2 || flightlog::is_sparse(log.policy->t_s)))
+    log.policy.reset(), log.header.policy.clear();  // it acted once
+  return log;
 }
 
 template <class T>
 bool Recorder<T>::write(const std::filesystem::path& folder) const {
-  if (!storage_->complete()) return false;
-  write_flight_log(folder, storage_->log);
+  const std::optional<flightlog::FlightLog> all = log();
+  if (!all) return false;
+  write_flight_log(folder, *all);
   flightlog::write_truth(folder, kTruthNames, storage_->truth);
   if (!storage_->joints.empty()) {
     io::CsvWriter csv(folder / flightlog::log_file::kJoints, kJointNames);

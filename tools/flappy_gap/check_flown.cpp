@@ -138,6 +138,9 @@ deploy::OnboardLog onboard(const std::string& folder, const flightlog::FlightLog
     to.commands.push_back({c.t_s[i] - zero_s, c.left_voltage_V[i], c.right_voltage_V[i]});
   if (h.flown) {
     to.start_pose = h.flown->start_pose;
+    for (const double x : h.flown->start_memory) to.start_memory.push_back(static_cast<float>(x));
+    to.start_phase = h.flown->start_phase;
+    if (h.flown->imu_latency_s) to.imu_latency_s = *h.flown->imu_latency_s;
     if (!h.flown->mode.empty())
       to.mode = static_cast<deploy::OnboardLog::Mode>(std::ranges::find(kModes, h.flown->mode) - kModes.begin());
     if (h.flown->begin_s) to.begin_s = *h.flown->begin_s - zero_s;
@@ -208,6 +211,11 @@ Json check_flown(const std::string& exported, const std::vector<std::string>& fo
       all = all && f.as_exported();
       continue;
     }
+    if (header && !header->start_memory.empty() && header->start_memory.size() != check.remembered())
+      refuse(folder,
+             io::format("flown.start_memory: %zu numbers, and the exported controller remembers %zu",
+                        header->start_memory.size(), check.remembered()),
+             "a log of a flight under the controller that was exported");
     deploy::Flown f = check.check(onboard(folder, log, check.contract()));
     f.from_s += start_of(log);
     if (f.begin_s) *f.begin_s += start_of(log);

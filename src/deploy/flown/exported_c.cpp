@@ -36,6 +36,18 @@ static flappy_quaternion flown_quaternion(const float *x) {
 void flown_start(flappy_controller *c, uint32_t now_us, const float *x) {
   flappy_controller_start(c, now_us, flappy_vector_from(x), flown_quaternion(x + 3));
 }
+unsigned flown_remembered(void) {
+  return (unsigned)((sizeof(flappy_estimator) + sizeof(flappy_motion) + sizeof(flappy_feedback)) / sizeof(float));
+}
+void flown_recall(flappy_controller *c, const float *x, uint32_t phase) {
+  const unsigned own = (unsigned)(sizeof(flappy_estimator) / sizeof(float));
+  const unsigned motion = (unsigned)(sizeof(flappy_motion) / sizeof(float)), all = flown_remembered();
+  unsigned i;
+  for (i = 0; i < own; ++i) ((float *)&c->estimator)[i] = x[i];
+  for (i = 0; i < motion; ++i) ((float *)&c->estimate)[i] = x[own + i];
+  for (i = own + motion; i < all; ++i) ((float *)&c->feedback)[i - own - motion] = x[i];
+  c->phase = phase;
+}
 void flown_hover(flappy_controller *c) { flappy_controller_hover(c); }
 void flown_stay(flappy_controller *c) { flappy_controller_stay(c); }
 void flown_begin(flappy_controller *c) { flappy_controller_begin(c); }
@@ -185,6 +197,8 @@ ExportedC::ExportedC(const fs::path& folder, Build build, const std::string& con
   take(start, "flown_start");
   take(policy_crc32, "flown_policy_crc32");
   take(controller_crc32, "flown_controller_crc32");
+  take(remembered, "flown_remembered");
+  take(recall, "flown_recall");
   take(hover, "flown_hover");
   take(stay, "flown_stay");
   take(begin, "flown_begin");

@@ -63,6 +63,8 @@ class ExportedC {
   // The functions of the headers; `state` has state_bytes().
   std::size_t state_bytes() const;
   void (*start)(void* state, std::uint32_t now_us, const float* pose);
+  unsigned (*remembered)();  ///< numbers of OnboardLog::start_memory
+  void (*recall)(void* state, const float* memory, std::uint32_t phase);
   void (*hover)(void* state);
   void (*stay)(void* state);
   void (*begin)(void* state);

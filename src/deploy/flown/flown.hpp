@@ -34,6 +34,8 @@ class FlownCheck {
   explicit FlownCheck(const std::filesystem::path& folder);
   Flown check(const OnboardLog& log) const;
   const Contract& contract() const { return contract_; }
+  /// Numbers that a start_memory of a log has to have.
+  std::size_t remembered() const { return library(Build::exact).remembered(); }
   const std::filesystem::path& folder() const { return folder_; }
 
  private:

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -37,6 +38,10 @@ struct OnboardLog {
 
   double start_s = 0;                               ///< flappy_controller_start()
   std::optional<std::array<double, 7>> start_pose;  ///< none: of the pose that arrived last before it
+  /// What estimator, estimate and feedback remembered then, as flappy_controller has it, and its phase of the beat; empty:
+  /// they started anew.
+  std::vector<float> start_memory;
+  std::uint32_t start_phase = 0;
   /// What the controller does before the policy begins: it hovers where the task begins, stays where it is, or flies the
   /// task's path. None: not known.
   enum class Mode { hover, stay, task };

@@ -70,6 +70,7 @@ class Loop {
     // before the start, motors are off
     out.volts.assign(static_cast<std::size_t>(first - log_.commands.begin()), {0, 0});
     c_.start(state(), stamp(log_.start_s), start_pose().data());
+    if (log_.start_memory.size() == c_.remembered()) c_.recall(state(), log_.start_memory.data(), log_.start_phase);
     if (log_.mode == OnboardLog::Mode::hover) c_.hover(state());
     if (log_.mode == OnboardLog::Mode::stay) c_.stay(state());
     auto next = first;
