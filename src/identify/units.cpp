@@ -14,7 +14,7 @@ namespace flappy::identify {
 namespace {
 
 constexpr double kOff = 3, kFarOff = 10;
-constexpr double kSignificant = 4;  // standard deviations of a slope
+constexpr double kSeen = 4;  // standard deviations of a slope
 constexpr double kGravity_m_s2 = 9.81;
 
 struct Unit {
@@ -45,25 +45,25 @@ std::string times(double ratio) { return in_short(ratio) + " times the vehicle's
 
 /// Measured slope over the vehicle's; nothing where either is not seen.
 std::optional<double> ratio_of(const Slope& is, const Slope& expected) {
-  const auto seen = [](const Slope& s) { return std::abs(s.value) > kSignificant * s.sd; };
+  const auto seen = [](const Slope& s) { return std::abs(s.value) > kSeen * s.sd; };
   if (!seen(is) || !seen(expected)) return std::nullopt;
   return is.value / expected.value;
 }
 
-[[noreturn]] void refuse(const MeasuredMap& map, const std::string& column, const std::string& what,
-                         const std::string& accepted) {
+[[noreturn]] void refuse_unit(const MeasuredMap& map, const std::string& column, const std::string& what,
+                              const std::string& accepted) {
   throw io::InputError(map.name + ":1: " + column + ": " + what + "; accepted: " + accepted);
 }
 
-void check_inputs(const MeasuredMap& map, const std::vector<Wrench>& simulated, const model::Driver& driver) {
+void check_duty(const MeasuredMap& map, const std::vector<Wrench>& simulated, const model::Driver& driver) {
   double most = 0;
   for (const sim::Input& u : map.inputs) most = std::max(most, u.amplitude_V);
   if (most > 1 || driver.amplitude_limit_V < kOff) return;
   if (group_rms(map.wrenches)[0] > kOff * group_rms(simulated)[0])
-    refuse(map, kInputNames[0],
-           "at most " + in_short(most) + " at forces of " +
-               times(group_rms(map.wrenches)[0] / group_rms(simulated)[0]) + "; likely duty cycles, not volts",
-           "volts: a duty cycle times the battery's voltage");
+    refuse_unit(map, kInputNames[0],
+                "at most " + in_short(most) + " at forces of " +
+                    times(group_rms(map.wrenches)[0] / group_rms(simulated)[0]) + "; likely duty cycles, not volts",
+                "volts: a duty cycle times the battery's voltage");
 }
 
 void check_forces(const MeasuredMap& map, const std::vector<Wrench>& simulated) {
@@ -72,7 +72,7 @@ void check_forces(const MeasuredMap& map, const std::vector<Wrench>& simulated) 
   if (!thrust) {
     const double all = group_rms(map.wrenches)[0] / group_rms(simulated)[0];
     if (is_off(all, kFarOff))
-      refuse(map, channel_names()[2], "forces are " + times(all) + "; " + likely(kForces, all, "N"), "N");
+      refuse_unit(map, channel_names()[2], "forces are " + times(all) + "; " + likely(kForces, all, "N"), "N");
     return;
   }
   if (*thrust <= 0 || !is_off(*thrust, kOff)) return;
@@ -82,10 +82,10 @@ void check_forces(const MeasuredMap& map, const std::vector<Wrench>& simulated) 
     return !ratio || (*ratio != 0 && std::log(std::abs(*ratio)) / std::log(*thrust) > 0.5);
   };
   if (alike(2, 0) && alike(1, 1))
-    refuse(map, channel_names()[2],
-           "thrust against amplitude_V has slope " + in_short(m[0][2].value) + ", " + times(*thrust) + "; " +
-               likely(kForces, *thrust, "N"),
-           "N");
+    refuse_unit(map, channel_names()[2],
+                "thrust against amplitude_V has slope " + in_short(m[0][2].value) + ", " + times(*thrust) + "; " +
+                    likely(kForces, *thrust, "N"),
+                "N");
 }
 
 void check_torques(const MeasuredMap& map, const std::vector<Wrench>& simulated) {
@@ -98,7 +98,7 @@ void check_torques(const MeasuredMap& map, const std::vector<Wrench>& simulated)
   }
   std::ranges::sort(ratios);
   if (is_off(ratios[1], kFarOff) && ratios[2] < 2 * ratios[0])
-    refuse(
+    refuse_unit(
         map, channel_names()[3],
         "torques against their inputs have slopes of " + times(ratios[1]) + "; " + likely(kTorques, ratios[1], "N m"),
         "N m");
@@ -117,16 +117,16 @@ void check_tare(const MeasuredMap& map, const std::vector<Wrench>& simulated, co
   const double a = (xy - x * y) / spread, b = y - a * x;
   const double left = std::sqrt(std::max(yy - y * y - a * a * spread, 0.0));
   if (a > 0.5 && a < 2 && std::abs(b + weight_N) < 0.2 * weight_N && left < 0.1 * weight_N)
-    refuse(map, channel_names()[2],
-           "thrust is " + in_short(-b) + " N less than the vehicle's at every input, about its weight of " +
-               in_short(weight_N) + " N; likely a balance that was not tared",
-           "forces of the air alone, 0 while the wings are at rest");
+    refuse_unit(map, channel_names()[2],
+                "thrust is " + in_short(-b) + " N less than the vehicle's at every input, about its weight of " +
+                    in_short(weight_N) + " N; likely a balance that was not tared",
+                "forces of the air alone, 0 while the wings are at rest");
 }
 
 }  // namespace
 
 void check_units(const MeasuredMap& measured, const std::vector<Wrench>& simulated, const model::Vehicle& vehicle) {
-  check_inputs(measured, simulated, vehicle.driver);
+  check_duty(measured, simulated, vehicle.driver);
   check_forces(measured, simulated);
   check_torques(measured, simulated);
   check_tare(measured, simulated, vehicle);
