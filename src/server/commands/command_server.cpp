@@ -86,29 +86,32 @@ void CommandServer::answer(const Command& command) {
   CommandResult r = commands_.execute(command);
   const bool lists = r.accepted && command.verb == "list";
   if (r.accepted && command.verb == "fetch") r = fetch(command);
-  answers_.push_back({command.client, std::move(r), lists, io::steady_seconds()});
+  Answer a{command.client, std::move(r), lists, io::steady_seconds()};
+  if (!send(a)) answers_.push_back(std::move(a));
 }
 
-/// Sends each answer as soon as the client's readers are matched, for what is written before that is lost.
+/// Sends an answer, unless the client's readers are not matched yet: what is written before that is lost.
+bool CommandServer::send(Answer& a) {
+  const bool reached = results_.reaches(a.client) && (!a.lists || jobs_.reaches(a.client));
+  if (!reached && io::steady_seconds() - a.asked_s < kDiscovery_s && answers_.size() < kMaxAnswers) return false;
+  if (a.lists) {
+    show_changes(true);
+    a.result.job = shown_.size();
+  }
+  CommandResultMessage m{};
+  put(m.id, a.result.id);
+  m.accepted = a.result.accepted;
+  m.job = a.result.job;
+  put(m.message, a.result.message);
+  results_.write(m);
+  return true;
+}
+
 void CommandServer::send_answers() {
   for (std::size_t k = answers_.size(); k > 0; --k) {
     Answer a = std::move(answers_.front());
     answers_.pop_front();
-    const bool reached = results_.reaches(a.client) && (!a.lists || jobs_.reaches(a.client));
-    if (!reached && io::steady_seconds() - a.asked_s < kDiscovery_s && answers_.size() < kMaxAnswers) {
-      answers_.push_back(std::move(a));
-      continue;
-    }
-    if (a.lists) {
-      show_changes(true);
-      a.result.job = shown_.size();
-    }
-    CommandResultMessage m{};
-    put(m.id, a.result.id);
-    m.accepted = a.result.accepted;
-    m.job = a.result.job;
-    put(m.message, a.result.message);
-    results_.write(m);
+    if (!send(a)) answers_.push_back(std::move(a));
   }
 }
 

@@ -53,6 +53,7 @@ class CommandServer {
   void run();
   void take_commands();
   void answer(const Command& command);
+  bool send(Answer& a);
   void send_answers();
   CommandResult fetch(const Command& command);
   bool send_pieces();
