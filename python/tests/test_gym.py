@@ -198,6 +198,7 @@ def test_copies_fly_on_from_where_they_are(mode):
         whole, env = (both(autoreset_mode=mode, copy=make == 0)[make] for _ in range(2))
         for each in (whole, env):
             each.reset(seed=3)
+            each.action_space.seed(4)
             some_steps(each, 0, 3)
         twin, other, shallow = copy.deepcopy(env), copy.deepcopy(env), copy.copy(env.unwrapped)
         assert twin.unwrapped is not env.unwrapped

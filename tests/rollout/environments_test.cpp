@@ -117,7 +117,7 @@ TEST(Environments, CopiesFlyOnToTheSameBytes) {
                                           {test::source_path("configs/fly/hummingbird_driven.toml"), ends},
                                           {test::source_path("configs/fly/perching.toml"), ends}}) {
     constexpr std::size_t kCount = 2;
-    Bench whole(config, overrides, {kCount, Autoreset::same_step}), bench(config, overrides, {kCount});
+    Bench bench(config, overrides, {kCount, Autoreset::same_step});
     const auto flown = [](Bench& b, int from, int to, float sign = 1) {
       std::uint64_t hash = 0;
       for (int step = from; step < to; ++step) {
@@ -128,16 +128,20 @@ TEST(Environments, CopiesFlyOnToTheSameBytes) {
       }
       return sim::mixed(hash, b.all->hash(0, kCount));
     };
-    const int before = static_cast<int>(std::lround(0.08 / whole.all->step_s())), after = 2 * before;
-    for (Bench* b : {&whole, &bench}) b->reset(3), flown(*b, 0, before);
-    const std::uint64_t expected = flown(whole, before, after);
-    EXPECT_GT(whole.all->episode(0), bench.all->episode(0)) << config;
+    const int before = static_cast<int>(std::lround(0.08 / bench.all->step_s())), after = 2 * before;
+    std::uint64_t expected = 0;
+    for (int k = 0; k < 2; ++k) {
+      bench.reset(3);
+      flown(bench, 0, before);
+      if (k == 0) expected = flown(bench, before, after);
+    }
+    const std::uint32_t episode = bench.all->episode(0);
     Bench twin(bench), other(bench);
     EXPECT_NE(flown(other, before, after, -1), expected) << config;
     EXPECT_EQ(flown(bench, before, after), expected) << config << ": the original, beside a copy that flew elsewhere";
     bench.all.reset();
     EXPECT_EQ(flown(twin, before, after), expected) << config;
-    EXPECT_EQ(twin.all->episodes()[1].length, whole.all->episodes()[1].length);
+    EXPECT_GT(twin.all->episode(0), episode) << config;
   }
 }
 
