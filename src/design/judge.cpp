@@ -195,7 +195,7 @@ Judged Judge::judged(const Values& values, Stage upto, bool past_limits) const {
   j.reached = Stage::effects;
   double successes = 0;
   std::size_t effects = 0;
-  for (const model::CatalogueEffect& effect : model::causes_of(j.robot.vehicle)) {
+  for (const model::CatalogueEffect& effect : model::catalogue_of(j.robot.vehicle)) {
     rollout::FlyConfig c = flights(hover, j.robot, j.controller);
     c.added_effects[effect.info.id] = {};
     Judged with{.robot = j.robot, .controller = j.controller, .figures = {}, .refused = {}};

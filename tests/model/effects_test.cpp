@@ -923,34 +923,5 @@ TEST(Tether, WeighsWithHeightAndPullsBack) {
   EXPECT_EQ(value(b.world<Tether>(q).force_B.z), 0);
 }
 
-TEST(Residual, AcceleratesInsideTheFlownRegimeAndFadesBeyond) {
-  Bench b;
-  b.velocity_B = {One(0.5), One(0), One(-0.2)};
-  b.x.body_rate_rad_s = {One(0), One(3), One(0)};
-  One q[48];
-  for (One& parameter : q) parameter = One(0);
-  for (int i = 42; i < 48; ++i) q[i] = One(i < 45 ? 1 : 10);
-  q[0] = One(2), q[1] = One(-1), q[3] = One(4);  // x: 2 - u + 4 w
-  q[4 * 7] = One(30), q[4 * 7 + 5] = One(-2);    // pitch: 30 - 2 q
-  const double mass = 1 / value(b.p.inverse_mass_1_kg),
-               inertia = value(b.p.fixed_second_kg_m2.xx + b.p.fixed_second_kg_m2.zz);
-  auto load = b.world<Residual>(q);
-  EXPECT_NEAR(value(load.force_B.x), mass * (2 - 0.5 - 0.8), 1e-15);
-  EXPECT_NEAR(value(load.moment_B.y), inertia * (30 - 6), 1e-18);
-  EXPECT_EQ(value(load.force_B.y), 0);
-  EXPECT_EQ(value(load.moment_B.z), 0);
-  b.velocity_B.x = One(1.25);  // half way to where it ends
-  load = b.world<Residual>(q);
-  EXPECT_NEAR(value(load.force_B.x), 0.5 * mass * (2 - 1.25 - 0.8), 1e-15);
-  EXPECT_NEAR(value(load.moment_B.y), 0.5 * inertia * (30 - 6), 1e-18);
-  b.velocity_B.x = One(-2);
-  load = b.world<Residual>(q);
-  EXPECT_EQ(value(load.force_B.x), 0);
-  EXPECT_EQ(value(load.moment_B.y), 0);
-  b.velocity_B.x = One(0);
-  b.x.body_rate_rad_s.z = One(15);
-  EXPECT_EQ(value(b.world<Residual>(q).moment_B.y), 0);
-}
-
 }  // namespace
 }  // namespace flappy::model

@@ -332,7 +332,7 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
     if (e.stopped) return std::nullopt;
     return rollout::summarise(e.flights);
   };
-  const std::vector<model::CatalogueEffect>& effects = model::causes_of(config.vehicle);
+  const std::vector<model::CatalogueEffect>& effects = model::catalogue_of(config.vehicle);
   const double all = static_cast<double>(effects.size() * std::size(kMagnitudes)) + 1;
   const auto without = fly(config);
   progress.show(++done / all);

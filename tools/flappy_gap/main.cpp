@@ -122,7 +122,7 @@ Json list_effects(bool beat_averaged) {
   Json all = Json::array();
   std::printf("| effect | stage | parameter | role | typical | accepted | 90 %% of the prior | group | source |\n");
   std::printf("|---|---|---|---|---|---|---|---|---|\n");
-  for (const model::CatalogueEffect& e : model::causes_of(vehicle)) {
+  for (const model::CatalogueEffect& e : model::catalogue_of(vehicle)) {
     Json parameters = Json::array();
     const std::string group = *e.info.group == '\0' ? "-" : e.info.group;
     for (std::size_t k = 0; k < e.parameters.size(); ++k) {

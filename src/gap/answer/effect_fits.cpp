@@ -82,14 +82,14 @@ FreeBlock largest_deviation(const ScaledEvidence& w, const RegimeBasis& basis) {
 std::vector<std::string> untestable(const RobotFit& robot, const std::vector<std::string>& withheld) {
   std::vector<std::string> list;
   const model::Vehicle& vehicle = robot.uncertain().nominal();
-  for (const model::CatalogueEffect& e : model::causes_of(vehicle)) {
+  for (const model::CatalogueEffect& e : model::catalogue_of(vehicle)) {
     double most = 0;
     for (const MagnitudeColumn& m : robot.magnitudes())
       if (m.effect == e.info.id) most = std::max(most, m.change.cwiseAbs().maxCoeff());
     if (!(most > kNoChange)) list.emplace_back(e.info.id);
   }
   for (const model::CatalogueEffect& e : model::effects())
-    if (e.info.cause && model::find_effect(vehicle, e.info.id) == nullptr) list.emplace_back(e.info.id);
+    if (model::find_effect(vehicle, e.info.id) == nullptr) list.emplace_back(e.info.id);
   std::erase_if(list, [&](const std::string& id) { return std::ranges::count(withheld, id) > 0; });
   return list;
 }
@@ -133,7 +133,7 @@ EffectFits::EffectFits(const Question& question, const RobotFit& robot, const Ba
       options_(options),
       rule_(options.rule),
       threads_(threads),
-      catalogue_size_(model::causes_of(robot.uncertain().nominal()).size()) {}
+      catalogue_size_(model::catalogue_of(robot.uncertain().nominal()).size()) {}
 
 double EffectFits::log_prior_of_one() const {
   return std::log(rule_.prior.effect / static_cast<double>(catalogue_size_));

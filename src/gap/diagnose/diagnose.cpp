@@ -96,7 +96,7 @@ DiagnosisRequest read_request(const DiagnosisSettings& settings) {
   InferenceOptions options;
   options.threads = s.threads;
   if (beat_averaged) {
-    options.max_finalists = static_cast<int>(model::causes_of(vehicle).size());
+    options.max_finalists = static_cast<int>(model::catalogue_of(vehicle).size());
     options.max_effects = kMaxBeatAveragedEffects;
   }
   options.withheld = s.withheld;

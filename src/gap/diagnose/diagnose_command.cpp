@@ -22,7 +22,7 @@ std::vector<std::string> whole_groups(const DiagnosisSettings& settings) {
   std::vector<std::string> all;
   for (const std::string& id : settings.withheld) {
     if (model::find_effect(vehicle, id) == nullptr) return settings.withheld;  // read_request refuses it
-    for (std::string& member : model::whole_group(model::causes_of(vehicle), id)) all.push_back(std::move(member));
+    for (std::string& member : model::whole_group(model::catalogue_of(vehicle), id)) all.push_back(std::move(member));
   }
   return all;
 }

@@ -141,7 +141,7 @@ std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, 
                                            const ModelDiscrepancy* background) {
   std::vector<MagnitudeStep> steps;
   const model::Vehicle now = Hypothesis(uncertain, {}).vehicle(at).vehicle;
-  for (const model::CatalogueEffect& e : model::causes_of(uncertain.nominal())) {
+  for (const model::CatalogueEffect& e : model::catalogue_of(uncertain.nominal())) {
     const std::string id = e.info.id;
     if (std::ranges::count(withheld, id)) continue;
     const Hypothesis h(uncertain, {id});

@@ -61,7 +61,7 @@ class Planner {
       throw io::InputError("--manoeuvre " + settings.manoeuvre + ": no such configuration in " + folder.string() +
                            "; accepted: " + io::joined(names) + io::did_you_mean(settings.manoeuvre, names));
     }
-    for (const model::CatalogueEffect& e : model::causes_of(vehicle_)) asked_[e.info.id] = 1;
+    for (const model::CatalogueEffect& e : model::catalogue_of(vehicle_)) asked_[e.info.id] = 1;
     for (const auto& [effect, times] : settings.magnitudes) {
       check_effect("--magnitude", effect, vehicle_);
       asked_[effect] = times;
@@ -216,7 +216,7 @@ class Planner {
       }
       plan.effects.push_back(std::move(p));
     }
-    for (const model::CatalogueEffect& e : model::causes_of(vehicle_))
+    for (const model::CatalogueEffect& e : model::catalogue_of(vehicle_))
       if (!std::ranges::count(s.effects, e.info.id)) plan.unseen.emplace_back(e.info.id);
     plan.groups = groups_of(plan);
     return plan;

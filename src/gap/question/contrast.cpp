@@ -221,7 +221,7 @@ VerdictRule Contrast::rule(const RobotFit& robot, VerdictRule given) const {
   if (robot.evidence().basis().covers_all()) return given;
   given.gain.outside_by_chance_nats = given.gain.by_chance_nats;
   given.gain.by_chance_nats = given.gain.uncovered_by_chance_nats;
-  for (const model::CatalogueEffect& e : model::causes_of(robot.uncertain().nominal()))
+  for (const model::CatalogueEffect& e : model::catalogue_of(robot.uncertain().nominal()))
     if (!std::ranges::count(robot.evidence().discrepancy().of_models, e.info.id))
       given.gain.outside.emplace_back(e.info.id);
   return given;

@@ -21,7 +21,7 @@ model::Vehicle read_believed_vehicle(const std::string& file) {
 
 void check_effect(const std::string& option, const std::string& id, const model::Vehicle& vehicle) {
   std::vector<std::string> known;
-  for (const model::CatalogueEffect& e : model::causes_of(vehicle)) known.emplace_back(e.info.id);
+  for (const model::CatalogueEffect& e : model::catalogue_of(vehicle)) known.emplace_back(e.info.id);
   if (std::ranges::count(known, id) > 0) return;
   throw io::InputError(option + " " + id + ": no such effect; accepted: those that flappy-gap effects lists" +
                        io::did_you_mean(id, known));

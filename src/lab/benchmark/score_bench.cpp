@@ -151,7 +151,7 @@ bool fit_truths(const ScoreCommand& command, Bench& bench) {
       work_through("fitting true effects", open.size(), command.threads, command.ranks, [&](std::size_t k) {
         const PublicCase& c = bench.manifest.cases[open[k]];
         std::vector<std::string> others;
-        for (const model::CatalogueEffect& e : model::causes_of(model::read_vehicle(bench.predictions.vehicle())))
+        for (const model::CatalogueEffect& e : model::catalogue_of(model::read_vehicle(bench.predictions.vehicle())))
           if (std::ranges::count(bench.cases[open[k]].truth.effects, std::string(e.info.id)) == 0)
             others.emplace_back(e.info.id);
         Question q = bench.predictions.question(c, others);

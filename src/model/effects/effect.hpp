@@ -43,7 +43,6 @@ struct EffectInfo {
   int magnitudes;  ///< number of leading parameters that are magnitudes: the effect vanishes, to the bit, when all of them are 0
   const char* group;  ///< group of effects that short or gentle flights cannot tell apart, or ""
   const char* source;
-  bool cause = true;  ///< false: describes what is left, and no diagnosis names it
 };
 
 inline namespace FLAPPY_ISA {

@@ -117,28 +117,18 @@ const CatalogueEffect* effect_named(const std::string& id) {
   return nullptr;
 }
 
-std::vector<CatalogueEffect> chosen(bool (*belongs)(const EffectInfo&)) {
+std::vector<CatalogueEffect> of_sensors() {
   std::vector<CatalogueEffect> list;
   for (const CatalogueEffect& e : effects())
-    if (belongs(e.info)) list.push_back(e);
+    if (e.info.stage == Stage::sensor) list.push_back(e);
   return list;
 }
 
 }  // namespace
 
 const std::vector<CatalogueEffect>& catalogue_of(const Vehicle& vehicle) {
-  static const std::vector<CatalogueEffect> seen = chosen([](const EffectInfo& e) { return e.stage == Stage::sensor; });
+  static const std::vector<CatalogueEffect> seen = of_sensors();
   return vehicle.beat_averaged ? means() : vehicle.jointed ? seen : effects();
-}
-
-const std::vector<CatalogueEffect>& causes() {
-  static const std::vector<CatalogueEffect> named = chosen([](const EffectInfo& e) { return e.cause; });
-  return named;
-}
-
-const std::vector<CatalogueEffect>& causes_of(const Vehicle& vehicle) {
-  const std::vector<CatalogueEffect>& all = catalogue_of(vehicle);
-  return &all == &effects() ? causes() : all;
 }
 
 const CatalogueEffect* find_effect(const Vehicle& vehicle, const std::string& id) {

@@ -30,7 +30,6 @@
 #include "model/effects/mocap_delay.hpp"
 #include "model/effects/mocap_tilt.hpp"
 #include "model/effects/payload.hpp"
-#include "model/effects/residual.hpp"
 #include "model/effects/rotational_lift.hpp"
 #include "model/effects/slung_load.hpp"
 #include "model/effects/spring_hardening.hpp"
@@ -52,13 +51,12 @@ namespace flappy::model {
 inline namespace FLAPPY_ISA {
 
 /// Order within a stage: changes of the vehicle; the voltage from the command to the motor; stroke and stops; the air,
-/// first what causes the wing's force, then what scales it; loads on the body; sensors; what is left.
-using Effects =
-    std::tuple<ComOffset, InertiaProducts, WingInertiaShape, WingDamage, CommandDelay, DriverDeadZone, DriverBandwidth,
-               WindingHeating, BatterySag, CoulombFriction, SpringHardening, StopCompliance, GearBacklash, Wind,
-               WingFlexibility, RotationalLift, WakeCapture, ClapAndFling, GroundEffect, CeilingEffect, AddedMass,
-               WallEffect, BodyDrag, Tether, GyroBias, AccelerometerMisalignment, VibrationRectification, MocapTilt,
-               MarkerOffset, MocapDelay, Residual>;
+/// first what causes the wing's force, then what scales it; loads on the body; sensors.
+using Effects = std::tuple<ComOffset, InertiaProducts, WingInertiaShape, WingDamage, CommandDelay, DriverDeadZone,
+                           DriverBandwidth, WindingHeating, BatterySag, CoulombFriction, SpringHardening,
+                           StopCompliance, GearBacklash, Wind, WingFlexibility, RotationalLift, WakeCapture,
+                           ClapAndFling, GroundEffect, CeilingEffect, AddedMass, WallEffect, BodyDrag, Tether, GyroBias,
+                           AccelerometerMisalignment, VibrationRectification, MocapTilt, MarkerOffset, MocapDelay>;
 
 using BeatAveragedEffects =
     std::tuple<ComOffset, InertiaProducts, Payload, ActuatorLoss, CommandDelay, DriverBandwidth, BatteryThrust, Wind,
@@ -114,9 +112,6 @@ struct CatalogueEffect {
 const std::vector<CatalogueEffect>& effects();
 /// Effects that a vehicle may have: effects(); if beat-averaged, those with such a stage; if jointed, those of sensors.
 const std::vector<CatalogueEffect>& catalogue_of(const Vehicle& vehicle);
-/// Those of effects() that a diagnosis may name, and those of a vehicle's catalogue.
-const std::vector<CatalogueEffect>& causes();
-const std::vector<CatalogueEffect>& causes_of(const Vehicle& vehicle);
 /// Null if the vehicle's catalogue does not have the effect.
 const CatalogueEffect* find_effect(const Vehicle& vehicle, const std::string& id);
 std::uint64_t sensor_effects();

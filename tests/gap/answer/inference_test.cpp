@@ -90,7 +90,7 @@ TEST(Diagnose, StopsWithWhatItHas) {
   options.progress = [](double, const std::string&) { return false; };
   const Inference d = infer(flights, shipped_priors(), options);
   EXPECT_FALSE(d.complete);
-  ASSERT_EQ(d.hypotheses.size(), 3 + model::causes().size());
+  ASSERT_EQ(d.hypotheses.size(), 3 + model::effects().size());
   double sum = 0;
   for (const ScoredHypothesis& a : d.hypotheses) {
     EXPECT_TRUE(a.held_out.empty());

@@ -33,7 +33,7 @@ TEST(RunDiagnose, ReadsNoTruth) {
   command.settings.priors = kConfigs + "gap/priors.toml";
   command.settings.flights = {options.log_folder.string()};
   command.out = folder / "out";
-  for (const model::CatalogueEffect& e : model::causes())
+  for (const model::CatalogueEffect& e : model::effects())
     if (std::string(e.info.id) != "clap_and_fling") command.settings.withheld.push_back(e.info.id);
   const std::filesystem::path truth = options.log_folder / "truth.csv";
   const std::string honest = io::read_text(truth);

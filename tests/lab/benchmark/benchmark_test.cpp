@@ -30,7 +30,7 @@ const std::string kConfigs = FLAPPY_SOURCE_DIR "/configs/";
 /// Every effect is detectable at 0.2, or these alone, but the tether; hover hides the ceiling.
 std::string detectability(const std::vector<std::string>& only = {}) {
   std::string text = "schema = 1\n";
-  for (const model::CatalogueEffect& e : model::causes()) {
+  for (const model::CatalogueEffect& e : model::effects()) {
     const std::string id = e.info.id;
     text += "[" + id + "]\n";
     const bool left_out = id == "tether" || (!only.empty() && std::ranges::count(only, id) == 0);
@@ -126,7 +126,7 @@ TEST_F(Benchmark, PredictsSealsAndScores) {
   EXPECT_EQ(json.at("group_top1"), 1.0);
   EXPECT_NEAR(json.at("closure_median").get<double>(), 0.5 * (1 + 0.5 / 0.75), 1e-12);
   EXPECT_TRUE(json.at("top1_current").is_null());
-  EXPECT_EQ(json.at("undetectable").size(), model::causes().size() - 1) << "outside_slosh, and all but two";
+  EXPECT_EQ(json.at("undetectable").size(), model::effects().size() - 1) << "outside_slosh, and all but two";
   for (const char* key : {"top1_mocap_imu", "top1_current", "group_top1", "top3", "false_alarm_none", "unknown",
                           "unknown_wrong", "ece", "closure_median", "pairs_f1", "hover_abstain"})
     for (const char* end : {"", "_low", "_high"}) EXPECT_TRUE(json.contains(std::string(key) + end)) << key << end;
@@ -410,7 +410,7 @@ TEST_F(Benchmark, FamilyAHasTheCatalogue) {
   std::set<std::string> own, catalogue;
   for (const blind::FamilyEffect& e : family_named("a").effects())
     if (in_catalogue(e)) own.insert(e.id);
-  for (const model::CatalogueEffect& e : model::causes()) catalogue.insert(std::string(e.info.id));
+  for (const model::CatalogueEffect& e : model::effects()) catalogue.insert(std::string(e.info.id));
   EXPECT_EQ(own, catalogue);
 }
 
