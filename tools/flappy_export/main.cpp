@@ -110,9 +110,17 @@ void write_for_runtimes(Export& e, const Request& request, const learn::Finished
   const auto observation = run.fly.fleet.task.observation(), action = run.fly.fleet.task.action();
   policy::PolicyVectors vectors;
   if (request.prove) vectors = deploy::some_of(deploy::roll_out(run.fly, 0, kComparedFlights), kComparedVectors);
-  const PolicyVectors far_out = deploy::saturating(network, e.flown);
+  const policy::PolicyNetwork loud = deploy::louder(network);
   std::vector<deploy::Agreement> rows;
-  const auto try_out = [&](const std::string& name, const std::string& runtime, const char* key) {
+  const auto far_out = [&](const std::string& file, const std::string& runtime, const policy::PolicyNetwork& of) {
+    const auto policy = policy::load_policy(work / file, of.inputs(), of.outputs());
+    deploy::Agreement asked;
+    deploy::ask_far_out(asked, *policy, of, deploy::saturating(of, e.flown));
+    if (asked.beyond_range > 0) throw std::runtime_error(file + " leaves the range of actions in " + runtime);
+    return asked.saturated;
+  };
+  const auto try_out = [&](const std::string& name, const std::string& runtime, const char* key,
+                           const std::string& loud_bytes) {
     io::write_atomically(work / name, e.files[name]);
     const auto policy = policy::load_policy(work / name, network.inputs(), network.outputs());
     std::vector<float> acts(e.flown.action.size());
@@ -122,14 +130,13 @@ void write_for_runtimes(Export& e, const Request& request, const learn::Finished
     json[key] = json_of(error);
     if (*std::ranges::max_element(error.largest) > kMaxError)
       throw std::runtime_error(runtime + " does not act as the actor does");
-    deploy::Agreement asked;
-    deploy::ask_far_out(asked, *policy, network, far_out);
-    if (asked.beyond_range > 0) throw std::runtime_error(name + " leaves the range of actions in " + runtime);
     if (!request.prove) return;
     deploy::Agreement& row = rows.emplace_back(deploy::compare(name, runtime, *policy, network.half, vectors));
-    row.saturated = asked.saturated;
-    std::printf("%s: %zu of %zu outputs far out saturate, and none leaves its range\n", name.c_str(), row.saturated,
-                far_out.action.size());
+    io::write_atomically(work / ("louder_" + name), loud_bytes);
+    row.saturated = far_out(name, runtime, network) + far_out("louder_" + name, runtime, loud);
+    std::printf(
+        "%s, and the same with 16 times the sums of its last layer: %zu outputs saturate, none leaves its range\n",
+        name.c_str(), row.saturated);
     const deploy::BesideActor flown = deploy::fly_beside(run.fly, *policy, kProofFlights);
     row.flights = kProofFlights;
     row.ended_alike = flown.ended_alike;
@@ -137,7 +144,7 @@ void write_for_runtimes(Export& e, const Request& request, const learn::Finished
   };
   if (policy::reads_torch_script()) {
     e.files["policy.pt"] = policy::torch_script(network, deploy::contract_text(run.fly, run.info));
-    try_out("policy.pt", "TorchScript", "torch_script_error");
+    try_out("policy.pt", "TorchScript", "torch_script_error", policy::torch_script(loud, ""));
   } else {
     std::printf("policy.pt is not written: this build has no LibTorch (package flappy-torch)\n");
   }
@@ -152,7 +159,7 @@ void write_for_runtimes(Export& e, const Request& request, const learn::Finished
                                      {"contract_json_sha256", io::sha256(e.files["contract.json"])},
                                      {"config_sha256", run.info.config_sha256}});
     if (const std::string version = policy::onnxruntime_version(); !version.empty())
-      try_out("policy.onnx", "onnxruntime " + version, "onnx_error");
+      try_out("policy.onnx", "onnxruntime " + version, "onnx_error", policy::onnx_model(loud, {}));
     else std::printf("policy.onnx, of opset %d, is not tried out: python3 has no onnxruntime\n", policy::kOnnxOpset);
   } else {
     std::printf("policy.onnx is not written: this build has no ONNX library\n");

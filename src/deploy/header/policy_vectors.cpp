@@ -136,6 +136,13 @@ void append(policy::PolicyVectors& to, const policy::PolicyVectors& more) {
   to.action.insert(to.action.end(), more.action.begin(), more.action.end());
 }
 
+policy::PolicyNetwork louder(policy::PolicyNetwork network) {
+  const auto inputs = static_cast<std::size_t>(network.widths[network.widths.size() - 2]);
+  const std::size_t last = static_cast<std::size_t>(network.outputs()) * (inputs + 1);
+  for (std::size_t k = network.weights.size() - last; k < network.weights.size(); ++k) network.weights[k] *= 16;
+  return network;
+}
+
 policy::PolicyVectors saturating(const policy::PolicyNetwork& network, const policy::PolicyVectors& flown) {
   constexpr std::size_t kRows = 64;
   constexpr float kStep = 1.03F;  // three from 8.2 to 9, where onnxruntime's tanh is larger than 1

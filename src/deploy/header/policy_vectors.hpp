@@ -32,6 +32,9 @@ BesideActor fly_beside(const rollout::FlyConfig& given, const policy::Policy& po
 policy::PolicyVectors some_of(const policy::PolicyVectors& all, std::size_t count);
 void append(policy::PolicyVectors& to, const policy::PolicyVectors& more);
 
+/// The network with 16 times the sums of its last layer, whose outputs saturate where those of a calm policy do not.
+policy::PolicyNetwork louder(policy::PolicyNetwork network);
+
 /// Flown observations at 1 to 1000 times their distance from the middle of the normalisation, so that one output after
 /// the other saturates.
 policy::PolicyVectors saturating(const policy::PolicyNetwork& network, const policy::PolicyVectors& flown);

@@ -17,7 +17,7 @@ struct Agreement {
   /// half the output's range, which do not grow where an output crosses 0.
   std::size_t outputs = 0, differing = 0;
   double median_ulp = 0, percentile_99_ulp = 0, largest_ulp = 0, largest_ulp_of_range = 0;
-  /// Of saturating(): outputs at an end of their range as the actor has them, and those of the file beyond it.
+  /// Of saturating(): outputs that the network has at an end of their range, and those of the file beyond it.
   std::size_t saturated = 0, beyond_range = 0;
   std::size_t flights = 0, ended_alike = 0;  ///< as fly_beside() (policy_vectors.hpp) finds them
   double largest_distance_m = 0;

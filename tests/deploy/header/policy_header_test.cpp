@@ -344,6 +344,11 @@ TEST(FileProof, FindsWhatLeavesTheRange) {
   ask_far_out(same, OfNetwork(network), network, far_out);
   EXPECT_GT(same.saturated, 100u);
   EXPECT_EQ(same.beyond_range, 0u);
+  const policy::PolicyNetwork loud = louder(network);
+  Agreement louder_one;
+  ask_far_out(louder_one, OfNetwork(loud), loud, saturating(loud, roll_out(config, 0, 8)));
+  EXPECT_GT(louder_one.saturated, same.saturated);
+  EXPECT_EQ(louder_one.beyond_range, 0u);
   policy::PolicyNetwork wider = network;  // by a millionth, at one output
   wider.half[0] *= 1 + 0x1p-20F;
   ask_far_out(beyond, OfNetwork(wider), network, far_out);
