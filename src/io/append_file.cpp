@@ -64,6 +64,11 @@ void AppendFile::refuse(int error) const {
   throw InputError(path_.string() + ": cannot be written: " + std::generic_category().message(error));
 }
 
+bool is_temporary(const std::filesystem::path& path) {
+  static const std::regex temporary(R"(.+\.tmp\d+-\d+)");
+  return std::regex_match(path.filename().string(), temporary);
+}
+
 FolderLock::FolderLock(const std::filesystem::path& folder)
     : descriptor_(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
   const auto refuse = [&](const std::string& what) {
@@ -76,13 +81,9 @@ FolderLock::FolderLock(const std::filesystem::path& folder)
     if (errno == EWOULDBLOCK) refuse("another process is at work here; accepted: wait for it, or another folder");
   }
   note_own_folder(folder);
-  static const std::regex temporary(R"(.+\.tmp\d+-\d+)");
   std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    const bool left_over =
-        entry.is_regular_file(error) && std::regex_match(entry.path().filename().string(), temporary);
-    if (left_over) unlink(entry.path().c_str());
-  }
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error))
+    if (entry.is_regular_file(error) && is_temporary(entry.path())) unlink(entry.path().c_str());
 }
 
 FolderLock::~FolderLock() { close(descriptor_); }

@@ -28,7 +28,11 @@ class AppendFile {
   std::uint64_t size_;
 };
 
-/// Locks a folder, which is the command's own then (read_files.hpp), until the object or the process ends, and removes temporary files of a killed process (AtomicFile).
+/// Whether it is named as the temporary file of an AtomicFile.
+bool is_temporary(const std::filesystem::path& path);
+
+/// Locks a folder, which is the command's own then (read_files.hpp), until the object or the process ends, and removes
+/// temporary files of a killed process (AtomicFile).
 /// Throws InputError where another process has locked the folder. Has no effect on file systems without locks.
 class FolderLock {
  public:

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <optional>
 
+#include "io/log.hpp"
 #include "io/progress.hpp"
 
 namespace flappy::server {
@@ -15,6 +16,7 @@ namespace fs = std::filesystem;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kLook{50};
+constexpr int kAttempts = 3;  // at a file that is replaced while it is fetched
 
 template <std::size_t kSize>
 void put(char (&to)[kSize], const std::string& from, const char* what) {
@@ -136,6 +138,7 @@ std::size_t CommandClient::fetch(std::uint64_t job, const fs::path& folder,
     files_.emplace(participant_, files_topic_, kPieces);
     waiting_.add(files_->entity());
   }
+  // false: the file is gone, as of a training that goes on, which replaces its files
   const auto ask_for = [&](const std::string& name, const std::function<void(const Piece&)>& see_piece) {
     pieces_.clear();
     Command command{
@@ -146,6 +149,7 @@ std::size_t CommandClient::fetch(std::uint64_t job, const fs::path& folder,
       io::sleep_until(io::steady_seconds() + 0.2);  // every file takes one command, so many files reach the rate limit
       r = ask(command);
     }
+    if (!r.accepted && r.message.starts_with(kNoSuchFile)) return false;
     if (!r.accepted) throw io::InputError(r.message);
     bool over = r.message == "0 files";
     for (double heard_s = io::steady_seconds(); !over;) {
@@ -160,6 +164,7 @@ std::size_t CommandClient::fetch(std::uint64_t job, const fs::path& folder,
                              io::shortest_digits(timeout_s_) + " s");
       waiting_.wait(kLook);
     }
+    return true;
   };
   std::vector<JobFile> files;
   std::optional<std::uint32_t> left;
@@ -168,20 +173,28 @@ std::size_t CommandClient::fetch(std::uint64_t job, const fs::path& folder,
     left = m.left;
     files.push_back({m.name, m.size});
   });
+  std::size_t fetched = 0;
   for (const JobFile& file : files) {
     see(file);
-    io::AtomicFile to(place_of(folder, file.name));
-    std::uint64_t got = 0, size = 0;
-    ask_for(file.name, [&](const Piece& m) {
-      if (m.offset != got) throw io::InputError(file.name + ": a piece is missing");
-      to.write(m.data);
-      got += m.data.size();
-      size = m.size;
-    });
-    if (got != size) throw io::InputError(file.name + ": changed while it was fetched; accepted: the same once more");
-    to.commit();
+    const fs::path path = place_of(folder, file.name);
+    bool there = true, whole = false;
+    for (int attempt = 0; attempt < kAttempts && there && !whole; ++attempt) {
+      io::AtomicFile to(path);
+      std::uint64_t got = 0, size = 0;
+      there = ask_for(file.name, [&](const Piece& m) {
+        if (m.offset != got) throw io::InputError(file.name + ": a piece is missing");
+        to.write(m.data);
+        got += m.data.size();
+        size = m.size;
+      });
+      whole = there && got == size;
+      if (whole) to.commit();
+    }
+    if (!there) io::log(io::LogLevel::warning, file.name + ": is gone meanwhile, and is left out");
+    else if (!whole) throw io::InputError(file.name + ": changes while it is fetched; accepted: the same once more");
+    fetched += whole;
   }
-  return files.size();
+  return fetched;
 }
 
 }  // namespace flappy::server

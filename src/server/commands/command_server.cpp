@@ -126,8 +126,7 @@ CommandResult CommandServer::fetch(const Command& command) {
       t.files = std::move(files);
     } else {
       const auto found = std::ranges::find(files, command.config, &JobFile::name);
-      if (found == files.end())
-        throw io::InputError("file: \"" + shown(command.config) + "\" is none of job " + std::to_string(command.job));
+      if (found == files.end()) throw io::InputError(std::string(kNoSuchFile) + ": \"" + shown(command.config) + "\"");
       r.message = found->name + ": " + std::to_string(found->bytes) + " bytes";
       t.name = found->name;
       t.size = found->bytes;

@@ -119,7 +119,7 @@ void CommandSocket::Parts::route() {
     }
     const std::string name = request.get_param_value("name");
     const auto found = std::ranges::find(files, name, &JobFile::name);
-    if (found == files.end()) throw io::InputError("file: is none of job " + std::to_string(job));
+    if (found == files.end()) throw io::InputError(std::string(kNoSuchFile) + ": \"" + shown(name) + "\"");
     if (found->bytes == 0) return response.set_content("", "application/octet-stream");
     response.set_content_provider(
         found->bytes, "application/octet-stream",

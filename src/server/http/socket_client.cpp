@@ -7,12 +7,15 @@
 #include <nlohmann/json.hpp>
 
 #include "io/files.hpp"
+#include "io/log.hpp"
 
 namespace flappy::server {
 namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
+
+constexpr int kFetches = 3;  // of a file that is replaced while it is fetched
 
 JobStatus job_of(const Json& j) {
   return {j.at("id"),        j.at("kind"),     j.at("config"),  j.at("state"), j.at("attempts"),
@@ -85,21 +88,30 @@ std::size_t SocketClient::fetch(std::uint64_t job, const fs::path& folder,
                                 const std::function<void(const JobFile&)>& see) {
   const std::string query = "/files?job=" + std::to_string(job);
   const Json files = Json::parse(body(client_->Get(query), folder_));
+  std::size_t fetched = 0;
   for (const Json& each : files) {
     const JobFile file{each.at("name"), each.at("bytes")};
     see(file);
-    io::AtomicFile to(place_of(folder, file.name));
-    std::uint64_t got = 0;
-    const httplib::Result result = client_->Get(query + "&name=" + file.name, [&](const char* bytes, std::size_t size) {
-      to.write({bytes, size});
-      got += size;
-      return true;
-    });
-    if (!result || result->status != 200 || std::to_string(got) != result->get_header_value("Content-Length"))
-      throw io::InputError(file.name + ": changed while it was fetched; accepted: the same once more");
-    to.commit();
+    const fs::path path = place_of(folder, file.name);
+    bool there = true, whole = false;
+    for (int attempt = 0; attempt < kFetches && there && !whole; ++attempt) {
+      io::AtomicFile to(path);
+      std::uint64_t got = 0;
+      const httplib::Result result =
+          client_->Get(query + "&name=" + file.name, [&](const char* bytes, std::size_t size) {
+            to.write({bytes, size});
+            got += size;
+            return true;
+          });
+      there = !result || result->status == 200;
+      whole = result && there && std::to_string(got) == result->get_header_value("Content-Length");
+      if (whole) to.commit();
+    }
+    if (!there) io::log(io::LogLevel::warning, file.name + ": is gone meanwhile, and is left out");
+    else if (!whole) throw io::InputError(file.name + ": changes while it is fetched; accepted: the same once more");
+    fetched += whole;
   }
-  return files.size();
+  return fetched;
 }
 
 }  // namespace flappy::server

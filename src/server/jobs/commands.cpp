@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "io/append_file.hpp"
 #include "io/files.hpp"
 #include "io/progress.hpp"
 #include "server/jobs/names.hpp"
@@ -116,7 +117,7 @@ std::vector<JobFile> files_of(const fs::path& folder) {
   std::error_code error;
   fs::recursive_directory_iterator each(folder, error);
   for (; !error && each != fs::recursive_directory_iterator() && all.size() < kMaxFiles; each.increment(error)) {
-    if (each->is_symlink(error) || !each->is_regular_file(error)) continue;
+    if (each->is_symlink(error) || !each->is_regular_file(error) || io::is_temporary(each->path())) continue;
     const std::uintmax_t bytes = each->file_size(error);
     const std::string name = each->path().lexically_relative(folder).string();
     if (!error && is_name(name)) all.push_back({name, bytes});

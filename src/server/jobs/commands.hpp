@@ -26,6 +26,9 @@ struct Command {
 /// Begins the message of a refusal by the rate limit; the client may send the same command again later.
 inline constexpr const char* kTooMany = "too many commands at a time";
 
+/// Begins the message of a refusal of a file that is not, or no longer, there.
+inline constexpr const char* kNoSuchFile = "no such file of the job";
+
 struct CommandResult {
   std::string id;  ///< id of the command
   bool accepted = false;
@@ -48,7 +51,8 @@ struct JobFile {
   std::uint64_t bytes = 0;
 };
 inline constexpr std::size_t kMaxFiles = 10'000, kMaxOfChunk = 65'536, kMaxListed = 1000;
-/// Lists the regular files below `folder`, sorted by name, without symbolic links; at most kMaxFiles.
+/// Lists the regular files below `folder`, sorted by name, without symbolic links and files that are being
+/// written; at most kMaxFiles.
 std::vector<JobFile> files_of(const std::filesystem::path& folder);
 
 /// Checks and executes commands. Thread-safe.

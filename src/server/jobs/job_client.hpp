@@ -18,7 +18,8 @@ class JobClient {
   virtual std::vector<JobStatus> list() = 0;  ///< newest first
   /// Calls `see` with each job that changes, until `see` or `keep_going` returns false.
   virtual void watch(const std::function<bool(const JobStatus& job)>& see, const std::function<bool()>& keep_going) = 0;
-  /// Downloads a job's files into `folder`, under their names, and returns their number. Calls `see` before each.
+  /// Downloads a job's files into `folder`, under their names, and returns their number. Calls `see` before each. A file
+  /// that is removed after the list was made, as a training does with old checkpoints, is left out with a warning.
   virtual std::size_t fetch(std::uint64_t job, const std::filesystem::path& folder,
                             const std::function<void(const JobFile&)>& see) = 0;
 };

@@ -98,6 +98,19 @@ TEST(CommandServer, HandsOverFiles) {
             std::string::npos);
 }
 
+// As of a training that goes on, which removes old checkpoints.
+TEST(CommandServer, LeavesOutFilesThatAreGoneMeanwhile) {
+  Served served;
+  CommandClient client(served.dds, 5);
+  client.ask(Served::submit("a"));
+  const auto folder = served.place.folder(1), out = served.place.root / "got";
+  std::filesystem::create_directories(folder);
+  for (const char* name : {"a.txt", "b.txt", "c.txt"}) io::write_atomically(folder / name, name);
+  EXPECT_EQ(client.fetch(1, out, [&](const JobFile&) { std::filesystem::remove(folder / "b.txt"); }), 2U);
+  EXPECT_TRUE(std::filesystem::exists(out / "a.txt") && std::filesystem::exists(out / "c.txt"));
+  EXPECT_FALSE(std::filesystem::exists(out / "b.txt"));
+}
+
 /// A client that writes commands, and makes its readers as the test asks.
 struct Raw {
   explicit Raw(const io::DdsConfig& dds) : participant(dds), command(participant, "/flappy/command", kPieces) {

@@ -129,6 +129,7 @@ TEST_F(CommandsOf, HandOutAJobsFiles) {
   const std::string text(kMaxOfChunk + 10, 'y');
   io::write_atomically(place.folder(1) / "run" / "best.json", text);
   fs::create_symlink("/etc/passwd", place.folder(1) / "leak");
+  io::AtomicFile half(place.folder(1) / "run" / "last.json");
   const std::vector<JobFile> files = commands.files(1);
   ASSERT_EQ(files.size(), 1u);
   EXPECT_EQ(files[0].name, "run/best.json");
