@@ -19,13 +19,16 @@ using namespace log_file;
   throw io::InputError(place.string() + ": " + what + (accepted.empty() ? "" : "; accepted: " + std::string(accepted)));
 }
 
-/// Name of the vehicle that a log declares, whose file may be in the folder; empty where the header cannot be read.
+/// Name of the vehicle that a log to be replaced declares, whose file may be in the folder; empty where the header cannot
+/// be read.
 std::string declared_vehicle(const fs::path& folder) {
+  std::string vehicle;
   try {
-    return io::Config::load(folder / kHeader).root().string("vehicle");
-  } catch (const io::InputError&) {
-    return "";
+    vehicle = io::Config::load(folder / kHeader).root().string("vehicle");
+  } catch (const io::InputError&) {  // then no vehicle's file is expected
   }
+  io::allow_update(folder / kHeader);  // read for this alone
+  return vehicle;
 }
 
 void require_log(const fs::path& folder) {
@@ -119,8 +122,8 @@ FlightLog read_flight_log(const fs::path& folder) {
 void write_flight_log(const fs::path& folder, const FlightLog& log) {
   const LogFiles files = flight_log_files(log);
   parse_flight_log(files, folder);
-  require_replaceable(folder);
   io::require_unread_folder(folder);
+  require_replaceable(folder);
   try {
     const fs::path named = folder.has_filename() ? folder : folder.parent_path();
     const fs::path target = fs::weakly_canonical(named);  // else a link would be replaced, not its folder

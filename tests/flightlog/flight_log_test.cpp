@@ -14,6 +14,7 @@
 #include "flightlog/some_log.hpp"
 #include "flightlog/log_world.hpp"
 #include "io/files.hpp"
+#include "io/read_files.hpp"
 
 namespace flappy::flightlog {
 namespace {
@@ -433,6 +434,20 @@ TEST_F(FlightLogFolder, IsWrittenAndReplacedAsAWhole) {
   EXPECT_FALSE(fs::exists(folder_ / "truth.csv"));  // it was another flight's
   EXPECT_FALSE(fs::exists(folder_ / sample_log().header.vehicle));
   EXPECT_EQ(names(), std::vector<std::string>{"flight_1"});
+}
+
+TEST_F(FlightLogFolder, IsReplacedUnlessTheSameCommandReadsIt) {
+  for (int i = 0; i < 2; ++i) {
+    const io::NotedCommand command;
+    write_flight_log(folder_, sample_log());
+    write_flight_log(folder_, sample_log());
+  }
+  const io::NotedCommand command;
+  io::read_text(folder_ / "mocap.csv");
+  EXPECT_EQ(write_message(folder_), folder_.string() +
+                                        ": holds mocap.csv, which is read by the same command; accepted: "
+                                        "another folder");
+  EXPECT_EQ(flightlog::read_flight_log(folder_), sample_log());
 }
 
 TEST_F(FlightLogFolder, FollowsALinkToAFolder) {
