@@ -25,6 +25,7 @@ nb::object diagnose(const std::filesystem::path& vehicle, const std::vector<std:
   command.settings.threads = threads;
   command.quiet = true;
   nlohmann::ordered_json json;
+  bool stopped = false;
   {
     const Interruptible until_done;
     const nb::gil_scoped_release free;

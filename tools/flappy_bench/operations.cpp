@@ -55,6 +55,9 @@ static C min(C a, C b) { return other(a.v < b.v ? a.v : b.v); }
 static C max(C a, C b) { return other(a.v > b.v ? a.v : b.v); }
 static C clamp(C v, C low, C high) { return min(max(v, low), high); }
 static C abs(C a) { return other(a.v < 0 ? -a.v : a.v); }
+static C nearest(C a) { return other(model::nearest(a.v)); }
+static C exponent(C a) { return other(model::exponent(a.v)); }
+static C half_to(C a) { return other(model::half_to(a.v)); }
 static C sqrt(C a) { return ++count.root, C(__builtin_sqrt(a.v)); }
 
 template <>
