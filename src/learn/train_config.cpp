@@ -38,7 +38,7 @@ std::vector<int> widths(const io::Table& t, const char* key) {
   return list;
 }
 
-std::string text_of(const std::vector<int>& widths) {
+std::string widths_text(const std::vector<int>& widths) {
   std::vector<std::string> words;
   for (const int width : widths) words.push_back(std::to_string(width));
   return "[" + io::joined(words) + "]";
@@ -214,8 +214,8 @@ policy::Actor TrainConfig::blank_actor() const {
 
 NetworkKeys network_keys(const io::Table& root) {
   const io::Table networks = root.table("networks"), learn = root.table("learn");
-  return {{"networks.actor", text_of(widths(networks, "actor"))},
-          {"networks.critic", text_of(widths(networks, "critic"))},
+  return {{"networks.actor", widths_text(widths(networks, "actor"))},
+          {"networks.critic", widths_text(widths(networks, "critic"))},
           {"networks.activation", networks.string("activation")},
           {"networks.layer_norm", networks.boolean_or("layer_norm", false) ? "true" : "false"},
           {"learn.twin", learn.boolean("twin") ? "true" : "false"},
@@ -223,7 +223,7 @@ NetworkKeys network_keys(const io::Table& root) {
 }
 
 NetworkKeys network_keys(const policy::Actor& actor) {
-  return {{"networks.actor", text_of({actor.widths.begin() + 1, actor.widths.end() - 1})},
+  return {{"networks.actor", widths_text({actor.widths.begin() + 1, actor.widths.end() - 1})},
           {"networks.activation", policy::name_of(actor.hidden)},
           {"networks.layer_norm", actor.layer_norm ? "true" : "false"}};
 }
