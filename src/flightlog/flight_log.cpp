@@ -31,15 +31,14 @@ struct Field {
 };
 
 constexpr double kLatest = 1e10;  // s; allows clocks that count from 1970
-constexpr double kMostRemembered = 1e30;
-constexpr double kMost_V = 1e3, kMost_A = 1e7, kMost_rad_s = 1e6, kMost_m_s2 = 1e9;
-const std::vector<Field<CommandStream>> kCommandFields = {
-    {"t_s", &CommandStream::t_s, kLatest},
-    {"left_voltage_V", &CommandStream::left_voltage_V, kMost_V},
-    {"right_voltage_V", &CommandStream::right_voltage_V, kMost_V}};
-const std::vector<Field<BeatInputs>> kInputFields = {{"amplitude_V", &BeatInputs::amplitude_V, kMost_V},
-                                                     {"difference_V", &BeatInputs::difference_V, kMost_V},
-                                                     {"bias_V", &BeatInputs::bias_V, kMost_V},
+constexpr double kMaxRemembered = 1e30;
+constexpr double kMax_V = 1e3, kMax_A = 1e7, kMax_rad_s = 1e6, kMax_m_s2 = 1e9;
+const std::vector<Field<CommandStream>> kCommandFields = {{"t_s", &CommandStream::t_s, kLatest},
+                                                          {"left_voltage_V", &CommandStream::left_voltage_V, kMax_V},
+                                                          {"right_voltage_V", &CommandStream::right_voltage_V, kMax_V}};
+const std::vector<Field<BeatInputs>> kInputFields = {{"amplitude_V", &BeatInputs::amplitude_V, kMax_V},
+                                                     {"difference_V", &BeatInputs::difference_V, kMax_V},
+                                                     {"bias_V", &BeatInputs::bias_V, kMax_V},
                                                      {"split_cycle", &BeatInputs::split_cycle, 0.5}};
 const std::string kPhase = "phase_rad";
 constexpr double kPhaseLimit = 1e9, kInputLimit = 1e6;
@@ -48,17 +47,17 @@ const std::vector<Field<MocapStream>> kMocapFields = {
     {"z_m", &MocapStream::z_m, 1e6},     {"qw", &MocapStream::qw, 2},     {"qx", &MocapStream::qx, 2},
     {"qy", &MocapStream::qy, 2},         {"qz", &MocapStream::qz, 2}};
 const std::vector<Field<ImuStream>> kImuFields = {{"t_s", &ImuStream::t_s, kLatest},
-                                                  {"gyro_x_rad_s", &ImuStream::gyro_x_rad_s, kMost_rad_s},
-                                                  {"gyro_y_rad_s", &ImuStream::gyro_y_rad_s, kMost_rad_s},
-                                                  {"gyro_z_rad_s", &ImuStream::gyro_z_rad_s, kMost_rad_s},
-                                                  {"accel_x_m_s2", &ImuStream::accel_x_m_s2, kMost_m_s2},
-                                                  {"accel_y_m_s2", &ImuStream::accel_y_m_s2, kMost_m_s2},
-                                                  {"accel_z_m_s2", &ImuStream::accel_z_m_s2, kMost_m_s2}};
+                                                  {"gyro_x_rad_s", &ImuStream::gyro_x_rad_s, kMax_rad_s},
+                                                  {"gyro_y_rad_s", &ImuStream::gyro_y_rad_s, kMax_rad_s},
+                                                  {"gyro_z_rad_s", &ImuStream::gyro_z_rad_s, kMax_rad_s},
+                                                  {"accel_x_m_s2", &ImuStream::accel_x_m_s2, kMax_m_s2},
+                                                  {"accel_y_m_s2", &ImuStream::accel_y_m_s2, kMax_m_s2},
+                                                  {"accel_z_m_s2", &ImuStream::accel_z_m_s2, kMax_m_s2}};
 const std::vector<Field<ImuStream>> kAccelFields = {kImuFields[0], kImuFields[4], kImuFields[5], kImuFields[6]};
 const std::vector<Field<PowerStream>> kPowerFields = {{"t_s", &PowerStream::t_s, kLatest},
-                                                      {"battery_V", &PowerStream::battery_V, kMost_V},
-                                                      {"left_current_A", &PowerStream::left_current_A, kMost_A},
-                                                      {"right_current_A", &PowerStream::right_current_A, kMost_A}};
+                                                      {"battery_V", &PowerStream::battery_V, kMax_V},
+                                                      {"left_current_A", &PowerStream::left_current_A, kMax_A},
+                                                      {"right_current_A", &PowerStream::right_current_A, kMax_A}};
 const std::vector<Field<PowerStream>> kBatteryFields = {kPowerFields[0], kPowerFields[1]};
 const std::vector<Field<AttitudeStream>> kAttitudeFields = {{"t_s", &AttitudeStream::t_s, kLatest},
                                                             {"qw", &AttitudeStream::qw, 2},
@@ -130,7 +129,7 @@ FlownHeader parse_flown(const io::Table& flown) {
     std::ranges::copy(flown.numbers("start_pose", 7, {-1e6, 1e6}), h.start_pose.emplace().begin());
   constexpr std::int64_t kWord = 0xffffffff;
   if (flown.has("start_memory")) {
-    h.start_memory = flown.numbers("start_memory", {-kMostRemembered, kMostRemembered});
+    h.start_memory = flown.numbers("start_memory", {-kMaxRemembered, kMaxRemembered});
     h.start_phase = static_cast<std::uint32_t>(flown.integer_or("start_phase", 0, 0, kWord));
   }
   if (flown.has("imu_latency_s")) h.imu_latency_s = flown.number("imu_latency_s", non_negative(10));

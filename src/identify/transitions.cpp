@@ -5,8 +5,8 @@
 #include <limits>
 #include <numbers>
 
-#include "flightlog/smoother.hpp"
 #include "flightlog/log_world.hpp"
+#include "flightlog/smoother.hpp"
 #include "identify/force_map.hpp"
 #include "io/csv.hpp"
 #include "io/statistics.hpp"

@@ -8,19 +8,18 @@
 namespace flappy::model {
 namespace {
 
-constexpr double kLeastOrder = 2;
+constexpr double kMinOrder = 2;
 
 double fastest_beat_Hz(const Vehicle& v) {
   if (!v.jointed) return v.driver.flapping_Hz;
   double faster = 1;
-  for (const Jointed::Input& i : v.jointed->inputs)
-    faster += std::max(i.frequency * i.low, i.frequency * i.high);
+  for (const Jointed::Input& i : v.jointed->inputs) faster += std::max(i.frequency * i.low, i.frequency * i.high);
   return faster * v.jointed->frequency_Hz;
 }
 
 /// k of the head.
 double order_of_rates(const Vehicle& v) {
-  if (!v.jointed) return kLeastOrder;
+  if (!v.jointed) return kMinOrder;
   double sum = 0, weighted = 0;
   for (const Jointed::Wing* w : {&v.jointed->left, &v.jointed->right})
     for (const Jointed::Angle& a : w->angles)
@@ -30,7 +29,7 @@ double order_of_rates(const Vehicle& v) {
         sum += rate2;
         weighted += n * n * rate2;
       }
-  return sum > 0 ? std::max(kLeastOrder, std::sqrt(weighted / sum)) : kLeastOrder;
+  return sum > 0 ? std::max(kMinOrder, std::sqrt(weighted / sum)) : kMinOrder;
 }
 
 }  // namespace

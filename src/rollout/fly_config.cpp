@@ -325,8 +325,8 @@ class Reader {
     // the longest step that does, and is a whole share of the control period and of the driver's hold
     const double period_s = 1 / c_.fleet.control_hz, hold_s = c_.vehicle.jointed ? period_s : c_.vehicle.driver.hold_s;
     double shares = std::ceil(period_s / coarse->enough_s - 1e-6);
-    constexpr double kMostShares = 1e6;
-    while (shares < kMostShares && !whole(hold_s * shares / period_s)) ++shares;
+    constexpr double kMaxShares = 1e6;
+    while (shares < kMaxShares && !whole(hold_s * shares / period_s)) ++shares;
     const double fits_s = period_s / shares;
     const std::string what = coarse->what + " (vehicle " + io::toml_string(c_.vehicle.name) + ")";
     if (coarse->refused) root_.fail("flight.step_s", what, "at most " + io::format("%.6g", fits_s));

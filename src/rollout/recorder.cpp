@@ -178,11 +178,11 @@ struct Recorder<T>::Storage {
     }
     look();
     add_truth(time_s(sim::storage_of(f.batch()).steps));
-    if (config.actor) tell_policy(o.task);
+    if (config.actor) declare_policy(o.task);
   }
 
   /// For flappy-gap check --flown: how the policy and its controller begin, and all that it gets and gives.
-  void tell_policy(const flight::Task& task) {
+  void declare_policy(const flight::Task& task) {
     for (const flight::Signal& s : task.observation()) log.header.policy.push_back("observation_" + s.name);
     for (const flight::Signal& s : task.action()) log.header.policy.push_back("action_" + s.name);
     log.policy.emplace().numbers.resize(log.header.policy.size());

@@ -36,7 +36,8 @@ FLAPPY_INLINE void look_around(State<L>& x, const Parameters<L>& p, const StepPl
     const L zero(0);
     x.position_m.z = where(fell_back, L(x.position_m.z - height), x.position_m.z);
     x.body_rate_rad_s = where(fell_back, Vec3<L>{zero, zero, zero}, x.body_rate_rad_s);
-    x.lift_N = where(fell_back, zero, x.lift_N);  // else what carried it off would do so again at once
+    // else what carried it off would do so again at once
+    x.lift_N = where(fell_back, L(L(plan.gravity_m_s2) / p.inverse_mass_1_kg), x.lift_N);
     x.support = where(fell_back, L(1), where(lifting & (height > L(kTakeOffClearance_m)), zero, x.support));
   }
   mark(flying & !lifting & (height < L(0)), kTouchedGround);

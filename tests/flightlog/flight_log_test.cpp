@@ -10,9 +10,9 @@
 #include <random>
 #include <stdexcept>
 
+#include "flightlog/log_world.hpp"
 #include "flightlog/readings.hpp"
 #include "flightlog/some_log.hpp"
-#include "flightlog/log_world.hpp"
 #include "io/files.hpp"
 #include "io/read_files.hpp"
 

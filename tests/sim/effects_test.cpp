@@ -83,7 +83,7 @@ TEST(Effects, AreTheCatalogue) {
     EXPECT_EQ(model::effect_index(e.info.id), static_cast<int>(ids.size()) - 1);
     if (*e.info.group) groups.insert(e.info.group);
   }
-  EXPECT_EQ(ids.size(), 31u);
+  EXPECT_EQ(ids.size(), 30u);
   EXPECT_EQ(groups, (std::set<std::string_view>{"wing_inertia", "unsteady_lift", "low_voltage", "asymmetry",
                                                 "thrust_loss", "world_force", "drive_lag", "wing_compliance"}));
 }

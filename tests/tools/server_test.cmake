@@ -12,7 +12,7 @@ execute_process(COMMAND bash -c "TIMEFORMAT='%U %S'; time \"$@\"" bash ${TIMEOUT
 expect_equal("exit code" "${code}" 0)
 expect_match("stderr, but for seconds of processor time, nearly none" "${err}" "^0\\.[01][0-9]* 0\\.[01][0-9]*\n$")
 expect_match("stdout" "${out}" "^dashboard: http://127.0.0.1:[0-9]+/\n${WORK}/jobs: 0 jobs to go on with\nstopped; go on: the same command\n$")
-execute_process(COMMAND ${TIMEOUT} --foreground --preserve-status -s TERM 0.2 ${PROGRAM} ${local} OUTPUT_VARIABLE out RESULT_VARIABLE code)
+execute_process(COMMAND ${TIMEOUT} --foreground --preserve-status -s TERM 1 ${PROGRAM} ${local} OUTPUT_VARIABLE out RESULT_VARIABLE code)
 expect_equal("exit code" "${code}" 0)
 expect_equal("stdout without --http" "${out}" "${WORK}/jobs: 0 jobs to go on with\nstopped; go on: the same command\n")
 foreach(name IN ITEMS queue.sqlite log.txt)

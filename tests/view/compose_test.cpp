@@ -124,7 +124,8 @@ TEST(Composed, RefusesWhatDoesNotFit) {
               composed({diagnosis}, options, packing);
             }),
             "--goal and --vehicle describe flights, and no flight is given; accepted: a flight log, too");
-  io::write_atomically(folder.path() / "half.json", R"({"schema": 2, "verdict": {}, "hypotheses": [], "locations": []})");
+  io::write_atomically(folder.path() / "half.json",
+                       R"({"schema": 2, "verdict": {}, "hypotheses": [], "locations": []})");
   EXPECT_EQ(
       refusal([&] { composed({folder.path() / "half.json"}, {}, packing); }),
       (folder.path() / "half.json").string() + ": key 'flights' not found; accepted: what flappy-gap diagnose wrote");

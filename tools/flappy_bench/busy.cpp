@@ -11,9 +11,9 @@
 #include <memory>
 
 #include "bench_closed_loop.hpp"
+#include "bench_learner.hpp"
 #include "flappy/batch.hpp"
 #include "io/parallel.hpp"
-#include "bench_learner.hpp"
 
 namespace flappy::bench {
 namespace {

@@ -6,8 +6,10 @@
 #include <optional>
 
 #include "accuracy.hpp"
-#include "busy.hpp"
 #include "bench_closed_loop.hpp"
+#include "bench_learner.hpp"
+#include "bench_telemetry.hpp"
+#include "busy.hpp"
 #include "engines.hpp"
 #include "figures.hpp"
 #include "flappy/batch.hpp"
@@ -17,12 +19,10 @@
 #include "io/parallel.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
-#include "bench_learner.hpp"
 #include "many_flights.hpp"
 #include "model/effects/registry.hpp"
 #include "roof.hpp"
 #include "speed.hpp"
-#include "bench_telemetry.hpp"
 #ifdef FLAPPY_HAVE_PEERS
 #include <mujoco/mujoco.h>
 

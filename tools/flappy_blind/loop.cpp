@@ -6,10 +6,6 @@
 #include <map>
 #include <optional>
 
-#include "lab/benchmark/families.hpp"
-#include "lab/benchmark/records.hpp"
-#include "lab/benchmark/work.hpp"
-#include "lab/blind/a/family_a.hpp"
 #include "escape_rules.hpp"
 #include "io/append_file.hpp"
 #include "io/files.hpp"
@@ -18,6 +14,10 @@
 #include "io/progress.hpp"
 #include "io/sha256.hpp"
 #include "io/toml_writer.hpp"
+#include "lab/benchmark/families.hpp"
+#include "lab/benchmark/records.hpp"
+#include "lab/benchmark/work.hpp"
+#include "lab/blind/a/family_a.hpp"
 #include "learn/trainer.hpp"
 #include "rollout/fly_config.hpp"
 

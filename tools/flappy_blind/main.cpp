@@ -4,6 +4,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "escapes.hpp"
+#include "io/installation.hpp"
+#include "io/sha256.hpp"
 #include "lab/benchmark/calibrate.hpp"
 #include "lab/benchmark/detectability.hpp"
 #include "lab/benchmark/families.hpp"
@@ -12,9 +15,6 @@
 #include "lab/benchmark/score_bench.hpp"
 #include "lab/blind/a/family_a.hpp"
 #include "lab/blind/firmware/faulty_firmware.hpp"
-#include "escapes.hpp"
-#include "io/installation.hpp"
-#include "io/sha256.hpp"
 #include "loop.hpp"
 #include "policy/policy.hpp"
 
@@ -163,8 +163,8 @@ void add_question_options(io::Command& c, benchmark::BenchQuestions& q) {
 
 int main(int argc, char** argv) {
   using namespace flappy;
-  io::Program program("flappy-blind", "Robots of simulators A, B and C, written apart: flies, diagnoses and scores them.",
-                      {});
+  io::Program program("flappy-blind",
+                      "Robots of simulators A, B and C, written apart: flies, diagnoses and scores them.", {});
   io::Command list = program.app().command("effects", "lists the effects that a robot may have");
   blind::FamilyOptions of;
   constexpr const char* kFamily = "a, b or c; none: a with the options of this command";

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "lab/blind/a/sampled_robot.hpp"
 #include "io/installation.hpp"
 #include "io/program.hpp"
+#include "lab/blind/a/sampled_robot.hpp"
 
 namespace flappy::blind {
 

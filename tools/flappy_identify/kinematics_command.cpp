@@ -1,12 +1,11 @@
 // flappy-identify kinematics: compares measured with simulated wing angles over one beat.
-#include "identify/kinematics.hpp"
-
 #include <cstdio>
 #include <limits>
 #include <memory>
 #include <numbers>
 
 #include "command.hpp"
+#include "identify/kinematics.hpp"
 #include "identify/measured_map.hpp"
 #include "io/files.hpp"
 #include "shared_options.hpp"

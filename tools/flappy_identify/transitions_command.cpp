@@ -1,6 +1,4 @@
 // flappy-identify transitions: open-loop test of a vehicle on recorded flights.
-#include "identify/transitions.hpp"
-
 #include <chrono>
 #include <cstdio>
 #include <memory>
@@ -8,6 +6,7 @@
 
 #include "command.hpp"
 #include "flappy/vehicle_file.hpp"
+#include "identify/transitions.hpp"
 #include "io/sha256.hpp"
 
 namespace flappy::identify {

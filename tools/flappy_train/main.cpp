@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "io/log.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
+#include "io/read_files.hpp"
 #include "io/schema.hpp"
 #include "io/sha256.hpp"
 #include "learn/checkpoint.hpp"
@@ -210,6 +212,8 @@ int main(int argc, char** argv) {
     if (!resume.empty()) {
       const fs::path config_file = train::config_of(resume);
       if (const auto summary = learn::finished_run_in(resume); from.empty() && !summary.is_null()) {
+        for (const auto& entry : std::filesystem::recursive_directory_iterator(resume))
+          io::note_read(entry.path());  // no output replaces what is left as it is
         std::printf("%s: is finished: seed %s, %s updates; nothing is left to do\n%s\n", resume.c_str(),
                     summary.value("seed", train::Json()).dump().c_str(),
                     summary.value("updates", train::Json()).dump().c_str(), io::shown_by(resume).c_str());

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "flightlog/readings.hpp"
 #include "flightlog/log_world.hpp"
+#include "flightlog/readings.hpp"
 #include "io/statistics.hpp"
 #include "sim/replay.hpp"
 

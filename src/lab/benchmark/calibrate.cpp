@@ -6,12 +6,12 @@
 #include <cstdio>
 #include <functional>
 
-#include "lab/benchmark/records.hpp"
 #include "gap/answer/verdict.hpp"
 #include "io/files.hpp"
 #include "io/program.hpp"
 #include "io/sha256.hpp"
 #include "io/text.hpp"
+#include "lab/benchmark/records.hpp"
 
 namespace flappy::benchmark {
 namespace {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <random>
 
-#include "lab/benchmark/families.hpp"
 #include "io/config.hpp"
+#include "lab/benchmark/families.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::benchmark {

@@ -9,13 +9,13 @@
 #include <mutex>
 #include <numbers>
 
-#include "lab/benchmark/families.hpp"
 #include "io/files.hpp"
 #include "io/parallel.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
 #include "io/statistics.hpp"
 #include "io/text.hpp"
+#include "lab/benchmark/families.hpp"
 
 namespace flappy::benchmark {
 namespace {

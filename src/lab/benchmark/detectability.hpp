@@ -22,8 +22,8 @@
 #include <string>
 #include <vector>
 
-#include "lab/blind/family.hpp"
 #include "io/installation.hpp"
+#include "lab/blind/family.hpp"
 
 namespace flappy::benchmark {
 

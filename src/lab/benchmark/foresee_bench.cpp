@@ -2,11 +2,11 @@
 
 #include <cstdio>
 
+#include "io/files.hpp"
 #include "lab/benchmark/families.hpp"
 #include "lab/benchmark/predict/foresee.hpp"
 #include "lab/benchmark/records.hpp"
 #include "lab/benchmark/work.hpp"
-#include "io/files.hpp"
 
 namespace flappy::benchmark {
 namespace {

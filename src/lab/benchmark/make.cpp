@@ -3,14 +3,14 @@
 #include <cstdio>
 #include <optional>
 
-#include "lab/benchmark/records.hpp"
-#include "lab/benchmark/work.hpp"
-#include "lab/blind/a/sampled_robot.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "io/append_file.hpp"
 #include "io/config.hpp"
 #include "io/program.hpp"
 #include "io/sha256.hpp"
+#include "lab/benchmark/records.hpp"
+#include "lab/benchmark/work.hpp"
+#include "lab/blind/a/sampled_robot.hpp"
 
 namespace flappy::benchmark {
 namespace {

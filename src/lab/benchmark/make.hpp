@@ -3,10 +3,10 @@
 #include <filesystem>
 #include <string>
 
-#include "lab/benchmark/families.hpp"
-#include "lab/benchmark/case_plan.hpp"
 #include "io/installation.hpp"
 #include "io/ranks.hpp"
+#include "lab/benchmark/case_plan.hpp"
+#include "lab/benchmark/families.hpp"
 
 namespace flappy::benchmark {
 

@@ -1,8 +1,8 @@
 // A manoeuvre that a diagnosis proposes, as a flight in the room of a blind robot.
 #pragma once
 
-#include "lab/blind/family.hpp"
 #include "gap/next/next_experiment.hpp"
+#include "lab/blind/family.hpp"
 
 namespace flappy::benchmark {
 

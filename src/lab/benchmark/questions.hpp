@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "io/installation.hpp"
 #include "lab/benchmark/predict/predict.hpp"
 #include "lab/benchmark/records.hpp"
-#include "io/installation.hpp"
 
 namespace flappy::benchmark {
 

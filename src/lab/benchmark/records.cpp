@@ -3,10 +3,10 @@
 #include <cstdio>
 #include <set>
 
-#include "lab/benchmark/families.hpp"
 #include "gap/result/diagnosis_json.hpp"
 #include "io/schema.hpp"
 #include "io/sha256.hpp"
+#include "lab/benchmark/families.hpp"
 
 namespace flappy::benchmark {
 namespace {
@@ -77,14 +77,8 @@ Manifest read_manifest(const std::filesystem::path& folder) {
       throw io::InputError(file.string() + ": schema " +
                            io::other_schema(schema.get<std::int64_t>(), 2, json.value("commit", "")) +
                            "; accepted: schema 2");
-    Manifest m{json.at("family"),
-               json.at("set"),
-               json.at("vehicle"),
-               json.at("vehicle_sha256"),
-               json.at("labels_sha256"),
-               json.at("commit"),
-               json.value("engine", ""),
-               {}};
+    Manifest m{json.at("family"),        json.at("set"),    json.at("vehicle"),       json.at("vehicle_sha256"),
+               json.at("labels_sha256"), json.at("commit"), json.value("engine", ""), {}};
     for (const Json& c : json.at("cases"))
       m.cases.push_back({c.at("number"), c.at("withheld"), c.at("files").get<std::map<std::string, std::string>>()});
     return m;

@@ -6,9 +6,9 @@
 #include <set>
 #include <tuple>
 
-#include "lab/benchmark/change_over_noise.hpp"
 #include "io/statistics.hpp"
 #include "io/text.hpp"
+#include "lab/benchmark/change_over_noise.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::benchmark {

@@ -5,17 +5,17 @@
 #include <memory>
 #include <set>
 
+#include "flappy/vehicle_file.hpp"
+#include "io/append_file.hpp"
+#include "io/files.hpp"
+#include "io/program.hpp"
+#include "io/sha256.hpp"
 #include "lab/benchmark/change_over_noise.hpp"
 #include "lab/benchmark/families.hpp"
 #include "lab/benchmark/foresee_bench.hpp"
 #include "lab/benchmark/proposal.hpp"
 #include "lab/benchmark/records.hpp"
 #include "lab/benchmark/work.hpp"
-#include "flappy/vehicle_file.hpp"
-#include "io/append_file.hpp"
-#include "io/files.hpp"
-#include "io/program.hpp"
-#include "io/sha256.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::benchmark {

@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "lab/benchmark/questions.hpp"
 #include "io/ranks.hpp"
+#include "lab/benchmark/questions.hpp"
 
 namespace flappy::benchmark {
 

@@ -6,9 +6,9 @@
 
 #include <functional>
 
-#include "lab/blind/a/flights.hpp"
 #include "flightlog/check/synthetic_log.hpp"
 #include "full.hpp"
+#include "lab/blind/a/flights.hpp"
 #include "vehicles.hpp"
 
 namespace flappy::flightlog {

@@ -6,17 +6,17 @@
 #include <filesystem>
 #include <set>
 
+#include "full.hpp"
+#include "gap/next/next_experiment.hpp"
+#include "gap/question/verdict_rule.hpp"
+#include "io/files.hpp"
+#include "io/sha256.hpp"
 #include "lab/benchmark/calibrate.hpp"
 #include "lab/benchmark/families.hpp"
 #include "lab/benchmark/foresee_bench.hpp"
 #include "lab/benchmark/make.hpp"
 #include "lab/benchmark/records.hpp"
 #include "lab/benchmark/score_bench.hpp"
-#include "full.hpp"
-#include "gap/next/next_experiment.hpp"
-#include "gap/question/verdict_rule.hpp"
-#include "io/files.hpp"
-#include "io/sha256.hpp"
 #include "model/effects/registry.hpp"
 #include "refusal.hpp"
 

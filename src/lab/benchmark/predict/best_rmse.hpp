@@ -1,7 +1,7 @@
 #pragma once
 
-#include "lab/benchmark/predict/predict.hpp"
 #include "gap/answer/inference.hpp"
+#include "lab/benchmark/predict/predict.hpp"
 
 namespace flappy::benchmark {
 

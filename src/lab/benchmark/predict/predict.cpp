@@ -1,8 +1,8 @@
 #include "lab/benchmark/predict/predict.hpp"
 
-#include "lab/benchmark/predict/best_rmse.hpp"
 #include "flappy/vehicle_file.hpp"
 #include "gap/diagnose/diagnose.hpp"
+#include "lab/benchmark/predict/best_rmse.hpp"
 
 namespace flappy::benchmark {
 

@@ -4,8 +4,8 @@
 
 #include <functional>
 
-#include "lab/blind/a/flights.hpp"
 #include "flight/episode.hpp"
+#include "lab/blind/a/flights.hpp"
 
 namespace flappy::blind {
 

@@ -1,7 +1,7 @@
 #include "lab/blind/a/family_a.hpp"
 
-#include "lab/blind/a/sampled_robot.hpp"
 #include "lab/blind/a/a_session.hpp"
+#include "lab/blind/a/sampled_robot.hpp"
 
 namespace flappy::blind {
 namespace {

@@ -3,8 +3,8 @@
 // the torso origin with noise, latency, jitter of the arrival, and short lost bursts.
 #pragma once
 
-#include "lab/blind/a/a_robot.hpp"
 #include "flightlog/flight_log.hpp"
+#include "lab/blind/a/a_robot.hpp"
 
 namespace flappy::blind {
 

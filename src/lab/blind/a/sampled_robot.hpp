@@ -2,8 +2,8 @@
 
 #include <filesystem>
 
-#include "lab/blind/a/flights.hpp"
 #include "io/files.hpp"
+#include "lab/blind/a/flights.hpp"
 #include "sim/randomise.hpp"
 
 namespace flappy::blind {

@@ -1,8 +1,8 @@
 // The pilot's view: the true state with white noise, gyro bias and 1 mm of position drift, as a filter would leave.
 #pragma once
 
-#include "lab/blind/a/a_robot.hpp"
 #include "flight/pid.hpp"
+#include "lab/blind/a/a_robot.hpp"
 
 namespace flappy::blind {
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "lab/blind/b/b_random.hpp"
 #include "io/files.hpp"
+#include "lab/blind/b/b_random.hpp"
 
 namespace flappy::blind::b {
 namespace {

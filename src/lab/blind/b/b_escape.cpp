@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "lab/blind/b/b_flight.hpp"
 #include "io/files.hpp"
+#include "lab/blind/b/b_flight.hpp"
 
 namespace flappy::blind::b {
 namespace {

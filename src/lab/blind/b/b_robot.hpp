@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "lab/blind/b/plant.hpp"
 #include "lab/blind/b/b_random.hpp"
+#include "lab/blind/b/plant.hpp"
 
 namespace flappy::blind::b {
 

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "lab/blind/b/b_random.hpp"
 #include "io/config.hpp"
 #include "io/sha256.hpp"
+#include "lab/blind/b/b_random.hpp"
 
 namespace flappy::blind::b {
 namespace {

@@ -3,11 +3,11 @@
 #include <cmath>
 #include <string>
 
+#include "io/files.hpp"
 #include "lab/blind/b/b_contrast.hpp"
 #include "lab/blind/b/b_effects.hpp"
 #include "lab/blind/b/b_escape.hpp"
 #include "lab/blind/b/b_flight.hpp"
-#include "io/files.hpp"
 
 namespace flappy::blind::b {
 namespace {

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "lab/blind/c/programme.hpp"
-#include "lab/blind/c/c_sensors.hpp"
 #include "io/files.hpp"
+#include "lab/blind/c/c_sensors.hpp"
+#include "lab/blind/c/programme.hpp"
 
 namespace flappy::blind::c {
 

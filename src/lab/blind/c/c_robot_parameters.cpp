@@ -1,7 +1,7 @@
 #include "lab/blind/c/c_robot_parameters.hpp"
 
-#include "lab/blind/c/c_random.hpp"
 #include "io/config.hpp"
+#include "lab/blind/c/c_random.hpp"
 
 namespace flappy::blind::c {
 namespace {

@@ -4,11 +4,11 @@
 #include <sstream>
 #include <system_error>
 
-#include "lab/blind/firmware/embedded_firmware.hpp"
 #include "io/files.hpp"
 #include "io/run_program.hpp"
 #include "io/shared_library.hpp"
 #include "io/temporary_folder.hpp"
+#include "lab/blind/firmware/embedded_firmware.hpp"
 
 namespace flappy::blind {
 namespace {

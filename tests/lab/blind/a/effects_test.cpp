@@ -1,13 +1,12 @@
 // Everything that may be wrong with the blind robot: nothing at magnitude 0, something at magnitude 1, and of the magnitude it should be.
-#include "lab/blind/a/a_effects.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <set>
 
-#include "lab/blind/a/robot_sensors.hpp"
 #include "full.hpp"
+#include "lab/blind/a/a_effects.hpp"
+#include "lab/blind/a/robot_sensors.hpp"
 #include "refusal.hpp"
 #include "vehicles.hpp"
 

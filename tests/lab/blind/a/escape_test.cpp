@@ -1,12 +1,11 @@
 // The blind robot under a policy: what the policy is shown and when, when its work is done, and what is a success.
-#include "lab/blind/a/a_escape.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "flight/constants.hpp"
 #include "full.hpp"
+#include "lab/blind/a/a_escape.hpp"
 #include "rollout/fly_config.hpp"
 #include "vehicles.hpp"
 

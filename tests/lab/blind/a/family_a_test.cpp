@@ -3,10 +3,10 @@
 
 #include <gtest/gtest.h>
 
-#include "lab/blind/a/sampled_robot.hpp"
-#include "lab/blind/a/a_session.hpp"
 #include "full.hpp"
 #include "io/sha256.hpp"
+#include "lab/blind/a/a_session.hpp"
+#include "lab/blind/a/sampled_robot.hpp"
 
 namespace flappy::blind {
 namespace {

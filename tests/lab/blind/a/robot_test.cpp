@@ -1,11 +1,10 @@
 // The blind robot without anything wrong: against other engines (tests/data/trajectories) and against what mechanics says.
-#include "lab/blind/a/a_robot.hpp"
-
 #include <gtest/gtest.h>
 
 #include <functional>
 
 #include "io/csv.hpp"
+#include "lab/blind/a/a_robot.hpp"
 #include "vehicles.hpp"
 
 namespace flappy::blind::robot_test {

@@ -10,13 +10,13 @@
 #include <string>
 #include <vector>
 
-#include "lab/blind/b/b_contrast.hpp"
-#include "lab/blind/b/b_escape.hpp"
-#include "lab/blind/b/family_b_tests.hpp"
-#include "lab/blind/b/b_flight.hpp"
-#include "lab/blind/b/b_session.hpp"
 #include "flightlog/flight_log.hpp"
 #include "io/parallel.hpp"
+#include "lab/blind/b/b_contrast.hpp"
+#include "lab/blind/b/b_escape.hpp"
+#include "lab/blind/b/b_flight.hpp"
+#include "lab/blind/b/b_session.hpp"
+#include "lab/blind/b/family_b_tests.hpp"
 #include "refusal.hpp"
 
 namespace flappy::blind::b {

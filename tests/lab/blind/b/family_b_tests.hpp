@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "lab/blind/b/b_effects.hpp"
-#include "lab/blind/b/plant.hpp"
 #include "lab/blind/b/b_robot.hpp"
+#include "lab/blind/b/plant.hpp"
 #include "lab/blind/family.hpp"
 
 namespace flappy::blind::b {

@@ -6,12 +6,12 @@
 
 #include <numeric>
 
+#include "io/parallel.hpp"
 #include "lab/blind/c/c_contrast.hpp"
 #include "lab/blind/c/c_escape.hpp"
 #include "lab/blind/c/c_flight.hpp"
-#include "lab/blind/c/mjcf.hpp"
 #include "lab/blind/c/c_session.hpp"
-#include "io/parallel.hpp"
+#include "lab/blind/c/mjcf.hpp"
 
 namespace flappy::blind::c {
 namespace {
