@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "io/installation.hpp"
-#include "io/log.hpp"
 #include "io/schema.hpp"
 #include "io/toml.hpp"
 #include "io/toml_writer.hpp"
@@ -524,11 +523,6 @@ std::string Table::path() const { return section_->path; }
 void Table::fail(std::string_view key, std::string_view what, std::string_view accepted) const {
   if (key.empty()) refuse(place(*section_), section_->path, what, accepted);
   refuse(find(*section_, key), what, accepted);
-}
-
-void Table::warn(std::string_view key, std::string_view what) const {
-  const Entry entry = find(*section_, key);
-  log(LogLevel::warning, line_of(place(entry), entry.path, what, ""));
 }
 
 void Table::finish() const { refuse_unasked(*section_); }
