@@ -81,7 +81,7 @@ class _Named:
     """What one environment and many have in common: names, ranges, and how they are pickled and copied."""
 
     _core: _core.Environments
-    _options: dict[str, Any]  # what made it
+    _options: dict[str, Any]  # arguments of the constructor
     spec: Any
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -34,7 +34,7 @@ class PyFleet {
     const Turn turn(other.busy_, "the fleet");
     other.with([&]<class T>(rollout::Rollout<T>& f) { flights_ = std::make_unique<rollout::Rollout<T>>(f); });
   }
-  /// What makes a fleet like this one at its start.
+  /// The configuration from which an equal fleet can be made.
   nb::tuple made_of() const { return nb::make_tuple(path_, size(), overrides_); }
   std::size_t size() const {
     return with([](auto& f) { return f.fleet().size(); });

@@ -44,7 +44,7 @@ class PyBatch {
     const Turn turn(other.busy_, "the batch");
     other.with([&]<class T>(sim::Batch<T>& batch) { batch_ = std::make_unique<sim::Batch<T>>(batch); });
   }
-  /// What makes a batch like this one when it was new.
+  /// The vehicle and options from which an equal batch can be made.
   nb::tuple made_of() const {
     const bool single = std::holds_alternative<std::unique_ptr<sim::Batch<float>>>(batch_);
     return nb::make_tuple(count_, vehicle_, options_.step_s, options_.threads, options_.world, options_.instruction_set,

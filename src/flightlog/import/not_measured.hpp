@@ -29,7 +29,7 @@ class NotMeasured {
 
  private:
   std::string type_;                 ///< "sensor_combined" of px4_msgs/msg/SensorCombined, too
-  std::vector<std::string> fields_;  ///< of this message
+  std::vector<std::string> fields_;  ///< names of this message's fields
 };
 
 }  // namespace flappy::flightlog
