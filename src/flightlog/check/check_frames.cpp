@@ -316,7 +316,10 @@ void check_frozen(Context& c) {
   const FlightLog& log = c.log;
   const MocapStream& m = log.mocap;
   const ImuStream& u = log.imu;
-  look("mocap", kMocap, m.t_s, {&m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz}, log.header.mocap.position_noise_m);
+  // an estimate may be logged more often than it is made, and rounded
+  const double pose_noise =
+      log.header.mocap.source == PoseSource::motion_capture ? log.header.mocap.position_noise_m : 0;
+  look("mocap", kMocap, m.t_s, {&m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz}, pose_noise);
   look("imu", kImu, u.t_s, {&u.accel_x_m_s2, &u.accel_y_m_s2, &u.accel_z_m_s2}, log.header.imu.accel_noise_m_s2);
   if (!log.attitude) return;
   const AttitudeStream& a = *log.attitude;

@@ -37,8 +37,9 @@ Levels levels_of(const Column& values) {
 
 /// Largest plausible ratios of a flight's level, a part's level, the spread. A robot of constant weight needs about the
 /// same inputs in all flights; battery, wear, wind and manoeuvres change them somewhat, another unit changes them more.
-/// Inputs about 0 have no level, and their spread varies more between flights.
-constexpr double kOtherLevel = 1.5, kOtherPart = 2, kOtherSpread = 5;
+/// Inputs about 0 have no level, and their spread depends on the manoeuvre: only another unit (57 from radians to
+/// degrees, 1000 from metres to millimetres) is plausible beyond kOtherUnit.
+constexpr double kOtherLevel = 1.5, kOtherPart = 2, kOtherSpread = 5, kOtherUnit = 30;
 
 bool has_level(const Level& usual) { return std::abs(usual.middle) > usual.spread; }
 
@@ -64,8 +65,8 @@ std::string oddity(const Levels& flight, const Level& usual) {
                   ratio(value, expected));
   };
   if (!has_level(usual))
-    return beyond(flight.all.spread, usual.spread, kOtherSpread) ? odd("varies by ", flight.all.spread, usual.spread)
-                                                                 : "";
+    return beyond(flight.all.spread, usual.spread, kOtherUnit) ? odd("varies by ", flight.all.spread, usual.spread)
+                                                               : "";
   if (beyond(flight.all.middle, usual.middle, kOtherLevel))
     return odd("in the middle ", flight.all.middle, usual.middle);
   for (const Level& part : flight.parts)

@@ -32,7 +32,9 @@ std::vector<DeclaredStream> streams_of(const FlightLog& log) {
   const FlightHeader& h = log.header;
   std::vector<DeclaredStream> list = {{kCommand, &log.command.t_s, command_rate_hz(log.command.t_s), {}},
                                       {kMocap, &m.t_s, h.mocap.rate_hz, {}}};
-  if (h.mocap.position_noise_m > 0) list[1].measured = {&m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz};
+  // an estimate may be logged more often than it is made, and rounded
+  if (h.mocap.position_noise_m > 0 && h.mocap.source == PoseSource::motion_capture)
+    list[1].measured = {&m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz};
   if (h.imu.rate_hz > 0) list.push_back({kImu, &s.t_s, h.imu.rate_hz, {}});
   if (h.imu.gyro_noise_rad_s > 0) list.back().measured = {&s.gyro_x_rad_s, &s.gyro_y_rad_s, &s.gyro_z_rad_s};
   if (log.power) {

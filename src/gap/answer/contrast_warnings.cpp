@@ -1,6 +1,7 @@
 #include "gap/answer/contrast_warnings.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "io/files.hpp"
 #include "io/text.hpp"
@@ -17,6 +18,16 @@ double duration_s(const FlightList& flights) {
   double sum = 0;
   for (const auto& f : flights) sum += static_cast<double>(f->beats()) / f->beats_Hz();
   return sum;
+}
+
+/// A rate that import measured is never the same to the last digit.
+bool same_sensors(const flightlog::FlightHeader& a, const flightlog::FlightHeader& b) {
+  constexpr double kSameRate = 0.01;
+  const auto like = [](auto own, const auto& other) {
+    if (std::abs(own.rate_hz - other.rate_hz) <= kSameRate * other.rate_hz) own.rate_hz = other.rate_hz;
+    return own == other;
+  };
+  return like(a.imu, b.imu) && like(a.mocap, b.mocap);
 }
 
 struct Range {
@@ -49,7 +60,7 @@ std::vector<std::string> contrast_warnings(const std::vector<flightlog::FlightHe
     lines.push_back(
         "flights and reference name different vehicle files: if the robots are not the same, what differs "
         "between them is taken for a change");
-  if (differs([](const auto& a, const auto& b) { return a.imu == b.imu && a.mocap == b.mocap; }))
+  if (differs(same_sensors))
     lines.push_back("flights and reference declare different sensors: errors of the sensors do not cancel");
   for (const auto& [name, list] : {std::pair("reference lasts", references), std::pair("flights last", tests)})
     if (const double s = duration_s(list); s < kShortest_s)

@@ -8,6 +8,7 @@
 #include "gap/answer/corrected_vehicle.hpp"
 #include "gap/answer/result.hpp"
 #include "gap/next/closed_loop_prediction.hpp"
+#include "gap/replay/beat_averaged_prediction.hpp"
 #include "gap/replay/believed_vehicle.hpp"
 #include "gap/replay/prediction.hpp"
 #include "io/config.hpp"
@@ -111,6 +112,8 @@ DiagnosisRequest read_request(const DiagnosisSettings& settings) {
     throw io::InputError("--discrepancy " + s.discrepancy + ": is of vehicles " +
                          (beat_averaged ? "with wings" : "that are beat-averaged") +
                          "; accepted: one that was learnt from vehicles like " + vehicle.name);
+  if (contrast && beat_averaged)
+    options.sessions = read_session_prior(io::config_path("gap/beat_averaged/session_scatter.toml"));
   if (contrast) options.discrepancy.session = read_session_variation(file(s.sessions, "session_variation.toml"));
   return {s,
           std::move(sets),
@@ -129,8 +132,31 @@ struct CheckedLogs {
   std::vector<std::string> folders;
   std::vector<flightlog::FlightLog> logs;
   std::vector<flightlog::FlightHeader> headers;
-  std::vector<flightlog::DataFault> faults;
+  std::vector<flightlog::DataFault> faults;  ///< of flights that could not be left out, as no other remains
+  std::vector<std::string> left_out;         ///< why each doubtful flight is left out, one line each
 };
+
+/// Leaves out flights with faults, as long as others remain.
+void leave_out_faulty(CheckedLogs& set, std::vector<std::vector<flightlog::DataFault>> faults) {
+  const auto sound = static_cast<std::size_t>(std::ranges::count_if(faults, [](const auto& f) { return f.empty(); }));
+  if (sound == 0) {
+    for (auto& f : faults) std::ranges::move(f, std::back_inserter(set.faults));
+    return;
+  }
+  CheckedLogs rest;
+  rest.left_out = std::move(set.left_out);
+  for (std::size_t i = 0; i < faults.size(); ++i) {
+    if (faults[i].empty()) {
+      rest.folders.push_back(std::move(set.folders[i]));
+      rest.headers.push_back(std::move(set.headers[i]));
+      rest.logs.push_back(std::move(set.logs[i]));
+    } else {
+      const flightlog::DataFault& first = faults[i].front();
+      rest.left_out.push_back(first.file + ":" + std::to_string(first.line) + ": " + first.what);
+    }
+  }
+  set = std::move(rest);
+}
 
 /// Reads and checks the references, then each set of flights; all are of one robot, so they are checked together.
 std::vector<CheckedLogs> read_sets(const DiagnosisRequest& request) {
@@ -146,22 +172,41 @@ std::vector<CheckedLogs> read_sets(const DiagnosisRequest& request) {
   if (!request.settings.reference.empty()) check_same_streams(logs, folders);
   const std::vector<flightlog::CheckReport> reports = flightlog::check_flights(logs);
   std::size_t next = 0;
-  for (CheckedLogs& set : sets)
+  for (CheckedLogs& set : sets) {
+    std::vector<std::vector<flightlog::DataFault>> faults;
     for (std::size_t i = 0; i < set.folders.size(); ++i, ++next) {
-      std::ranges::move(flightlog::data_faults(logs[next], reports[next], folders[next]),
-                        std::back_inserter(set.faults));
+      faults.push_back(flightlog::data_faults(logs[next], reports[next], folders[next]));
       set.headers.push_back(logs[next].header);
       set.logs.push_back(std::move(logs[next]));
     }
+    leave_out_faulty(set, std::move(faults));
+  }
   return sets;
 }
 
-/// Takes the logs of the set.
+/// Takes the logs of the set. Leaves out flights that are too short, as long as others remain.
 FlightList predictions_of(const DiagnosisRequest& request, CheckedLogs& set) {
   FlightList list;
-  for (std::size_t i = 0; i < set.logs.size(); ++i)
-    list.push_back(prediction_of(request.vehicle, set.folders[i], std::move(set.logs[i]), request.channels));
+  std::vector<std::string> folders;
+  std::vector<flightlog::FlightHeader> headers;
+  std::vector<TooLittleSeen> refused;
+  std::size_t instants = 0;
+  for (std::size_t i = 0; i < set.logs.size(); ++i) try {
+      list.push_back(prediction_of(request.vehicle, set.folders[i], std::move(set.logs[i]), request.channels));
+      instants += list.back()->beats();
+      folders.push_back(std::move(set.folders[i]));
+      headers.push_back(std::move(set.headers[i]));
+    } catch (const TooLittleSeen& e) {
+      refused.push_back(e);
+    }
   set.logs.clear();
+  if (list.empty() && !refused.empty()) throw refused.front();
+  if (!list.empty() && list.front()->is_averaged() && instants < kMinInstants)
+    throw io::InputError(folders.front() + ": all flights together have " + std::to_string(instants) +
+                         " instants; accepted: " + std::to_string(kMinInstants) + " or more");
+  for (const TooLittleSeen& e : refused) set.left_out.emplace_back(e.what());
+  set.folders = std::move(folders);
+  set.headers = std::move(headers);
   return list;
 }
 
@@ -180,6 +225,8 @@ Diagnosed diagnose_set(const DiagnosisRequest& request, CheckedLogs& tests, Refe
   if (!faults.empty()) {
     d.result = result_of(tests.folders, std::move(faults));
     d.result.reference = request.settings.reference;
+    for (CheckedLogs* const set : {&reference.read, &tests})
+      for (const std::string& why : set->left_out) d.result.warnings.push_back("left out: " + why);
     return d;
   }
   if (reference.flights.empty()) reference.flights = predictions_of(request, reference.read);
@@ -194,12 +241,14 @@ Diagnosed diagnose_set(const DiagnosisRequest& request, CheckedLogs& tests, Refe
   d.uncertain = request.uncertain;
   d.uncertain->set_minors(d.inference.minors);
   d.result = result_of(tests.folders, d.flights, *d.uncertain, d.inference);
-  d.result.reference = request.settings.reference;
+  d.result.reference = reference.read.folders;
   if (!reference.flights.empty()) {
     std::vector<flightlog::FlightHeader> headers = reference.read.headers;
     headers.insert(headers.end(), tests.headers.begin(), tests.headers.end());
     d.result.warnings = contrast_warnings(headers, d.flights);
   }
+  for (CheckedLogs* const set : {&reference.read, &tests})
+    for (const std::string& why : set->left_out) d.result.warnings.push_back("left out: " + why);
   if (d.inference.complete) d.corrected = corrected_vehicle(request.vehicle, d.inference, request.uncertain);
   return d;
 }

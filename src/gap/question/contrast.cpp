@@ -39,8 +39,25 @@ BasisCoefficients spread_of(const Evidence& evidence, const BasisCoefficients& c
   return spread;
 }
 
-/// The references' parameters and background, and the test flights' effects. The magnitudes of an effect that both have
-/// add up.
+/// By how much parameters changed from the references to the test flights, as sessions differ, given the answer.
+VectorXd changed_since(const RobotFit& robot, const Fitter& fitter, const ScoredHypothesis& answer,
+                       const Inference& d) {
+  const bool fitted = answer.kind == HypothesisKind::effect && answer.fitted();
+  const Hypothesis h(robot.uncertain(), fitted ? answer.effects : std::vector<std::string>{});
+  const Fitter::JointFit joint = fitter.joint_fit(h, fitted ? answer.fit : d.parameters, fitter.all_flights());
+  const std::vector<Background> changes = robot.session_changes(fitter.evidence().discrepancy().session);
+  const std::size_t first = robot.nuisance_regressors().columns.size();
+  VectorXd moved = VectorXd::Zero(h.shared());
+  for (const Fitter::NuisanceMean& n : joint.means) {
+    if (n.place < first || n.place >= first + changes.size()) continue;
+    for (const Background::Move& m : changes[n.place - first].moves)
+      if (m.effect.empty()) moved[m.unknown] += m.by * n.mean;
+  }
+  return moved;
+}
+
+}  // namespace
+
 CorrectedParameters with_effects(const sim::Randomisation& uncertain, const CorrectedParameters& reference,
                                  const Hypothesis& tests, const VectorXd& at) {
   CorrectedParameters c{tests.effects(), {}, reference.minors};
@@ -62,25 +79,6 @@ CorrectedParameters with_effects(const sim::Randomisation& uncertain, const Corr
   c.at = h.bounded(std::move(c.at));
   return c;
 }
-
-/// By how much parameters changed from the references to the test flights, as sessions differ, given the answer.
-VectorXd changed_since(const RobotFit& robot, const Fitter& fitter, const ScoredHypothesis& answer,
-                       const Inference& d) {
-  const bool fitted = answer.kind == HypothesisKind::effect && answer.fitted();
-  const Hypothesis h(robot.uncertain(), fitted ? answer.effects : std::vector<std::string>{});
-  const Fitter::JointFit joint = fitter.joint_fit(h, fitted ? answer.fit : d.parameters, fitter.all_flights());
-  const std::vector<Background> changes = robot.session_changes(fitter.evidence().discrepancy().session);
-  const std::size_t first = robot.nuisance_regressors().columns.size();
-  VectorXd moved = VectorXd::Zero(h.shared());
-  for (const Fitter::NuisanceMean& n : joint.means) {
-    if (n.place < first || n.place >= first + changes.size()) continue;
-    for (const Background::Move& m : changes[n.place - first].moves)
-      if (m.effect.empty()) moved[m.unknown] += m.by * n.mean;
-  }
-  return moved;
-}
-
-}  // namespace
 
 ReferenceFit::ReferenceFit(const FlightList& references, const sim::Randomisation& uncertain,
                            const InferenceOptions& options)

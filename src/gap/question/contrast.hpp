@@ -6,7 +6,12 @@
 
 namespace flappy::gap {
 
-class Contrast final : public Question {
+/// The references' parameters and background, and the test flights' effects. The magnitudes of an effect that both have
+/// add up.
+CorrectedParameters with_effects(const sim::Randomisation& uncertain, const CorrectedParameters& reference,
+                                 const Hypothesis& tests, const Eigen::VectorXd& at);
+
+class Contrast : public Question {
  public:
   explicit Contrast(double min_step_nats) : min_step_nats_(min_step_nats) {}
 

@@ -8,6 +8,7 @@
 #include "gap/fit/robot_fit.hpp"
 #include "gap/question/verdict_rule.hpp"
 #include "gap/result/diagnosis.hpp"
+#include "gap/session/session_scatter.hpp"
 
 namespace flappy::gap {
 
@@ -53,6 +54,7 @@ struct InferenceOptions {
   std::function<bool(double share, const std::string& what)> progress;  ///< returns false to fit no further effect
   ModelDiscrepancy discrepancy;
   VerdictRule rule;
+  SessionPrior sessions;
 };
 
 struct Inference {

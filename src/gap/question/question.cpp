@@ -3,6 +3,7 @@
 #include "gap/question/alone.hpp"
 #include "gap/question/beat_averaged_question.hpp"
 #include "gap/question/contrast.hpp"
+#include "gap/question/session_contrast.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -11,7 +12,8 @@ namespace {
 constexpr double kWingStep_nats = 0.5, kBeatAveragedStep_nats = 0.05;
 
 const Alone kAlone(kWingStep_nats), kReferencesOfBeatAveraged(kBeatAveragedStep_nats);
-const Contrast kContrast(kWingStep_nats), kContrastOfBeatAveraged(kBeatAveragedStep_nats);
+const Contrast kContrast(kWingStep_nats);
+const SessionContrast kContrastOfBeatAveraged(kBeatAveragedStep_nats);
 const BeatAveraged kBeatAveraged(kBeatAveragedStep_nats);
 
 }  // namespace

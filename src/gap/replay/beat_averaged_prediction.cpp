@@ -15,7 +15,8 @@ using Vec = model::Vec3<double>;
 
 /// Rows in a period of the bandwidth: a little more than the two that the sampling theorem asks for.
 constexpr double kRowsPerPeriod = 2.2;
-constexpr std::size_t kMinRows = 30;
+/// Fewest instants of a flight.
+constexpr std::size_t kMinRows = 12;
 /// Moments are compared as means over this time, in which an autopilot has counteracted most of what disturbs it.
 constexpr double kTrim_s = 3;
 /// Least thrust that moments are divided by, as a share of the weight.
@@ -129,9 +130,9 @@ BeatAveragedPrediction::BeatAveragedPrediction(const std::filesystem::path& fold
   std::size_t seen = 0;
   for (std::size_t i = stride_ / 2; i < motion_.size(); i += stride_) rows_.push_back(i), seen += motion_.seen[i] != 0;
   if (seen < kMinRows)
-    throw io::InputError(folder.string() + ": only " + std::to_string(seen) +
-                         " instants are in the air and seen; accepted: " + std::to_string(kMinRows) +
-                         " or more, higher than " + io::shortest_digits(least_z_m) + " m");
+    throw TooLittleSeen(folder.string() + ": only " + std::to_string(seen) +
+                        " instants are in the air and seen; accepted: " + std::to_string(kMinRows) +
+                        " or more, higher than " + io::shortest_digits(least_z_m) + " m");
   for (const std::vector<double> smooth = flightlog::low_pass(battery_, b.bandwidth_Hz * motion_.step_s);
        const std::size_t i : rows_)
     battery_rows_.push_back(smooth[i]);
@@ -458,6 +459,24 @@ std::vector<RegimeFunction> BeatAveragedPrediction::functions() const {
   add("height", BasisFunction::place, [&](std::size_t i) { return motion_.position_m[i].z(); });
   add("time", BasisFunction::place, [&](std::size_t i) { return motion_.step_s * static_cast<double>(i); });
   return list;
+}
+
+std::optional<double> BeatAveragedPrediction::log_input_noise() const {
+  const flightlog::Column& t_s = log_.command.t_s;
+  std::vector<char> in_air;
+  for (const double t : t_s) {
+    const auto k = static_cast<std::size_t>(std::max((t - motion_.t_s(0)) / motion_.step_s, 0.0));
+    in_air.push_back(k < motion_.size() && motion_.seen[k] != 0);
+  }
+  double sum = 0, n = 0;
+  for (const model::BeatAveraged::Input& i : nominal_.beat_averaged->inputs) {
+    const auto at = std::ranges::find(log_.header.inputs, i.name) - log_.header.inputs.begin();
+    const flightlog::Column& x = log_.command.declared[static_cast<std::size_t>(at)];
+    for (std::size_t k = 1; k + 1 < x.size(); ++k)
+      if (in_air[k]) sum += std::pow((x[k + 1] - 2 * x[k] + x[k - 1]) / (i.high - i.low), 2), n += 1;
+  }
+  if (!(sum > 0)) return {};
+  return 0.5 * std::log(sum / n);
 }
 
 std::vector<RegimeQuantity> BeatAveragedPrediction::inputs() const {

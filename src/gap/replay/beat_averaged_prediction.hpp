@@ -22,6 +22,13 @@
 
 namespace flappy::gap {
 
+/// A flight too short, or too little of it seen, to be compared.
+struct TooLittleSeen : io::InputError {
+  using io::InputError::InputError;
+};
+/// Fewest instants of all flights of a robot together.
+inline constexpr std::size_t kMinInstants = 30;
+
 class BeatAveragedPrediction final : public PredictedFlight {
  public:
   /// `nominal`: the vehicle that is believed to have flown. `channels`: the only ones with rows; empty: all that it
@@ -49,6 +56,7 @@ class BeatAveragedPrediction final : public PredictedFlight {
   std::vector<std::pair<std::string, std::string>> products() const override { return {}; }
   std::vector<RegimeQuantity> regimes() const override;
   std::vector<RegimeQuantity> inputs() const override;
+  std::optional<double> log_input_noise() const override;
   bool is_averaged() const override { return true; }
 
  private:

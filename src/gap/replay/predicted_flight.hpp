@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -116,6 +117,9 @@ class PredictedFlight {
   virtual std::vector<std::pair<std::string, std::string>> products() const = 0;
   virtual std::vector<RegimeQuantity> regimes() const = 0;
   virtual std::vector<RegimeQuantity> inputs() const = 0;
+  /// Logarithm of the rms of the inputs' second differences, in shares of their ranges: how much the controller shakes
+  /// while the robot is in the air. None for vehicles with wings, or where inputs do not change.
+  virtual std::optional<double> log_input_noise() const { return {}; }
   /// Whether rows are means over beats alone: of a beat-averaged vehicle.
   virtual bool is_averaged() const = 0;
   /// Null for beat-averaged vehicles.

@@ -17,7 +17,7 @@ struct SlungLoad {
   static constexpr std::array<EffectParameter, 5> kParameters{{{"mass_kg", 0, 0.1, 0.003, 0, 0.01},
                                                                {"moment_x_kg_m", -0.01, 0.01, 0, -3e-4, 3e-4},
                                                                {"moment_y_kg_m", -0.01, 0.01, 0, -3e-4, 3e-4},
-                                                               {"length_m", 0.01, 5, 0.2, 0.05, 0.5},
+                                                               {"length_m", 0.01, 5, 0.5, 0.1, 1.2},
                                                                {"z_m", -0.5, 0.5, 0, -0.03, 0.03}}};
   /// A weight below this counts as one of this for the place of its hook.
   static constexpr double kMinPlaced_kg = 1e-4;

@@ -1,0 +1,23 @@
+// What changed in a beat-averaged vehicle, whose flights are compared by a few numbers each
+// (gap/session/quantities.hpp). The robot's own reference sessions say how much these differ while nothing is done to
+// it (gap/session/session_scatter.hpp). A hypothesis shifts them by what its effects change in the rows:
+//   p(y | effects) = integral of t(y - shift(z)) N(z; 0, 1) dz
+// with z the unknowns of the effects, by Laplace's method around the most probable z (MacKay, Information Theory,
+// Inference, and Learning Algorithms, 2003, ch. 27).
+#pragma once
+
+#include "gap/question/contrast.hpp"
+#include "gap/session/session_scatter.hpp"
+
+namespace flappy::gap {
+
+class SessionContrast final : public Contrast {
+ public:
+  using Contrast::Contrast;
+  std::optional<Inference> by_sessions(const Flights& flights, const sim::Randomisation& uncertain,
+                                       const InferenceOptions& options, const ReferenceFit& reference) const override;
+  CorrectedParameters correct_by_sessions(const sim::Randomisation& uncertain, const ReferenceFit& reference,
+                                          const Inference& d) const override;
+};
+
+}  // namespace flappy::gap

@@ -1,0 +1,59 @@
+// What one flight shows, in a few numbers: how far its rows are from a prediction, along directions that have a
+// physical meaning. Each is a coefficient of a linear regression of the residual, so an effect shifts it by what the
+// same regression gives for the change that the effect makes in the rows:
+//   force along z      share of the thrust; with the battery, the height, the climb and the speed squared; a delay
+//   forces along x, y  a constant and a drag of each axis; the pull of a weight on a line, for several lengths
+//   moments            where the thrust acts: mean moment over the weight
+//   inputs             the logarithm of how much they shake, which no effect of the catalogue predicts
+// Regressors that a flight does not excite are held at 0 by a prior, as are they in every other flight.
+#pragma once
+
+#include "gap/replay/predicted_flight.hpp"
+
+namespace flappy::gap {
+
+struct SessionQuantity {
+  std::string name, unit;
+  std::string block;  ///< quantities of one kind, which a cause that is not in the catalogue changes together
+};
+
+inline constexpr const char* kSessionBlocks[] = {"thrust", "battery", "height", "climb",  "speed", "delay",
+                                                 "force",  "drag",    "swing",  "moment", "yaw",   "noise"};
+
+/// What all references together show of the force along z, which each flight is corrected for: coefficients of the
+/// regressors (quantities.cpp), and the means at which these are 0.
+struct CommonTrend {
+  double battery = 0, height_m = 0;
+  Eigen::VectorXd slopes;
+};
+/// `robot`: what predicts.
+CommonTrend common_trend(const FlightList& references, const VehicleHypothesis& robot);
+
+/// The regressions of one flight.
+class FlightQuantities {
+ public:
+  /// `robot`: what predicts; the same for all flights that are compared.
+  FlightQuantities(const PredictedFlight& flight, const VehicleHypothesis& robot, const CommonTrend& trend);
+  const std::vector<SessionQuantity>& quantities() const { return quantities_; }
+  /// What the flight shows.
+  const Eigen::VectorXd& values() const { return values_; }
+  /// Variance of each by the noise of the flight.
+  const Eigen::VectorXd& variances() const { return variances_; }
+  /// What a change of the rows that are predicted adds to the values.
+  Eigen::VectorXd change(const Rows& rows) const;
+
+ private:
+  struct Regression;
+  void add(const Regression& regression, const Eigen::VectorXd& residual);
+  void add_unseen(const Regression& regression);
+  std::vector<SessionQuantity> quantities_;
+  Eigen::VectorXd values_, variances_;
+  struct Weights {
+    std::vector<std::size_t> rows;
+    Eigen::MatrixXd weights;  ///< [quantity][row]
+    Eigen::Index first;
+  };
+  std::vector<Weights> regressions_;
+};
+
+}  // namespace flappy::gap

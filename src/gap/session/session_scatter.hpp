@@ -1,0 +1,96 @@
+// How much the quantities of a robot differ from session to session while nothing is done to it. The yardstick of a
+// contrast is the robot itself: of a quantity with session means x_1 ... x_n,
+//   x_i ~ N(m, s^2 + v_i)    s^2 ~ scaled inverse chi-squared(nu, s_0^2),  v_i: noise of the session's own flights
+//   y   ~ t_(nu + n - 1)(m, s^2 (1 + 1/n) + v)    what another session of the unchanged robot shows
+// s_0 and nu are those of other robots (configs/gap/beat_averaged/sessions.toml) (Gelman et al., Bayesian Data
+// Analysis, 3rd ed., ch. 3.2 and 5.4).
+#pragma once
+
+#include <map>
+
+#include "gap/session/quantities.hpp"
+
+namespace flappy::gap {
+
+/// What is believed before the robot's own sessions are seen: configs/gap/beat_averaged/session_scatter.toml.
+struct SessionPrior {
+  struct Block {
+    double scatter, unknown, leak;
+  };
+  std::map<std::string, Block> blocks;  ///< by SessionQuantity::block
+  double freedom = 0;                   ///< for how many sessions of the robot it counts
+  double share_of_noise = 0;            ///< by which flights differ besides
+  double unchanged = 0, effect = 0, unknown = 0, further_effect = 0;
+  std::map<std::string, double> together;  ///< in place of further_effect, by two effects in the order of their names
+  double further(const std::string& a, const std::string& b, std::size_t effects) const;
+  const Block& of(const SessionQuantity& quantity) const { return blocks.at(quantity.block); }
+};
+/// io::InputError with file and line.
+SessionPrior read_session_prior(const std::filesystem::path& path);
+
+/// Sessions of one robot: means of their flights, weighted by what each flight shows.
+struct SessionValues {
+  Eigen::MatrixXd values, variances;  ///< [session][quantity]
+};
+
+/// [flight][quantity] Share of each flight in the values of all together.
+Eigen::MatrixXd flight_shares(const std::vector<FlightQuantities>& flights, const SessionPrior& prior);
+/// `of`: [flight] number of its session, from 0 on.
+SessionValues session_values(const std::vector<FlightQuantities>& flights, const std::vector<int>& of,
+                             const SessionPrior& prior);
+
+class SessionScatter {
+ public:
+  SessionScatter(const std::vector<SessionQuantity>& quantities, const SessionValues& references,
+                 const SessionPrior& prior);
+  const std::vector<SessionQuantity>& quantities() const { return quantities_; }
+  const Eigen::VectorXd& mean() const { return mean_; }
+  /// Variance between sessions, and of the mean.
+  const Eigen::VectorXd& variance() const { return variance_; }
+  const Eigen::VectorXd& variance_of_mean() const { return variance_of_mean_; }
+  /// Mean over the references of the variance by the noise of their flights, which is part of variance().
+  const Eigen::VectorXd& noise() const { return noise_; }
+  double freedom() const { return freedom_; }
+
+ private:
+  std::vector<SessionQuantity> quantities_;
+  Eigen::VectorXd mean_, variance_, variance_of_mean_, noise_;
+  double freedom_;
+};
+
+/// Log density of quantities of a further session.
+class SessionDensity {
+ public:
+  /// `values`, `variances`: of the session.
+  SessionDensity(const SessionScatter& scatter, const Eigen::VectorXd& values, const Eigen::VectorXd& variances,
+                 const SessionPrior& prior);
+  /// What the session differs by, and its variance were nothing changed.
+  const Eigen::VectorXd& difference() const { return difference_; }
+  const Eigen::VectorXd& variance() const { return variance_; }
+  double freedom() const { return freedom_; }
+  /// By how many standard deviations of unchanged sessions a quantity differs.
+  double times(Eigen::Index quantity) const;
+  /// `shift`: what a cause adds; `more`: variance that it adds, of causes whose shift is not known. A robot that changed
+  /// much flies otherwise, so that errors of the model that are the same in all of its flights no longer cancel, and
+  /// the change may leak into other quantities.
+  double log_density(const Eigen::VectorXd& shift, const Eigen::VectorXd& more) const;
+  /// [quantity] precision at a shift: that of the normal distribution with the same slope.
+  Eigen::VectorXd precision(const Eigen::VectorXd& shift, const Eigen::VectorXd& more) const;
+  /// Quantities of a block.
+  const std::vector<std::vector<Eigen::Index>>& blocks() const { return blocks_; }
+
+ private:
+  Eigen::VectorXd difference_, variance_;
+  Eigen::VectorXd noise_;    ///< variance by the noise of the session's flights and of the references'
+  Eigen::VectorXd unknown_;  ///< standard deviation of what an unknown cause does
+  Eigen::VectorXd leak_;     ///< probability that a change leaks into it
+  double freedom_;
+  std::vector<std::vector<Eigen::Index>> blocks_;
+  /// The largest change is 1: as large as that by an unknown cause.
+  double size_of(const Eigen::VectorXd& shift) const;
+  /// Log density of a block, and the precision of its quantities.
+  double block_density(const std::vector<Eigen::Index>& block, const Eigen::VectorXd& shift,
+                       const Eigen::VectorXd& variance, Eigen::VectorXd* precision) const;
+};
+
+}  // namespace flappy::gap
