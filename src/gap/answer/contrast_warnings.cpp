@@ -9,9 +9,9 @@
 namespace flappy::gap {
 namespace {
 
-/// Shorter sessions tell less than the benchmark's shortest ones, which are 10 s long.
+/// Shorter sessions are warned of. Choice: the benchmark's shortest ones are 10 s long.
 constexpr double kShortest_s = 9;
-/// A regime counts as not covered if more than this share of the beats of the tests is beyond the references'.
+/// A regime is warned of if more than this share of the beats of the tests is beyond the references'. Choice.
 constexpr double kMaxBeyond = 0.2;
 
 double duration_s(const FlightList& flights) {

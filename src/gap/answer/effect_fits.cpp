@@ -14,8 +14,10 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Number of hypotheses tried with a remainder, and of single effects with which the parameters are fitted again.
-constexpr std::size_t kMaxRemainders = 3, kMaxMoved = 3;
+/// Number of hypotheses tried with a remainder. Choice.
+constexpr std::size_t kMaxRemainders = 3;
+/// Number of single effects with which the parameters are fitted again. Choice.
+constexpr std::size_t kMaxMoved = 3;
 
 ScoredHypothesis baseline(HypothesisKind kind, double log_evidence, double prior) {
   ScoredHypothesis a;

@@ -9,7 +9,7 @@
 namespace flappy::gap {
 namespace {
 
-/// Smallest error of a sensor that is reported, in prior standard deviations.
+/// Smallest error of a sensor that is reported, in prior standard deviations. Choice.
 constexpr double kMinSensorError = 0.25;
 
 std::vector<std::pair<std::string, double>> moved_parameters(const Fit& fit, const Hypothesis& hypothesis) {
@@ -55,6 +55,7 @@ void add_hypotheses(const RowContext& context, const sim::Randomisation& uncerta
   r.hypotheses.insert(r.hypotheses.end(), without_effects.begin(), without_effects.end());
 }
 
+/// Number of suspects. Size: of a list that is printed.
 constexpr std::size_t kSuspects = 3;
 
 /// Sums the probabilities of all hypotheses that contain an effect.

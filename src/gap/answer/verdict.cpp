@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-/// Refuted only if the regime explains more than this share of the parameters' residual; less may be chance.
+/// Refuted only if the regime explains more than this share of the parameters' residual. Choice: less may be chance.
 constexpr double kMinExplainable = 0.15;
 
 /// Refutes hypotheses that explain too little of what depends on the regime in held-out flights, however probable.

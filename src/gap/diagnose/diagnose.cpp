@@ -19,9 +19,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A next flight is proposed if the second hypothesis has at least this probability.
+/// A next flight is proposed if the second hypothesis has at least this probability. Choice.
 constexpr double kMinRival = 0.01;
-/// A beat-averaged vehicle's file may lack many effects at once, and another fit costs little.
+/// Largest number of effects in a hypothesis, of a beat-averaged vehicle. Choice: its file may lack many at once, and
+/// another fit costs little.
 constexpr int kMaxBeatAveragedEffects = 8;
 
 std::vector<int> read_channels(const std::vector<std::string>& names, bool beat_averaged) {

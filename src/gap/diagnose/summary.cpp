@@ -11,6 +11,7 @@
 namespace flappy::gap {
 namespace {
 
+/// Rows of lists. Size: of what is printed.
 constexpr std::size_t kParameters = 6, kBackground = 2, kRunnersUp = 3, kMoved = 3, kTerms = 3, kSensors = 3;
 
 std::string listed(const std::vector<std::string>& words, const char* last) {

@@ -7,6 +7,7 @@
 
 namespace flappy::gap {
 
+/// Largest number of lines. Size: of what is printed.
 inline constexpr std::size_t kSummaryLines = 30;
 
 /// The summary for a person, in general fewer than kSummaryLines lines. `out`: folder of the files; empty: none.

@@ -15,7 +15,8 @@ constexpr std::pair<BasisFunction, const char*> kShareKeys[] = {
 constexpr const char* kSharesHead =
     R"(# Prior standard deviation of the coefficients of the regime basis, as a share of the channel's signal, for harmonics 0 (the mean) to 4 of the beat.
 # Rows are kinds of functions: constant; the inputs; the rates of the body; products with an input; the place (height, heading, time, nearness of
-# surfaces); an offset of each flight (a warm sensor, another day's battery); the velocity v in B; and |v| v.
+# surfaces); an offset of each flight (a warm sensor, another day's battery); the velocity v in B; and |v| v. What no flight shows, as a channel that
+# none has, or an offset of flights of one each, keeps the number from which learning started.
 )";
 
 }  // namespace

@@ -23,5 +23,7 @@ inline double share_of(const Shares& shares, int channel, int harmonic, BasisFun
 Shares read_shares(const io::Table& root);
 /// Text of these tables.
 std::string shares_text(const Shares& shares);
+/// Comment in files on `other` of the background magnitudes, which learning keeps.
+inline constexpr const char* kOthers = "  # Of effects that are not listed. Choice.";
 
 }  // namespace flappy::gap

@@ -20,11 +20,16 @@ using Eigen::VectorXd;
   return true;
 }();
 
-/// Degrees of freedom of the noise's Student t.
+/// Degrees of freedom of the noise's Student t. Choice.
 constexpr double kNoiseFreedom = 4;
-/// Ridge of least squares on the whole basis.
+/// Ridge of least squares on the whole basis. Choice.
 constexpr double kLooseRidge = 1e-6;
+/// Largest memory of the noise from beat to beat. Choice.
 constexpr double kMaxPast = 0.95;
+/// Standard deviation over the median of absolute values. Derived: of normal noise.
+constexpr double kRobustSd = 1.4826;
+/// Residuals are clipped at so many robust standard deviations where the memory of the noise is found. Choice.
+constexpr double kClipSd = 3;
 
 std::size_t row_of(std::size_t beat, int group) { return beat * kRowsPerBeat + static_cast<std::size_t>(group); }
 
@@ -191,7 +196,7 @@ void Evidence::learn(const Residuals& residual, Learn what) {
     std::vector<double> sizes;
     for (std::size_t f = 0; f < flights_->size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool) { sizes.push_back(std::abs(left(f, j))); });
-    const double clip = 3 * 1.4826 * io::upper_median(sizes);
+    const double clip = kClipSd * kRobustSd * io::upper_median(sizes);
     double product = 0, square = 0;
     for (std::size_t f = 0; f < flights_->size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool before) {
@@ -209,7 +214,7 @@ void Evidence::learn(const Residuals& residual, Learn what) {
     };
     for (std::size_t f = 0; f < flights_->size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool before) { steps.push_back(std::abs(innovation(f, j, before))); });
-    group.sd = std::max({1.4826 * io::upper_median(steps), group.declared_sd, 1e-9});
+    group.sd = std::max({kRobustSd * io::upper_median(steps), group.declared_sd, 1e-9});
     if (what == Learn::declared) group.declared_sd = group.sd;
     if (what != Learn::weights) known = group;
     if (what == Learn::declared) return;  // declared noise has no outliers

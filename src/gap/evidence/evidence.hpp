@@ -187,6 +187,7 @@ class Evidence {
   ScaledEvidence weigh(const SufficientStatistics& residual, const Regressors& regressors, const std::vector<char>& use,
                        const BasisCoefficients& law_sd, const Scales& start,
                        std::optional<double> unknown_penalty_nats = {}, int max_iterations = kMaxIterations) const;
+  /// Largest number of iterations of a search for scales. Choice.
   static constexpr int kMaxIterations = 40;
   /// Log-prior cost, in nats, of a background magnitude that is `times` its prior.
   static double scale_cost_nats(double times, ScalePrior prior, const Scales& scales);

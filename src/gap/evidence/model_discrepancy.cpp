@@ -16,21 +16,21 @@ constexpr const char* kHead =
 # has to explain more than this. Read by flappy-gap diagnose, written by flappy-gap learn-discrepancy: learn it again from robots of your own that
 # you trust, whose flights contain nothing that the vehicle file lacks.
 #
-# Learnt from )";
+# Learnt: flappy-gap learn-discrepancy, )";
 constexpr const char* kSpread =
     R"(# Priors of the scales by which models of one robot are off by more or less than those of others. robot_sd: standard deviation of the logarithm of the
 # robot's scale; wide, for a robot may be nearly the model. The other scales have inverse gamma priors of their squares; the more degrees of freedom,
 # the closer a scale stays to the centre of its prior. Scales of blocks (a class of regimes in a channel and harmonic) are centred on the robot's
 # scale: block_freedom, and place_freedom for those of the place, which are closer, for a wing does not sense its place. Scales of background
 # magnitudes are centred on 1 (effect_freedom), except those of the effects of_models, which describe how a wing, its hinges and its drive work:
-# each model and each robot has its own laws of these, so they are centred on the robot's scale and vary more (model_freedom). Choices.
+# each model and each robot has its own laws of these, so they are centred on the robot's scale and vary more (model_freedom). Choice.
 )";
 constexpr const char* kSensors =
-    R"(# Errors of declared sensors: prior standard deviations, the same under every hypothesis. Choices.
+    R"(# Errors of declared sensors: prior standard deviations, the same under every hypothesis. Choice.
 )";
 constexpr const char* kBackground =
     R"(# Prior standard deviation of the background magnitudes, in coordinates of the effect (1: the prior of the catalogue). Every vehicle has a little of
-# every effect, or of something that looks like it; only more than that is evidence of the effect. `other`: for effects that are not listed.
+# every effect, or of something that looks like it; only more than that is evidence of the effect.
 )";
 
 /// The effect of a background magnitude, without the suffix of what both wings share.
@@ -89,12 +89,13 @@ std::string discrepancy_text(const ModelDiscrepancy& d, const std::string& learn
           (d.beat_averaged ? "\nbeat_averaged = true\n\n" : "\n\n");
   if (!d.nuisances.empty())
     text += std::string(kSensors) + "[sensors]\nimu_rotation_rad = " + sensor("imu_mounting") +
-            "  # as it is mounted, about each axis\n" + "imu_place_m = " + sensor("imu_place") +
-            "  # along each axis\npower_latency_s = " + sensor("power_delay") +
-            "  # of a sample that is an instant, a mean, or held\nclock_rate = " + sensor("imu_clock") +
-            "  # of each stream's clock against that of the commands\n\n";
+            "  # As the IMU is mounted, about each axis. Choice.\n" + "imu_place_m = " + sensor("imu_place") +
+            "  # Where the IMU is, along each axis. Choice.\npower_latency_s = " + sensor("power_delay") +
+            "  # Of a sample that is an instant, a mean, or held. Choice.\nclock_rate = " + sensor("imu_clock") +
+            "  # Of each stream's clock against that of the commands. Choice.\n\n";
   text += std::string(kBackground) + "[background_sd]\n";
-  for (const auto& [effect, sd] : d.background) text += effect + " = " + number(sd) + "\n";
+  for (const auto& [effect, sd] : d.background)
+    text += effect + " = " + number(sd) + (effect == "other" ? kOthers : "") + "\n";
   return text;
 }
 

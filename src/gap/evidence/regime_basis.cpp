@@ -100,6 +100,7 @@ void RegimeBasis::append_of_tests(const Flights& flights, const std::vector<std:
 
 /// By the mean over a class's functions of their variance in the references over that in the tests, at most 1 each.
 void RegimeBasis::find_covered(const Flights& flights) {
+  // References cover a class of regimes if they have this share of its variance in the tests. Choice.
   constexpr double kCovered = 0.5;
   const auto variance = [&](int i, bool of_reference) {
     double sum = 0, squares = 0, n = 0;

@@ -12,25 +12,26 @@ constexpr const char* kSessionHead =
     R"(# What differs between two sessions of flights of one robot in which nothing that matters has changed. An effect that is named by contrast with
 # reference flights has to explain more than this. Read by flappy-gap diagnose --reference, written by flappy-gap learn-discrepancy --pairs.
 #
-# Learnt from )";
+# Learnt: flappy-gap learn-discrepancy --pairs, )";
 constexpr const char* kSessionSpread =
     R"(# scale_sd: standard deviation of the logarithm of the scale of a pair of sessions. block_freedom, effect_freedom: degrees of freedom of the scales of
-# single blocks and of single effects; high, for no session differs by a hundred times as much as others. Choices.
+# single blocks and of single effects. Choice: high, for no session differs by a hundred times as much as others.
 )";
 constexpr const char* kSessionLaws =
     R"(# How far another law of the same cause deviates from that of the catalogue, as a share of the change by the effect: by the stage in which it acts, the
 # centre over effects and robots. spread: standard deviation of its logarithm. most: the largest over the centre; what deviates more is another cause.
 )";
+constexpr const char* kScaleSd = "  # Standard deviation of the logarithm of the scale of a pair of sessions. Learnt.";
 const char* stage_name(std::size_t stage) { return name_of(static_cast<model::Stage>(stage)); }
 constexpr const char* kSessionParametersHead =
     R"(# Prior standard deviation of the change of a parameter, in standard deviations of its prior (configs/gap/priors.toml), by a part of its name.
 # Weather: density by 1 %. A battery put back: mass by 0.5 %, centre of mass by 0.1 mm. Temperature of the motors: resistance by 2.5 %, torque constant
 # by 0.3 %. Wear and grease: friction and damping by 7 %. A hinge that was touched: rest angle by 0.3 degrees. The IMU and the markers are taken off and
-# put back: mounting by a tenth of its prior. Clocks drift with temperature. Choices, made before any session was seen.
+# put back: mounting by a tenth of its prior. Clocks drift with temperature. Choice: made before any session was seen.
 )";
 constexpr const char* kSessionBackground =
     R"(# Prior standard deviation of the change of each effect's magnitude from session to session, in coordinates of the effect (1: the prior of the
-# catalogue). `other`: for effects that are not listed.
+# catalogue).
 )";
 
 }  // namespace
@@ -53,15 +54,17 @@ double SessionVariation::background_sd(const std::string& effect) const {
 std::string session_text(const SessionVariation& s, const std::string& learnt) {
   const auto number = [](double v) { return io::format("%.4g", v); };
   std::string text = kSessionHead + learnt + ".\nschema = 1\n\n" + kSessionSpread +
-                     "[spread]\nscale_sd = " + number(s.scale_sd) + "\nblock_freedom = " + number(s.block_freedom) +
-                     "\neffect_freedom = " + number(s.effect_freedom) + "\n\n" + kSessionLaws + "[law_error]\n";
+                     "[spread]\nscale_sd = " + number(s.scale_sd) + kScaleSd +
+                     "\nblock_freedom = " + number(s.block_freedom) + "\neffect_freedom = " + number(s.effect_freedom) +
+                     "\n\n" + kSessionLaws + "[law_error]\n";
   for (std::size_t stage = 0; stage < model::kStages; ++stage)
     text += std::string(stage_name(stage)) + " = " + number(s.law_error[stage]) + "\n";
   text += "spread = " + number(s.law_spread) + "\nmost = " + number(s.law_most) + "\n\n" + kSessionParametersHead +
           "[parameters]\n";
   for (const auto& [name, sd] : s.parameters) text += "\"" + name + "\" = " + number(sd) + "\n";
   text += "\n" + shares_text(s.shares) + kSessionBackground + "[background_sd]\n";
-  for (const auto& [effect, sd] : s.background) text += effect + " = " + number(sd) + "\n";
+  for (const auto& [effect, sd] : s.background)
+    text += effect + " = " + number(sd) + (effect == "other" ? kOthers : "") + "\n";
   return text;
 }
 

@@ -21,10 +21,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Iterations end when they gain less evidence than this.
+/// Iterations end when they gain less evidence than this. Choice.
 constexpr double kSettled_nats = 0.1;
-constexpr double kStrideGrowth = 1.5, kMaxStride = 8;
-/// Smallest scale of a free block over the scale of the robot.
+/// Growth of the stride of over-relaxed steps from one iteration to the next. Choice.
+constexpr double kStrideGrowth = 1.5;
+/// Largest stride. Choice.
+constexpr double kMaxStride = 8;
+/// Smallest scale of a free block over the scale of the robot. Choice.
 constexpr double kMinFree = 2;
 
 double log_prior(double scale, double robot, double freedom) {
@@ -35,6 +38,7 @@ double log_prior(double scale, double robot, double freedom) {
 /// The most probable robot scale f. `freedom`: sum of nu; `inverses`: sum of nu / s^2 over scales s that follow it;
 /// `sd`: of log f.
 double robot_scale(double freedom, double inverses, double sd) {
+  // Step of the grid of log f. Choice.
   constexpr double kGrid = 0.02;
   double best = 1, most = -std::numeric_limits<double>::infinity();
   for (double log_f = -5; log_f <= 3; log_f += kGrid) {

@@ -14,17 +14,24 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// First differences reach kFirstReach; later ones kReachSd standard deviations of the posterior, within bounds.
-constexpr double kFirstReach = 0.3, kMinReach = 0.1, kMaxReach = 1, kReachSd = 3;
-/// Statistics are averaged over this many points around that of a fit; their distance in reaches.
+/// Reach of the first differences, in prior standard deviations. Choice.
+constexpr double kFirstReach = 0.3;
+/// Reach of later differences, in standard deviations of the posterior. Choice.
+constexpr double kReachSd = 3;
+/// Bounds of that reach, in prior standard deviations. Choice.
+constexpr double kMinReach = 0.1, kMaxReach = 1;
+/// Number of points around that of a fit over which statistics are averaged. Choice.
 constexpr int kAround = 8;
+/// Distance of these points, in reaches. Choice.
 constexpr double kAroundReach = 0.2;
-/// A smaller step ends the iteration.
+/// A smaller step, in prior standard deviations, ends the iteration. Choice.
 constexpr double kConverged = 0.02;
-/// Nuisance regressors with less information, in prior precisions, are left out: they matter hundredths of a nat.
+/// Nuisance regressors with less information, in prior precisions, are left out. Choice: they matter hundredths of a
+/// nat.
 constexpr double kMinInformation = 0.05;
-/// Largest distance, in reaches, at which the columns of another point are used.
+/// Largest distance, in reaches, at which the columns of another point are used. Choice.
 constexpr double kMaxDistance = 2;
+/// Largest number of steps in a fit of effects whose parameters stay where they are. Choice.
 constexpr int kMaxEffectSteps = 2;
 
 /// Directions of a fit with a column.
@@ -427,11 +434,12 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, c
     const VectorXd step = fit.directions.axes * fit.posterior.mean;
     bool improved = n < max_iterations && step.cwiseAbs().maxCoeff() >= kConverged;
     if (improved) {
-      // shares of the step, and damped steps, shorter where there is little information; all are tried at once
-      constexpr double kShares[] = {1.4, 1, 0.7, 0.5, 0.35, 0.25, 0.1, 0.03},
-                       kDampings[] = {0.3, 1, 3, 10, 30, 100, 300, 1000};
+      // Shares of the Gauss-Newton step, all tried at once. Choice.
+      constexpr double kStepShares[] = {1.4, 1, 0.7, 0.5, 0.35, 0.25, 0.1, 0.03};
+      // Dampings of further steps (Levenberg), shorter where there is little information. Choice.
+      constexpr double kDampings[] = {0.3, 1, 3, 10, 30, 100, 300, 1000};
       std::vector<VectorXd> tries;
-      for (const double share : kShares) tries.push_back(hypothesis.bounded(fit.at + share * step));
+      for (const double share : kStepShares) tries.push_back(hypothesis.bounded(fit.at + share * step));
       for (const double damping : kDampings)
         tries.push_back(hypothesis.bounded(fit.at + fit.directions.axes * solve(fit, r, reduced, damping).mean));
       // effects of sensors keep their values, so that all tries share one log; their changes are added linearly

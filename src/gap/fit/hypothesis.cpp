@@ -7,10 +7,10 @@
 namespace flappy::gap {
 namespace {
 
-/// Prior of the lag of the sensors against the inputs: a header does not say whether a sample is instantaneous,
-/// averaged, or held.
+/// Prior standard deviation of the lag of the sensors against the inputs. Choice: a header does not say whether a sample
+/// is instantaneous, averaged, or held.
 constexpr double kLagSd_s = 5e-4;
-/// Largest deviation of a parameter, in standard deviations.
+/// Largest deviation of a parameter, in prior standard deviations. Choice.
 constexpr double kMaxDeviation = 4;
 
 }  // namespace

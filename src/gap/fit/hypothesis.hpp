@@ -18,6 +18,7 @@ struct CatalogueEffect;
 namespace flappy::gap {
 
 /// Half a 90 % interval of a normal distribution, also the 90 % quantile of a half-normal, in standard deviations.
+/// Derived: the 95 % quantile of the normal distribution.
 inline constexpr double kHalf90 = 1.645;
 
 /// One coordinate: value = centre + scale x coordinate.

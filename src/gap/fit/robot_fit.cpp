@@ -16,13 +16,23 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kFirstIterations = 4, kMaxRefits = 5, kRefitIterations = 6;
-/// Scale of background magnitudes over their prior scale, in the first fit with them.
+/// Iterations of the first fit of the parameters. Choice.
+constexpr int kFirstIterations = 4;
+/// Iterations of a fit after noise, scales or minor draws have changed. Choice.
+constexpr int kRefitIterations = 6;
+/// Largest number of rounds with minor draws. Choice.
+constexpr int kMaxRefits = 5;
+/// Scale of background magnitudes over their prior scale, in the first fit with them. Choice.
 constexpr double kWideScale = 5;
-/// Rounds of linear fits of the catalogue, each followed by learning the noise from what is left.
+/// Rounds of linear fits of the catalogue, each followed by learning the noise from what is left. Choice.
 constexpr int kRestRounds = 3;
-/// Another round needs this gain and is undone at this loss; smaller changes may be errors of linear models.
+/// Another round and a larger background need this gain; a round is undone at this loss. Choice: smaller changes may be
+/// errors of linear models.
 constexpr double kMinGain_nats = 2;
+/// Factors by which a background is tried larger. Choice.
+constexpr double kWidenings[] = {2, 4, 8, 16, 32, 64};
+/// Factor between law factors that are tried. Choice.
+constexpr double kLawStep = 2;
 
 constexpr const char* kDelay = "delay_s";
 constexpr const char* kDiverges =
@@ -311,7 +321,7 @@ std::optional<Scales> RobotFit::larger_background(const Hypothesis& hypothesis, 
              Evidence::scale_cost_nats(factor * now.effects[e], r.priors[static_cast<std::size_t>(columns[0])], now);
     };
     const double before = log_evidence(1);
-    for (const double factor : {2.0, 4.0, 8.0, 16.0, 32.0, 64.0}) {
+    for (const double factor : kWidenings) {
       const double gain = log_evidence(factor) - before;
       if (!(gain > most)) continue;
       most = gain;
@@ -347,7 +357,7 @@ ScaledEvidence RobotFit::weigh(const Hypothesis& hypothesis, const Fit& fit, con
     if (ScaledEvidence w = with(1, without_background); w.posterior.log_evidence > best.posterior.log_evidence)
       best = std::move(w);
   if (!fitter_.law_may_deviate(hypothesis, fit)) return best;
-  for (const double step : {std::min(2.0, law.most), 1 / std::min(2.0, law.most)})
+  for (const double step : {std::min(kLawStep, law.most), 1 / std::min(kLawStep, law.most)})
     for (double law_factor = step; law_factor <= law.most && law_factor >= 1 / law.most; law_factor *= step) {
       ScaledEvidence other = with(law_factor, best.scales);
       if (other.posterior.log_evidence < best.posterior.log_evidence) break;

@@ -131,8 +131,10 @@ class Screening {
   double without_ = 0;
 };
 
-/// Distance of near steps in background standard deviations; the least distance: shorter differences are rough.
-constexpr double kNearSd = 2, kMinNearReach = 0.05;
+/// Distance of near steps, in standard deviations of the background. Choice.
+constexpr double kNearSd = 2;
+/// Least distance of near steps, in prior standard deviations. Choice: shorter differences are rough.
+constexpr double kMinNearReach = 0.05;
 
 }  // namespace
 

@@ -19,9 +19,11 @@ struct MagnitudeStep : Magnitude {
   double near_reach;                       ///< about as large as background magnitudes become
   std::vector<VehicleHypothesis> near;     ///< near_reach away: above and, unless one_sided, below
 };
+/// Number of steps along a magnitude of one sign. Choice.
 inline constexpr std::size_t kMaxSteps = 5;
+/// Length of such a step, in prior standard deviations. Choice.
 inline constexpr double kMagnitudeReach = 0.4;
-/// Effects whose change is at most this are not seen.
+/// Effects whose change is at most this are not seen. Choice: less is rounding.
 inline constexpr double kNoChange = 1e-9;
 
 /// Steps for each effect but `withheld`, with shape parameters in mid-prior. `background`: reach of near steps; null: no

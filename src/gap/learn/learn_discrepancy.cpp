@@ -20,16 +20,23 @@ namespace {
 
 using Eigen::Index;
 
+/// Iterations of expectation-maximisation. Choice.
 constexpr int kIterations = 16;
-/// The mean square of like channels counts as much as this many coefficients.
+/// The mean square of like channels counts as much as this many coefficients. The scale that pairs of sessions start
+/// with counts as much as this many pairs. Choice.
 constexpr double kShrink = 6;
-/// Least estimates: smaller ones are due to the small number of robots.
-constexpr double kMinShare = 2e-4, kMinBackground = 0.01;
-/// Errors of laws are learnt from no fewer pairs; least standard deviation of their logarithm.
+/// Least share of the discrepancy that is learnt. Choice: smaller ones are due to the small number of robots.
+constexpr double kMinShare = 2e-4;
+/// Least standard deviation of a background magnitude that is learnt. Choice: smaller ones are due to the small number of robots.
+constexpr double kMinBackground = 0.01;
+/// Errors of laws are learnt from no fewer pairs. Choice.
 constexpr std::size_t kMinLaws = 5;
+/// Least standard deviation of the logarithm of errors of laws. Choice.
 constexpr double kMinSpread = 0.25;
-/// The centre over all stages counts as much as this many errors of a stage.
+/// The centre over all stages counts as much as this many errors of a stage. Choice.
 constexpr double kShrinkLaws = 2;
+/// The quantile of errors of laws, over their centres, that is the largest of them. Choice.
+constexpr double kLargestLaw = 0.95;
 constexpr std::size_t kKinds = static_cast<std::size_t>(BasisFunction::count);
 
 struct Moment {
@@ -193,7 +200,9 @@ void shrink(std::map<std::string, Moment>& backgrounds) {
 /// Deviation of the law of an effect from the catalogue's, as a share of its change: the most probable one of a grid.
 /// None: the effect cannot be simulated.
 std::optional<double> law_error(const RobotFit& robot, const std::string& effect, const ModelDiscrepancy& now) {
-  constexpr double kStep = 1.1892;  // four steps to a factor of two
+  // Factor between errors of laws that are tried. Choice: four to a factor of two.
+  constexpr double kStep = 1.1892;
+  // Errors of laws that are tried reach from the one to the other. Choice.
   constexpr double kSmallest = 0.01, kLargest = 4;
   const Fitter fitter = robot.fitter_given(now);
   std::vector<MagnitudeColumn> columns = robot.magnitudes();
@@ -249,7 +258,7 @@ void take(const LawErrors& errors, SessionVariation& to) {
   over.reserve(errors.size());
   for (const auto& [effect, error] : errors) over.push_back(error / to.law_error_of(effect));
   to.law_spread = std::max(std::log(io::quantile(over, 0.84) / io::quantile(over, 0.16)) / 2, kMinSpread);
-  to.law_most = std::max(io::quantile(over, 0.95), 1.0);
+  to.law_most = std::max(io::quantile(over, kLargestLaw), 1.0);
 }
 
 }  // namespace

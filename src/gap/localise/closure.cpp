@@ -11,9 +11,11 @@
 namespace flappy::gap {
 namespace {
 
-/// Beats in a block: a quarter of a second at 34 Hz.
+/// Beats in a block that is resampled. Choice: a quarter of a second at 34 Hz.
 constexpr std::size_t kBlock = 8;
+/// Number of resamples for the interval of the closure. Choice.
 constexpr int kDraws = 400;
+/// The gap that can be closed has to be this many of its standard deviations. Choice.
 constexpr double kMinGapSd = 2;
 
 }  // namespace

@@ -26,8 +26,9 @@ struct Whiteness {
   double rms = 0;  ///< root mean square of the block means
   double p_value = 1;
 };
-/// Test of Ljung and Box 1978 on block means, over kWhitenessLags lags; none with fewer than 20 blocks.
+/// Number of lags in the test of whiteness. Choice.
 inline constexpr int kWhitenessLags = 6;
+/// Test of Ljung and Box 1978 on block means, over kWhitenessLags lags; none with too few blocks.
 std::optional<Whiteness> whiteness_test(const std::vector<double>& y, const std::vector<int>& block);
 
 struct Bands {

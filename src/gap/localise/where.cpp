@@ -10,12 +10,15 @@
 namespace flappy::gap {
 namespace {
 
-/// Beats in a block, half a second at 34 Hz: longer than noise is usually correlated.
+/// Beats in a block of the tests of means and slopes. Choice: half a second at 34 Hz, longer than noise is usually
+/// correlated.
 constexpr int kLongBlock = 16;
-/// Beats in a block of the test of whiteness: short, yet longer than the hat of a beat (gap/replay/beat_rows.hpp).
+/// Beats in a block of the test of whiteness. Choice: short, yet longer than the hat of a beat
+/// (gap/replay/beat_rows.hpp).
 constexpr int kShortBlock = 8;
+/// Largest memory of one beat in the frequency test. Choice.
 constexpr double kMaxMemory = 0.95;
-/// Upper ends of the frequency bands, except the highest band.
+/// Upper ends of the frequency bands, except the highest band. Choice.
 constexpr double kBandEnds_Hz[] = {0.5, 1, 2, 4, 8};
 
 /// Weight of the square of a coefficient in the mean square of the waveform.

@@ -19,6 +19,7 @@
 
 namespace flappy::gap {
 
+/// False discovery rate among all tests of a stage. Choice.
 inline constexpr double kFalseDiscoveries = 0.05;
 
 constexpr std::size_t group_of(int channel, int coefficient) {

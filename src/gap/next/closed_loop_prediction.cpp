@@ -15,15 +15,21 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-/// Standard deviation of the smoothing weights: measured path; flown path, which the flight smooths again. Knots.
-constexpr double kPathSd_s = 0.25, kFlownSd_s = 0.12, kKnot_s = 0.1;
-/// A path within these ranges of position and heading counts as a hover.
+/// Standard deviation of the weights that smooth a measured path. Choice.
+constexpr double kPathSd_s = 0.25;
+/// Standard deviation of the weights that smooth a flown path. Choice: the flight smooths it again.
+constexpr double kFlownSd_s = 0.12;
+/// Time between knots of a path. Choice.
+constexpr double kKnot_s = 0.1;
+/// A path within these ranges of position and heading counts as a hover. Choice.
 constexpr double kHoverReach_m = 0.06, kHoverTurn_rad = 0.6;
-/// Before a recorded path: hover kClear_m off ground and ceiling to learn the trim, approach the start, rest.
+/// Before a recorded path: hover to learn the trim, approach the start, rest. Choice.
 constexpr double kLearn_s = 3, kApproach_s = 1, kRest_s = 0.5, kLead_s = kLearn_s + kApproach_s + kRest_s;
+/// Distance of that hover from ground and ceiling. Choice.
 constexpr double kClear_m = 0.5;
-/// Left out at the start of each flight: a simulated vehicle starts at rest and has to catch up.
+/// Left out at the start of each flight. Choice: a simulated vehicle starts at rest and has to catch up.
 constexpr double kCatchUp_s = 0.5;
+/// Least number of beats of a flight that is compared. Choice.
 constexpr std::size_t kMinBeats = 40;
 
 constexpr std::array<const char*, 9> kQuantities = {"mean_amplitude_V", "mean_difference_V", "mean_bias_V",

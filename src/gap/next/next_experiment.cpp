@@ -18,7 +18,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Number of the most probable rivals that have to survive a manoeuvre.
+/// Number of the most probable rivals that have to survive a manoeuvre. Choice.
 constexpr std::size_t kSurvive = 4;
 
 /// The rivals keep references to `uncertain` and `as_filed`, which has minor draws of 0.
@@ -120,6 +120,7 @@ void add_open(const std::vector<Rival>& rivals, const Flights& flights, const Ev
   }
 }
 
+/// Time between points of the course of a flight. Size: of what is written.
 constexpr double kCourseStep_s = 0.1;
 
 constexpr const char* kCourses[] = {"x_m", "y_m", "z_m", "amplitude_V", "difference_V", "bias_V", "split_cycle"};

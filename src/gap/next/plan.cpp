@@ -24,9 +24,9 @@ namespace {
 namespace fs = std::filesystem;
 using Eigen::Index;
 
-/// A probability from which on a verdict names an effect.
+/// A probability from which on a verdict names an effect. Choice: as naming.of_all of verdict.toml.
 constexpr double kNamed = 0.5;
-/// Other numbers of flights that are weighed.
+/// Other numbers of flights that are weighed. Choice.
 constexpr std::size_t kFew = 1, kMany = 6;
 
 /// The flights of a robot, and the sensors that log them.
@@ -262,7 +262,7 @@ class Planner {
     return c;
   }
 
-  /// As in configs/fly/open_loop.toml.
+  /// Battery, and noise and rate of logs, of a planned flight. Source: configs/fly/open_loop.toml.
   static constexpr double kBattery_V = 18, kLog_Hz = 500, kVoltageNoise_V = 0.02, kCurrentNoise_A = 0.01,
                           kWingNoise_rad = 0.01;
 

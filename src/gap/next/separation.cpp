@@ -13,6 +13,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+/// Doublings and halvings of a magnitude. Derived: up to kMaxFactor.
 constexpr int kDoublings = 4;
 static_assert(1 << kDoublings == static_cast<int>(kMaxFactor));
 

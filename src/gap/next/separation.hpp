@@ -27,7 +27,10 @@ struct Separation {
   /// largest_factor().
   std::vector<std::optional<double>> sure_from;
 };
-inline constexpr double kSure = 0.9, kMaxFactor = 16;
+/// A probability that counts as sure. Choice.
+inline constexpr double kSure = 0.9;
+/// Largest factor on a magnitude that is tried, and one over the smallest. Choice.
+inline constexpr double kMaxFactor = 16;
 
 /// The largest factor on the typical magnitudes of an effect that a vehicle file accepts.
 double largest_factor(const model::CatalogueEffect& effect);

@@ -11,11 +11,15 @@ namespace {
 
 using Eigen::VectorXd;
 
-/// A change follows a function of the place if its square along it is at least this share of the largest.
+/// A change follows a function of the place if its square along it is at least this share of the largest. Choice.
 constexpr double kFollows = 0.1;
-constexpr double kLawFactorSd = 1, kMaxLawFactor = 32;
+/// Prior standard deviation of the logarithm of the law factor. Choice.
+constexpr double kLawFactorSd = 1;
+/// Largest law factor, and one over the smallest. Choice.
+constexpr double kMaxLawFactor = 32;
+/// So often is the point of a body that is not physical moved halfway back. Choice.
 constexpr int kMaxHalvings = 10;
-/// Beyond this a coordinate is out of its range; less is rounding.
+/// Beyond this a coordinate is out of its range. Choice: less is rounding.
 constexpr double kBeyond = 1e-9;
 
 const ScoredHypothesis& parameters_alone(const std::vector<ScoredHypothesis>& all) {

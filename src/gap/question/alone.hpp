@@ -39,7 +39,7 @@ class Alone : public Question {
               const Fit& parameters) const override;
   std::optional<Fit> refit_jointly(const Fitter& fitter, const Hypothesis& hypothesis, const Eigen::VectorXd& start,
                                    const Fit& parameters) const override;
-  std::size_t max_further() const override { return 2; }
+  std::size_t max_further() const override { return kMaxFurther; }
   std::vector<Residuals> held_out(const Fitter& fitter, const Flights& flights,
                                   const std::vector<FittedHypothesis>& fits, const std::vector<int>& fold,
                                   int threads) const override;
@@ -56,6 +56,7 @@ class Alone : public Question {
   std::vector<BasisCoefficients> known_columns(const Rival& rival, const std::optional<Fit>& first) const override;
 
  protected:
+  /// Largest number of iterations of a fit of effects with the parameters. Choice.
   static constexpr int kFitIterations = 6;
   /// Parameters and effects that predict the flights by themselves.
   virtual CorrectedParameters by_themselves(const RobotFit& robot, const Fitter& fitter, const Hypothesis& hypothesis,

@@ -152,9 +152,12 @@ VectorXd Contrast::next_effects(const Fitter& fitter, const Hypothesis& hypothes
   const Index shared = hypothesis.shared(), effects = hypothesis.size() - shared;
   for (Index i = shared; i < hypothesis.size(); ++i)
     if (hypothesis.unknowns()[static_cast<std::size_t>(i)].in_log) return there;  // linear
-  constexpr double kShares[] = {1, 0.5, 0.2}, kShrunk[] = {0.5, 0.2};
+  // Points on the way from a fit to where the linear model leads, as shares of it. Choice.
+  constexpr double kOnTheWay[] = {1, 0.5, 0.2};
+  // Magnitudes of further points, as shares of those of the fit. Choice.
+  constexpr double kShrunk[] = {0.5, 0.2};
   std::vector<VectorXd> tries;
-  for (const double share : kShares) tries.push_back(hypothesis.bounded(fit.at + share * (there - fit.at)));
+  for (const double share : kOnTheWay) tries.push_back(hypothesis.bounded(fit.at + share * (there - fit.at)));
   for (const double share : kShrunk) {
     tries.push_back(fit.at);
     tries.back().tail(effects) *= share;
@@ -227,7 +230,8 @@ VerdictRule Contrast::rule(const RobotFit& robot, VerdictRule given) const {
 
 /// Nothing at all changed since the references.
 double Contrast::log_evidence_of_none(const RobotFit& robot) const {
-  constexpr double kNothing = 1e-3;  // changes so many times smaller than those between sessions have no effect
+  // Under the hypothesis none, changes are so small a share of those between sessions. Choice: they have no effect.
+  constexpr double kNothing = 1e-3;
   ModelDiscrepancy d = robot.evidence().discrepancy();
   for (auto& channel : d.session.shares)
     for (auto& harmonic : channel)

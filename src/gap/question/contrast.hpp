@@ -11,6 +11,9 @@ namespace flappy::gap {
 CorrectedParameters with_effects(const sim::Randomisation& uncertain, const CorrectedParameters& reference,
                                  const Hypothesis& tests, const Eigen::VectorXd& at);
 
+/// Largest number of passes in which blocks and their centres are maximised in turn. Choice.
+inline constexpr int kMaxPasses = 100;
+
 class Contrast : public Question {
  public:
   explicit Contrast(double min_step_nats) : min_step_nats_(min_step_nats) {}
@@ -20,7 +23,7 @@ class Contrast : public Question {
   bool may_be_free(std::size_t block, const RegimeBasis& basis, const ModelDiscrepancy& discrepancy) const override;
   Scales first_scales(const Scales& given, const std::function<double(const Scales&)>& log_evidence) const override;
   /// Blocks of many degrees of freedom hold each other back: they and their centres are maximised until these settle.
-  int max_passes() const override { return 100; }
+  int max_passes() const override { return kMaxPasses; }
 
   double min_step_nats() const override { return min_step_nats_; }
   bool law_may_deviate(const Unknown& /*magnitude*/) const override { return true; }
@@ -46,7 +49,7 @@ class Contrast : public Question {
               const Fit& parameters) const override;
   std::optional<Fit> refit_jointly(const Fitter& fitter, const Hypothesis& hypothesis, const Eigen::VectorXd& start,
                                    const Fit& parameters) const override;
-  std::size_t max_further() const override { return 2; }
+  std::size_t max_further() const override { return kMaxFurther; }
   std::vector<Residuals> held_out(const Fitter& fitter, const Flights& flights,
                                   const std::vector<FittedHypothesis>& fits, const std::vector<int>& fold,
                                   int threads) const override;

@@ -43,13 +43,17 @@ struct CorrectedParameters {
   std::vector<double> minors;        ///< variates for sim::Randomisation::set_minors
 };
 
-/// Log evidence of a hypothesis that is refuted, or whose vehicle cannot be simulated.
+/// Log evidence of a hypothesis that is refuted, or whose vehicle cannot be simulated. Choice: less than any other.
 inline constexpr double kRefuted = -1e9;
+/// Number of effects that are fitted by simulation, of a vehicle with wings. Choice.
+inline constexpr int kMaxFinalists = 8;
+/// Largest number of effects in a hypothesis, of a vehicle with wings. Choice.
+inline constexpr int kMaxEffects = 3;
 
 struct InferenceOptions {
   int threads = 0;
-  int max_finalists = 8;                                                ///< effects that are fitted by simulation
-  int max_effects = 3;                                                  ///< largest number of effects in a hypothesis
+  int max_finalists = kMaxFinalists;                                    ///< effects that are fitted by simulation
+  int max_effects = kMaxEffects;                                        ///< largest number of effects in a hypothesis
   std::vector<std::string> withheld;                                    ///< effects to leave out of the catalogue
   std::function<bool(double share, const std::string& what)> progress;  ///< returns false to fit no further effect
   ModelDiscrepancy discrepancy;

@@ -8,8 +8,10 @@
 namespace flappy::gap {
 namespace {
 
-/// With wings, each step of a fit costs a simulation, so it has to bring more; of a beat-averaged vehicle almost nothing.
-constexpr double kWingStep_nats = 0.5, kBeatAveragedStep_nats = 0.05;
+/// Least gain of a step of a fit, of a vehicle with wings. Choice: each step costs a simulation.
+constexpr double kWingStep_nats = 0.5;
+/// Least gain of a step of a fit, of a beat-averaged vehicle. Choice: a step costs almost nothing.
+constexpr double kBeatAveragedStep_nats = 0.05;
 
 const Alone kAlone(kWingStep_nats), kReferencesOfBeatAveraged(kBeatAveragedStep_nats);
 const Contrast kContrast(kWingStep_nats);

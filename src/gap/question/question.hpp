@@ -17,6 +17,9 @@
 
 namespace flappy::gap {
 
+/// Number of further effects that are tried at a time, of a vehicle with wings. Choice.
+inline constexpr std::size_t kMaxFurther = 2;
+
 class Question : public FitRules {
  public:
   /// The parameters, fitted to the flights. `reference`: of a contrast.

@@ -13,10 +13,13 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Length of a block of rows that is resampled; number of resamples; number of shifted copies.
+/// Length of a block of rows that is resampled. Choice.
 constexpr double kBlock_s = 2;
-constexpr int kResamples = 1000, kCopies = 20;
-/// Ridge on functions of rms 1, for functions may be nearly the same.
+/// Number of resamples for an interval. Choice.
+constexpr int kResamples = 1000;
+/// Number of shifted copies of an effect's change. Choice.
+constexpr int kCopies = 20;
+/// Ridge on functions of rms 1. Choice: functions may be nearly the same.
 constexpr double kRidge = 0.01;
 
 /// Type of a flight: its name without the number of the repetition, as "level_flight" for level_flight_2.

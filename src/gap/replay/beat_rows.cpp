@@ -11,6 +11,7 @@ namespace flappy::gap {
 BeatProjection::BeatProjection(const std::vector<double>& beat, const std::vector<char>& valid, std::size_t beats,
                                std::size_t first)
     : covered_(beats, 0) {
+  // A beat counts where less than this share of its usual weight is missing. Choice.
   constexpr double kMissing = 0.1;
   std::vector<double> there(beats, 0), all(beats, 0);
   for (std::size_t i = 0; i < beat.size(); ++i) {

@@ -10,6 +10,7 @@
 
 namespace flappy::gap {
 
+/// Harmonics of the beat, besides the mean. Choice.
 inline constexpr int kHarmonics = 4;
 inline constexpr int kCoefficients = 2 * kHarmonics + 1;
 

@@ -14,14 +14,15 @@ namespace {
 
 using Eigen::Vector3d;
 constexpr double kTurn = 2 * std::numbers::pi;
-/// The flapping frequency is searched within this share of the declared one.
+/// The flapping frequency is searched within this share of the declared one. Choice.
 constexpr double kFrequencyReach = 0.02;
-/// Cut off at both ends, so that the log still covers the grid after its clocks are corrected.
+/// Cut off at both ends. Choice: the log still covers the grid after its clocks are corrected.
 constexpr double kMargin_s = 0.05;
-/// First samples give the full voltage; a ratio to nominal below kFuller may be noise and counts as 1.
+/// Number of first samples that give the full voltage. Choice.
 constexpr std::size_t kFirstSamples = 20;
+/// A ratio of the full to the nominal voltage below this counts as 1. Choice: it may be noise.
 constexpr double kFuller = 1.02;
-/// An interval between commands that is longer than so many times the median is a gap.
+/// An interval between commands that is longer than so many times the median is a gap. Choice.
 constexpr double kLongestHold = 5;
 
 TorsoAt torso_at(const flightlog::TorsoMotion& m) {

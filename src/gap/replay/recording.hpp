@@ -13,14 +13,15 @@
 
 namespace flappy::gap {
 
-/// Time step of replays. Half of it costs twice the time and predicts no better. A faultless robot simulated with finer
-/// steps gets the verdict "parameters" rather than "none", as fitted parameters absorb the difference.
+/// Time step of replays. A faultless robot simulated with finer steps gets the verdict "parameters" rather than "none",
+/// as fitted parameters absorb the difference. Choice: half of it costs twice the time and predicts no better.
 inline constexpr double kPredictionStep_s = 2e-4;
 /// The hold time of a motor driver has to be a multiple of this. Replays hold recorded voltages for kPredictionStep_s.
+/// Choice.
 inline constexpr double kHoldStep_s = 1e-4;
-/// Beats until the transient of wings that start at rest has decayed: after three it is thirty times the noise.
+/// Beats until the transient of wings that start at rest has decayed. Choice: after three it is thirty times the noise.
 inline constexpr double kSpinUpBeats = 6;
-/// Below this height above its stand, a vehicle may touch the ground, which no hypothesis models.
+/// Below this height above its stand, a vehicle may touch the ground, which no hypothesis models. Choice.
 inline constexpr double kMinClearance_m = 0.01;
 
 /// Inputs and motion of a flight, as means over one beat.

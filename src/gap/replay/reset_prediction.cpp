@@ -25,13 +25,16 @@ static_assert(kTorqueX == int{kTurning} && kForceX == int{kForce} && kStrokeLeft
 /// Samples of all lanes.
 constexpr std::size_t kSample = kSignals * kVehicles, kMeter = kMetered * kVehicles;
 
-/// Rounding error of a time, in steps.
+/// Rounding error of a time, in steps. Choice.
 constexpr double kSameStep = 1e-3;
 /// Signals of path and turn; times the shares of the discrepancy, how much both sensors may disagree without an effect.
+/// Choice: so the shares are in these units.
 constexpr double kStreamSignal_m_s2 = 1, kStreamSignal_rad_s = 1;
 
-/// Weights that a second difference of positions over three beats gives to accelerations around.
+/// Beats to either side that a second difference of positions over three beats reaches. Derived: from kKernel.
 constexpr std::size_t kHalfKernel = 2;
+/// Weights that a second difference of positions over three beats gives to accelerations around. Derived: the hat of a
+/// difference over three beats.
 constexpr double kKernel[] = {1.0 / 9, 2.0 / 9, 3.0 / 9, 2.0 / 9, 1.0 / 9};
 
 /// Voltages delayed by a number of steps, linearly interpolated between steps.
@@ -359,7 +362,7 @@ namespace {
 using R = const Recording&;
 using S = const BeatMotion&;
 
-/// Distance over which the influence of a surface decays: about the length of a wing.
+/// Distance over which the influence of a surface decays. Choice: about the length of a wing.
 constexpr double kReach_m = 0.07;
 
 double near_wall(R r, S s) {

@@ -50,6 +50,7 @@ class ResetPrediction final : public PredictedFlight {
   /// Undoes errors of sensors in the log. Caches the last kMaxCorrected results; several threads may call it.
   std::shared_ptr<const PredictedFlight> corrected(const EffectValues& given) const override;
   void forget() const override;
+  /// Logs that are kept. Size: of a cache.
   static constexpr std::size_t kMaxCorrected = 8;
 
  private:

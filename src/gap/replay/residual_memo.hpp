@@ -38,7 +38,8 @@ class ResidualMemo {
   }
 
  private:
-  /// A quarter of a megabyte each for a flight of 10 s; a linearisation of all parameters takes some 120.
+  /// A quarter of a megabyte each for a flight of 10 s; a linearisation of all parameters takes some 120. Size: of a
+  /// cache.
   static constexpr std::size_t kMaxKept = 256;
   mutable std::mutex mutex_;
   std::map<Key, std::vector<double>> known_;

@@ -13,6 +13,7 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
+/// Beats that differences of path and turn span. Choice.
 constexpr std::size_t kSpan = 3;
 
 /// Dead reckoning of the IMU, at the bounds of its intervals.
