@@ -20,15 +20,15 @@ BIN, PROJECT, DATA, OUT = (pathlib.Path(a).resolve() for a in sys.argv[1:5])
 # What is withheld of the fitted vehicle: name, channel, entry, its parameters (all: the whole entry), entries of the same form, and what else
 # is a right answer.
 CASES = [
-    ("drag", "force_x", "flapping_counter_force", ["x_per_s"], ["body_drag"], []),
-    ("dihedral", "force_x", "stroke_plane_actuation", None, [], []),
-    ("lever arm", "force_x", "marker_offset", None, ["com_offset", "payload", "slung_load"], ["com_offset"]),
-    ("drag", "force_y", "flapping_counter_force", ["y_per_s"], ["body_drag"], []),
-    ("lever arm", "force_y", "marker_offset", None, ["com_offset", "payload", "slung_load"], ["com_offset"]),
-    ("wind or tilt", "force_y", "mocap_tilt", None, ["wind", "thrust_axis_tilt", "tether"], ["wind", "thrust_axis_tilt"]),
-    ("battery", "force_z", "battery_thrust", None, [], []),
-    ("heave damping", "force_z", "flapping_counter_force", ["z_per_s"], ["body_drag"], []),
-    ("v_h^2", "force_z", "translational_lift", None, [], []),
+    ("drag", "specific_force_x", "flapping_counter_force", ["x_per_s"], ["body_drag"], []),
+    ("dihedral", "specific_force_x", "stroke_plane_actuation", None, [], []),
+    ("lever arm", "specific_force_x", "marker_offset", None, ["com_offset", "payload", "slung_load"], ["com_offset"]),
+    ("drag", "specific_force_y", "flapping_counter_force", ["y_per_s"], ["body_drag"], []),
+    ("lever arm", "specific_force_y", "marker_offset", None, ["com_offset", "payload", "slung_load"], ["com_offset"]),
+    ("wind or tilt", "specific_force_y", "mocap_tilt", None, ["wind", "thrust_axis_tilt", "tether"], ["wind", "thrust_axis_tilt"]),
+    ("battery", "specific_force_z", "battery_thrust", None, [], []),
+    ("heave damping", "specific_force_z", "flapping_counter_force", ["z_per_s"], ["body_drag"], []),
+    ("v_h^2", "specific_force_z", "translational_lift", None, [], []),
 ]
 
 

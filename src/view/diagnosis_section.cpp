@@ -193,10 +193,10 @@ class DiagnosisSection {
     } else {
       const Location& first = where.front();
       section_.say(
-          format("With the vehicle's parameters refitted, the %s is still off by %.3g where noise alone makes %.3g "
+          format("With the vehicle's parameters refitted, the %s is still off by %.3g %s where noise alone makes %.3g "
                  "(%.1f times): %s.",
-                 channel_words(first.channel).c_str(), first.gap, first.noise_floor, first.gap / first.noise_floor,
-                 text_of(first.regime, first.test).c_str()));
+                 channel_words(first.channel).c_str(), first.gap, in_print(first.unit).c_str(), first.noise_floor,
+                 first.gap / first.noise_floor, text_of(first.regime, first.test).c_str()));
     }
     Json parts = Json::array();
     std::map<std::string, Json> strongest;
@@ -207,13 +207,15 @@ class DiagnosisSection {
       Json& best = strongest[l.channel];
       if (best.is_null() || ratio > best.at("ratio").get<double>())
         best = {{"ratio", ratio},
-                {"text", text_of(l.regime, l.test) + format(": %.3g against %.3g of noise", l.gap, l.noise_floor)}};
+                {"text", text_of(l.regime, l.test) + format(": %.3g against %.3g %s of noise", l.gap, l.noise_floor,
+                                                            in_print(l.unit).c_str())}};
     }
     for (auto& [channel, part] : strongest) {
       part["channel"] = channel;
       part["name"] = channel_words(channel);
-      part["short"] =
-          channel.starts_with("path") || channel.starts_with("rotate") ? spoken(channel) : channel_words(channel);
+      const bool long_name =
+          channel.starts_with("specific_force") || channel.starts_with("path") || channel.starts_with("rotate");
+      part["short"] = long_name ? spoken(channel) : channel_words(channel);
       parts.push_back(part);
     }
     if (parts.empty()) return;

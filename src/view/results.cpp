@@ -14,12 +14,12 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-const std::map<std::string, std::string> kChannelNames = {{"torque_x", "roll torque"},
-                                                          {"torque_y", "pitch torque"},
-                                                          {"torque_z", "yaw torque"},
-                                                          {"force_x", "forward force"},
-                                                          {"force_y", "sideways force"},
-                                                          {"force_z", "vertical force"},
+const std::map<std::string, std::string> kChannelNames = {{"angular_acceleration_x", "roll acceleration"},
+                                                          {"angular_acceleration_y", "pitch acceleration"},
+                                                          {"angular_acceleration_z", "yaw acceleration"},
+                                                          {"specific_force_x", "forward specific force"},
+                                                          {"specific_force_y", "sideways specific force"},
+                                                          {"specific_force_z", "vertical specific force"},
                                                           {"stroke_left", "left stroke"},
                                                           {"stroke_right", "right stroke"},
                                                           {"battery", "battery voltage"},

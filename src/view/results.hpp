@@ -28,7 +28,7 @@ TextTable read_text_table(const std::filesystem::path& file);
 
 std::string spoken(std::string identifier);  ///< "body_drag" -> "body drag"
 std::string spoken_list(const std::vector<std::string>& words, const char* last = "and");  ///< "a, b and c"
-std::string channel_words(const std::string& channel);  ///< "force_x" -> "forward force"
+std::string channel_words(const std::string& channel);  ///< "specific_force_x" -> "forward specific force"
 std::string in_print(std::string unit);                 ///< "m/s^2" -> "m/s²"
 /// The words of an effect's magnitude without its unit: "wind.speed_m_s" in "m/s" -> "wind (speed)".
 std::string magnitude_words(const std::string& name, const std::string& unit);

@@ -18,7 +18,9 @@ constexpr Colour kColourOf[] = {Colour::blue,   Colour::vermillion, Colour::gree
 constexpr double kHalf90 = 1.645;    ///< half a 90 % interval of the normal distribution, in standard deviations
 constexpr double kOneNumber = 0.01;  ///< p-value below which fits to single flights disagree
 
-const char* unit_of(const std::string& channel) { return channel.starts_with("torque") ? "rad/s²" : "m/s²"; }
+const char* unit_of(const std::string& channel) {
+  return channel.starts_with("angular_acceleration") ? "rad/s²" : "m/s²";
+}
 
 class ValidationPart {
  public:
@@ -64,7 +66,7 @@ class ValidationPart {
                  spoken_list(falls) + ".");
     // channels with the same unit share figures
     std::map<std::string, std::vector<std::string>> kinds;
-    for (const std::string& c : channels_) kinds[c.substr(0, c.find('_'))].push_back(c);
+    for (const std::string& c : channels_) kinds[c.substr(0, c.rfind('_'))].push_back(c);
     for (const auto& [kind, channels] : kinds) add_ladder(kind, channels);
     Json rows = Json::array();
     std::vector<std::string> head = {"rung"};
@@ -90,7 +92,7 @@ class ValidationPart {
     double most = 0;
     Figure each{.id = "ladder_" + kind,
                 .title = "What is left, one effect upon the other",
-                .note = "Rms of what is left of the measured " + kind +
+                .note = "Rms of what is left of the measured " + spoken(kind) +
                         ", each flight under the fit to the others; intervals hold 90 % of draws of blocks of the "
                         "flights. Every rung has what stands above it, too.",
                 .x = {.title = std::string("rms of what is left (") + unit_of(channels.front()) + ")", .low = 0.0},

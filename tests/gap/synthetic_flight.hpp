@@ -13,7 +13,7 @@
 
 namespace flappy::gap {
 
-/// Rows are there in the mean and the first cosine of kForceX, kForceZ and kTorqueY. The regime has an amplitude, a velocity, a height and a time.
+/// Rows are there in the mean and the first cosine of kSpecificForceX, kSpecificForceZ and kAngularAccelerationY. The regime has an amplitude, a velocity, a height and a time.
 class SyntheticFlight final : public PredictedFlight {
  public:
   static constexpr double kNoise = 0.01, kSignal = 2;
@@ -63,7 +63,8 @@ class SyntheticFlight final : public PredictedFlight {
   double beats_Hz() const override { return 34; }
   bool covers(std::size_t /*beat*/, int channel) const override { return has_rows(channel, 0); }
   bool has_rows(int channel, int coefficient) const override {
-    return (channel == kForceX || channel == kForceZ || channel == kTorqueY) && coefficient < 2;
+    return (channel == kSpecificForceX || channel == kSpecificForceZ || channel == kAngularAccelerationY) &&
+           coefficient < 2;
   }
   const Rows& measured() const override { return measured_; }
   const Rows& signal() const override {
@@ -151,10 +152,10 @@ inline void synthetic_law(const SyntheticFlight& f, const VehicleHypothesis& h, 
   static const model::Vehicle nominal = synthetic_vehicle();
   const double mass = (h.vehicle.torso.mass_kg / nominal.torso.mass_kg - 1) / 0.1;
   const double com = (h.vehicle.torso.com_m.x - nominal.torso.com_m.x) / 0.001;
-  f.add(kForceZ, 0, 0.1 * mass * f.amplitude, rows);
-  f.add(kTorqueY, 0, 0.05 * com * f.amplitude, rows);
-  f.add(kForceX, 0, 5 * value_of(h, "wind", "x_m_s") * f.velocity, rows);
-  f.add(kForceZ, 0, value_of(h, "ground_effect", "gain") * f.height_m, rows);
+  f.add(kSpecificForceZ, 0, 0.1 * mass * f.amplitude, rows);
+  f.add(kAngularAccelerationY, 0, 0.05 * com * f.amplitude, rows);
+  f.add(kSpecificForceX, 0, 5 * value_of(h, "wind", "x_m_s") * f.velocity, rows);
+  f.add(kSpecificForceZ, 0, value_of(h, "ground_effect", "gain") * f.height_m, rows);
 }
 
 inline int group_index(int channel, int coefficient) { return channel * kCoefficients + coefficient; }

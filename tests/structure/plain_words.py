@@ -23,6 +23,7 @@ PATTERNS = [
     (r"\bk(?:Most|Least)(?:[A-Z_]\w*)?\b", "", "kMax..., kMin..."),
     (r"\b(?:class|struct) (?:Story|Belief|Ailments|Companion)\b|\btell_[a-z_]+\(", "", "what they are"),
     (r"\b(?:fly|tasks|train)/gap\.toml\b", "", "aperture.toml"),
+    (r"\bk(?:Torque|Force)[XYZ]\b|\"(?:torque|force)_[xyz]\"", "gap view lab", "angular_acceleration, specific_force"),
     (r"(?i)\banother making\b|\bother makings\b", "", "simulators A, B, C"),
 ]
 
@@ -53,7 +54,8 @@ def self_test():
            "freeing_nats = 10", "std::vector<gap::Candidate>", "its minder", "kMostLanes", "kLeast = 3", "class Story {", "void tell_verdict() {", "fly/gap.toml",
            "robots of another making"]
     cases = [({}, None), ({"src/gap/x.cpp": "// beside the fit\n"}, "src/gap/x.cpp:1"), ({"src/view/x.cpp": "// beside the fit\n"}, None),
-             ({"src/gap/x.cpp": "fit_beside(h);\n"}, "src/gap/x.cpp:1"), ({"src/io/x.hpp": "bool plain_;\n"}, None)]
+             ({"src/gap/x.cpp": "fit_beside(h);\n"}, "src/gap/x.cpp:1"), ({"src/io/x.hpp": "bool plain_;\n"}, None),
+             ({"src/view/x.cpp": "channel == \"torque_x\"\n"}, "src/view/x.cpp:1"), ({"src/model/x.cpp": "\"force_x\"\n"}, None)]
     cases += [({"src/sim/x.hpp": f"// {line}\n"}, "src/sim/x.hpp:1: ") for line in bad]
     return misjudged(faults, good, cases)
 

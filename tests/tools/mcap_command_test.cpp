@@ -97,8 +97,8 @@ TEST_F(RunMcap, WritesWhatBothVehiclesPredict) {
         const auto number = [&](const Members& m) { return std::get<double>(m.at(member)); };
         ASSERT_NEAR(number(left), number(imu.at(t)) - number(predicted.at(t)), 1e-12) << vehicle << " " << member;
       }
-    EXPECT_NEAR(json["rms"]["force_x"][vehicle.substr(1)], rms(seen.at(vehicle + "/beat_residual"), "accel.linear.x"),
-                1e-9);
+    EXPECT_NEAR(json["rms"]["specific_force_x"][vehicle.substr(1)],
+                rms(seen.at(vehicle + "/beat_residual"), "accel.linear.x"), 1e-9);
   }
   // the robot's own model leaves the noise of the sensors: 0.5 m/s^2 and 0.0524 rad/s in configs/sensors
   EXPECT_LT(rms(seen.at("/corrected/residual"), "linear_acceleration.z"), 1.0);
@@ -149,7 +149,7 @@ TEST_F(RunMcap, KnowsThatTheEffectCameAfterTheReference) {
   diagnosis_.flights.clear();
   diagnosis_.verdict = {VerdictKind::effect, {"body_drag"}, false, 0.9};
   write();
-  const nlohmann::ordered_json rms = run_mcap(command_)["rms"]["force_x"];
+  const nlohmann::ordered_json rms = run_mcap(command_)["rms"]["specific_force_x"];
   EXPECT_EQ(rms["declared"], rms["corrected"]);
 }
 

@@ -125,7 +125,7 @@ TEST(Composed, RefusesWhatDoesNotFit) {
             }),
             "--goal and --vehicle describe flights, and no flight is given; accepted: a flight log, too");
   io::write_atomically(folder.path() / "half.json",
-                       R"({"schema": 2, "verdict": {}, "hypotheses": [], "locations": []})");
+                       R"({"schema": 3, "verdict": {}, "hypotheses": [], "locations": []})");
   EXPECT_EQ(
       refusal([&] { composed({folder.path() / "half.json"}, {}, packing); }),
       (folder.path() / "half.json").string() + ": key 'flights' not found; accepted: what flappy-gap diagnose wrote");
@@ -305,7 +305,8 @@ Json by_the_beat() {
     return Json{{"rms", rms}, {"low", 0.9 * rms}, {"high", 1.1 * rms}, {"by_type", by_type}};
   };
   const auto rung = [&](const char* added, double x, double z) {
-    return Json{{"added", added}, {"held_out", {{"force_x", error(x, 1.5 * x)}, {"force_z", error(z, z)}}}};
+    return Json{{"added", added},
+                {"held_out", {{"specific_force_x", error(x, 1.5 * x)}, {"specific_force_z", error(z, z)}}}};
   };
   const auto size = [](double value, const char* unit) {
     return Json{{"value", value}, {"low", value - 0.1}, {"high", value + 0.1}, {"unit", unit}};
@@ -317,7 +318,7 @@ Json by_the_beat() {
   json["locations"] = {
       {{"stage", "refit"},
        {"test", "regime"},
-       {"channel", "force_x"},
+       {"channel", "specific_force_x"},
        {"unit", "m/s^2"},
        {"regime", {{"quantity", "speed"}, {"third", "high"}, {"low", 1.0}, {"high", nullptr}, {"unit", "m/s"}}},
        {"gap", 2.0},
@@ -344,7 +345,7 @@ Json by_the_beat() {
                         hypothesis("parameters", Json::array(), 0.01, -1e9, Json::object())};
   json["unexplained"] = {{"jointly_with", {"flapping_counter_force"}},
                          {"terms",
-                          {{{"channel", "force_x"},
+                          {{{"channel", "specific_force_x"},
                             {"harmonic", 0},
                             {"function", "right_flap velocity_y"},
                             {"regime", "velocity"},
@@ -358,7 +359,10 @@ Json by_the_beat() {
   json["validation"] = {
       {"ladder", {rung("file", 2.0, 1.0), rung("parameters", 1.5, 0.9), rung("flapping_counter_force", 0.5, 0.25)}},
       {"controls",
-       {{{"effect", "flapping_counter_force"}, {"channel", "force_x"}, {"gain", 0.75}, {"best_of_shifted", 0.01}}}},
+       {{{"effect", "flapping_counter_force"},
+         {"channel", "specific_force_x"},
+         {"gain", 0.75},
+         {"best_of_shifted", 0.01}}}},
       {"agreements",
        {agreement("flapping_counter_force.x_per_s", 2.9, 3.2, 0.4),
         agreement("flapping_counter_force.z_per_s", 0.1, 0.9, 1e-4)}}};
@@ -384,10 +388,10 @@ TEST(DiagnosisSection, TellsWhatALaboratoryAsks) {
   expect_cells_of(section, json, 24 + 6 + 8);
   std::map<std::string, Figure> figures;
   for (const Figure& f : section.figures()) figures[f.id] = f;
-  const Figure &ladder = figures.at("ladder_force"), &kinds = figures.at("ladder_kinds_force");
+  const Figure &ladder = figures.at("ladder_specific_force"), &kinds = figures.at("ladder_kinds_specific_force");
   EXPECT_EQ(io::joined(ladder.categories), "vehicle's file, parameters refitted, + flapping counter force");
   ASSERT_EQ(ladder.series.size(), 2u);
-  EXPECT_EQ(ladder.series[0].name, "forward force");
+  EXPECT_EQ(ladder.series[0].name, "forward specific force");
   EXPECT_EQ(ladder.series[0].x, (std::vector<double>{2.0, 1.5, 0.5}));
   EXPECT_EQ(ladder.series[0].low, (std::vector<double>{0.9 * 2.0, 0.9 * 1.5, 0.9 * 0.5}));
   EXPECT_EQ(kinds.series[0].x, (std::vector<double>{3.0, 2.25, 0.75}));
@@ -407,7 +411,7 @@ TEST(DiagnosisSection, TellsWhatALaboratoryAsks) {
   const std::string words = words_of(section);
   const auto says = [&](const std::string& text) { return words.find(text) != std::string::npos; };
   EXPECT_TRUE(
-      says("forward force from 2 to 0.5 m/s² (90 %: 0.45 to 0.55; 0.75 where all flights of a type are held "
+      says("forward specific force from 2 to 0.5 m/s² (90 %: 0.45 to 0.55; 0.75 where all flights of a type are held "
            "out)"))
       << words;
   EXPECT_TRUE(says("each takes 75 % or more off the rms where it takes most, its shifted copies 1 % at best")) << words;

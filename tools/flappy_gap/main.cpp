@@ -187,7 +187,8 @@ int main(int argc, char** argv) {
   takes_constants(diagnose, command.settings);
   diagnose.option("--manoeuvre", command.settings.manoeuvre,
                   "what was flown, as a configuration of flappy-fly; else the recorded paths, under its hover's");
-  diagnose.option("--channels", command.settings.channels, "of a beat-averaged vehicle: only these, as force_x");
+  diagnose.option("--channels", command.settings.channels,
+                  "of a beat-averaged vehicle: only these, as specific_force_x");
   diagnose.option("--withhold", command.settings.withheld, "effects to leave out of the catalogue");
   std::string software;
   diagnose.option("--flown", software,

@@ -83,18 +83,18 @@ VehicleTopics topics_of(const std::string& name, const std::shared_ptr<const Pre
     io::refuse(file, "its simulation of this flight diverges, or no part of the flight can be replayed",
                "a vehicle that flies what was flown");
   for (std::size_t j = 0; j < seen->beats(); ++j) {
-    if (!seen->covers(j, kForceX) || !seen->covers(j, kTorqueX)) continue;
+    if (!seen->covers(j, kSpecificForceX) || !seen->covers(j, kAngularAccelerationX)) continue;
     const auto mean = [&](int channel) {
       return left.front()[j * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients];
     };
     topics.beats.push_back({seen->recording()->regimes[j].t_s,
-                            {mean(kForceX), mean(kForceY), mean(kForceZ)},
-                            {mean(kTorqueX), mean(kTorqueY), mean(kTorqueZ)}});
+                            {mean(kSpecificForceX), mean(kSpecificForceY), mean(kSpecificForceZ)},
+                            {mean(kAngularAccelerationX), mean(kAngularAccelerationY), mean(kAngularAccelerationZ)}});
   }
   return topics;
 }
 
-/// Forces, then torques, in the order of the axes.
+/// Specific forces, then angular accelerations, in the order of the axes.
 std::array<double, 6> rms_of(const std::vector<VehicleTopics::Beat>& beats) {
   std::array<double, 6> rms{};
   for (const VehicleTopics::Beat& b : beats)
@@ -138,12 +138,13 @@ Json run_mcap(const McapCommand& command) {
   for (const auto& [file, name] : layouts) io::write_atomically(file, io::read_text(io::config_path(name)));
 
   std::printf("%s: %llu messages\n", command.out.c_str(), static_cast<unsigned long long>(messages));
-  std::printf("rms of measured less predicted, means of beats:\n  %-8s %10s %10s\n", "", "declared", "corrected");
+  std::printf("rms of measured less predicted, means of beats:\n  %-22s %10s %10s\n", "", "declared", "corrected");
   const std::array<double, 6> before = rms_of(vehicles[0].beats), after = rms_of(vehicles[1].beats);
-  constexpr std::array<int, 6> kShown = {kForceX, kForceY, kForceZ, kTorqueX, kTorqueY, kTorqueZ};
+  constexpr std::array<int, 6> kShown = {kSpecificForceX,       kSpecificForceY,       kSpecificForceZ,
+                                         kAngularAccelerationX, kAngularAccelerationY, kAngularAccelerationZ};
   Json rms = Json::object();
   for (std::size_t k = 0; k < kShown.size(); ++k) {
-    std::printf("  %-8s %10.3g %10.3g %s\n", channel_name(kShown[k]), before[k], after[k], channel_unit(kShown[k]));
+    std::printf("  %-22s %10.3g %10.3g %s\n", channel_name(kShown[k]), before[k], after[k], channel_unit(kShown[k]));
     rms[channel_name(kShown[k])] = {
         {"declared", before[k]}, {"corrected", after[k]}, {"unit", channel_unit(kShown[k])}};
   }

@@ -29,7 +29,8 @@ std::vector<int> read_channels(const std::vector<std::string>& names, bool beat_
   if (!names.empty() && !beat_averaged)
     throw io::InputError("--channels: is for a beat-averaged vehicle; accepted: all channels of this one");
   std::vector<std::string> known;
-  for (int channel = kTorqueX; channel <= kForceZ; ++channel) known.emplace_back(channel_name(channel));
+  for (int channel = kAngularAccelerationX; channel <= kSpecificForceZ; ++channel)
+    known.emplace_back(channel_name(channel));
   std::vector<int> list;
   for (const std::string& name : names) {
     const auto at = std::ranges::find(known, name);

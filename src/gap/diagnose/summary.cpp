@@ -213,7 +213,7 @@ std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::strin
   lines.push_back(locations.empty() ? "with parameters refitted nothing stands out of the noise"
                                     : "where the gap lies, with parameters refitted (rms, that of noise):");
   for (const ResidualLocation& p : locations)
-    lines.push_back(io::format("  %-12s %-34s %8.3g, noise %.3g %s", p.channel.c_str(),
+    lines.push_back(io::format("  %-22s %-34s %8.3g, noise %.3g %s", p.channel.c_str(),
                                text_of(p.regime, p.test).c_str(), p.gap, p.noise_floor, p.unit.c_str()));
   const auto loss = [](const std::optional<double>& e) { return e ? io::format("%.3g", *e) : std::string("-"); };
   lines.push_back("mean loss in flights held out: vehicle's file " + loss(diagnosis.nominal_loss) +
@@ -240,14 +240,14 @@ std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::strin
   if (diagnosis.validation) {
     std::string head = "rms in flights held out (in kinds of flights):";
     for (const HeldOutError& e : diagnosis.validation->ladder.front().errors)
-      head += io::format(" %18s", e.channel.c_str());
+      head += io::format(" %22s", e.channel.c_str());
     lines.push_back(head);
     for (const Validation::Rung& rung : diagnosis.validation->ladder) {
       std::string line = io::format(
           "  %-44s",
           ((&rung == &diagnosis.validation->ladder.front() || rung.added == "parameters" ? "" : "+ ") + rung.added)
               .c_str());
-      for (const HeldOutError& e : rung.errors) line += io::format("  %8.3f (%6.3f)", e.rms, e.by_type);
+      for (const HeldOutError& e : rung.errors) line += io::format("  %12.3f (%6.3f)", e.rms, e.by_type);
       lines.push_back(line);
     }
     for (const Validation::Control& c : diagnosis.validation->controls)

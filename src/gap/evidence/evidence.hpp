@@ -91,7 +91,7 @@ struct Reduced {
 
 // Rows, groups and blocks. A row is one number of one flight; delta has a coefficient for each group and function:
 //
-//               channel         torque_x                torque_y        ...   rotate_z
+//               channel         angular_acceleration_x  ..._y           ...   rotate_z
 //               coefficient     mean cos1 sin1 ... sin4  mean cos1 ...         mean ... sin4
 //   flight 1    beat 1          |    |    |        |                                          a beat: kRowsPerBeat rows
 //               beat 2          |    |    |        |

@@ -96,8 +96,8 @@ void expect(const Robots& robots, const ModelDiscrepancy& now, ShareMoments& sha
 }
 
 /// First and last of the channels that are shrunk towards their mean.
-constexpr std::array<std::pair<int, int>, 7> kAlike = {{{kTorqueX, kTorqueZ},
-                                                        {kForceX, kForceZ},
+constexpr std::array<std::pair<int, int>, 7> kAlike = {{{kAngularAccelerationX, kAngularAccelerationZ},
+                                                        {kSpecificForceX, kSpecificForceZ},
                                                         {kStrokeLeft, kStrokeRight},
                                                         {kBattery, kBattery},
                                                         {kCurrentLeft, kCurrentRight},

@@ -21,7 +21,7 @@ BasisCoefficients spread_of(const Evidence& evidence, const BasisCoefficients& c
   const RegimeBasis& basis = evidence.basis();
   const auto kind = [](int g) {
     const int channel = g / kCoefficients;
-    return channel <= kTorqueZ ? 0 : channel <= kForceZ ? 1 : 2;
+    return channel <= kAngularAccelerationZ ? 0 : channel <= kSpecificForceZ ? 1 : 2;
   };
   MatrixXd squares = MatrixXd::Zero(3, basis.size());
   VectorXd groups = VectorXd::Zero(3);

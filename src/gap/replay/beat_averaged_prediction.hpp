@@ -5,8 +5,8 @@
 // Inputs pass the motion's low-pass (flightlog/beat_averaged_motion.hpp). Nothing is integrated, so no error
 // accumulates. Rows are about half a period of the bandwidth apart: closer ones would not be independent. Loads come
 // from the vehicle file or, if its model is "predicted", from predicted.csv (predicted_loads.hpp) through the same
-// filter. Effects act on both, except those of the drive, which predicted loads contain. Force channels always have
-// rows; torque channels if the vehicle has and compares moments, or the caller selects them. Rows count where the
+// filter. Effects act on both, except those of the drive, which predicted loads contain. Specific forces always have
+// rows; angular accelerations if the vehicle has and compares moments, or the caller selects them. Rows count where the
 // origin is at least the vehicle's extent.below_m above the ground.
 #pragma once
 
@@ -44,9 +44,11 @@ class BeatAveragedPrediction final : public PredictedFlight {
   bool covers(std::size_t beat, int channel) const override {
     return has_rows(channel, 0) && motion_.seen[rows_[beat]] != 0 && (!disturbed(channel) || is_trim_[beat] != 0);
   }
-  bool disturbed(int channel) const override { return nominal_.beat_averaged->trims && channel <= kTorqueZ; }
+  bool disturbed(int channel) const override {
+    return nominal_.beat_averaged->trims && channel <= kAngularAccelerationZ;
+  }
   bool has_rows(int channel, int coefficient) const override {
-    return coefficient == 0 && channel <= kForceZ && shown_[static_cast<std::size_t>(channel)];
+    return coefficient == 0 && channel <= kSpecificForceZ && shown_[static_cast<std::size_t>(channel)];
   }
   const Rows& measured() const override { return measured_; }
   const Rows& signal() const override { return signal_; }
@@ -81,7 +83,7 @@ class BeatAveragedPrediction final : public PredictedFlight {
   std::string name_;
   flightlog::FlightLog log_;
   model::Vehicle nominal_;
-  std::array<bool, kForceZ + 1> shown_{};  ///< [channel]
+  std::array<bool, kSpecificForceZ + 1> shown_{};  ///< [channel]
   flightlog::BeatAveragedMotion motion_;
   std::size_t stride_;
   std::vector<std::size_t> rows_;            ///< [row] index into the grid of the motion

@@ -16,12 +16,12 @@
 namespace flappy::gap {
 
 enum Channel : int {
-  kTorqueX,
-  kTorqueY,
-  kTorqueZ,  ///< angular acceleration, rad/s^2, B
-  kForceX,
-  kForceY,
-  kForceZ,  ///< specific force at the IMU, or for beat-averaged vehicles at the torso origin, m/s^2, B
+  kAngularAccelerationX,
+  kAngularAccelerationY,
+  kAngularAccelerationZ,  ///< rad/s^2, B
+  kSpecificForceX,
+  kSpecificForceY,
+  kSpecificForceZ,  ///< at the IMU, or for beat-averaged vehicles at the torso origin, m/s^2, B
   kStrokeLeft,
   kStrokeRight,  ///< stroke angle, rad; only where logged
   kBattery,      ///< battery voltage, V; only where logged
@@ -102,7 +102,7 @@ class PredictedFlight {
   virtual bool disturbed(int /*channel*/) const { return false; }
   virtual const Rows& measured() const = 0;
   /// The signal of each channel, which the model discrepancy is a share of: the measured rows. Exceptions for vehicles
-  /// with wings and motors: for torque the recorded angular acceleration, as the rows are already differences from it;
+  /// with wings and motors: for the angular acceleration the recorded one, as the rows are already differences from it;
   /// for the battery its voltage less the full voltage; for path and turn constants. For moments that an autopilot
   /// counteracts, which add up to nothing: the root of the sum of their squares.
   virtual const Rows& signal() const = 0;

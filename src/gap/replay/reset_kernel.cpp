@@ -41,8 +41,8 @@ void reset_block(sim::Block<Flown>& block, const TorsoAt* from, const TorsoAt& t
       const Matrix3<V> halfway = rotation_matrix(rotated(begin, all(0.25) * turn));
       const Vec3<V> missed =
           per_interval * flight::rotation_vector(flight::from_to(flown.attitude, quaternion(to.attitude)));
-      store(all(-1) * per_interval * missed, kept.rows + kTurning, first);
-      store(transpose_times(halfway, force), kept.rows + kForce, first);
+      store(all(-1) * per_interval * missed, kept.rows + kAngularAcceleration, first);
+      store(transpose_times(halfway, force), kept.rows + kSpecificForce, first);
       x.left.stroke_rad.store(kept.rows[kStroke] + first);
       x.right.stroke_rad.store(kept.rows[kStroke + 1] + first);
       x.body_rate_rad_s = x.body_rate_rad_s + missed;

@@ -19,9 +19,9 @@ struct TorsoAt {
 
 /// Rows of lanes: what the sensors of each vehicle would have measured over an interval.
 enum ResetRow : int {
-  kTurning = 0,  ///< mean angular acceleration over the interval, simulated less recorded, rad/s^2, B: 3 rows
-  kForce = 3,    ///< mean specific force at the IMU, m/s^2, in B half-way through the interval: 3 rows
-  kStroke = 6,   ///< stroke angle at the end of the interval, rad: left, right
+  kAngularAcceleration = 0,  ///< mean over the interval, simulated less recorded, rad/s^2, B: 3 rows
+  kSpecificForce = 3,        ///< mean at the IMU, m/s^2, in B half-way through the interval: 3 rows
+  kStroke = 6,               ///< stroke angle at the end of the interval, rad: left, right
   kResetRows = 8
 };
 

@@ -19,8 +19,8 @@ namespace {
 /// Channels predicted at every interval of the IMU, and those that the power meter samples.
 constexpr std::size_t kSignals = kBattery, kMetered = sim::kMeterRows;
 static_assert(kPathX == kSignals + kMetered);
-static_assert(kTorqueX == int{kTurning} && kForceX == int{kForce} && kStrokeLeft == int{kStroke} &&
-              kSignals == kResetRows);
+static_assert(kAngularAccelerationX == int{kAngularAcceleration} && kSpecificForceX == int{kSpecificForce} &&
+              kStrokeLeft == int{kStroke} && kSignals == kResetRows);
 
 /// Samples of all lanes.
 constexpr std::size_t kSample = kSignals * kVehicles, kMeter = kMetered * kVehicles;
@@ -69,7 +69,7 @@ ResetPrediction::ResetPrediction(Recording recording) : recording_(std::move(rec
   has_wings_ = r.log.wings.has_value();
   for (std::size_t k = 0; k < r.intervals(); ++k) {
     double* s = &samples[k * kSignals];
-    for (int i = 0; i < 3; ++i) s[kForceX + i] = r.force_m_s2[k][i];
+    for (int i = 0; i < 3; ++i) s[kSpecificForceX + i] = r.force_m_s2[k][i];
     if (!has_wings_) continue;
     const auto strokes = flightlog::strokes_at(*r.log.wings, r.log.header.wings->rate_hz, r.end_s[k]);
     if (std::isfinite(strokes[0])) s[kStrokeLeft] = strokes[0], s[kStrokeRight] = strokes[1];
@@ -80,7 +80,7 @@ ResetPrediction::ResetPrediction(Recording recording) : recording_(std::move(rec
   measured_ = rows_of(samples);
   for (std::size_t k = 0; k < r.intervals(); ++k)
     for (std::size_t i = 0; i < 3; ++i)
-      samples[k * kSignals + kTorqueX + i] =
+      samples[k * kSignals + kAngularAccelerationX + i] =
           (r.torso[k + 1].body_rate_rad_s[i] - r.torso[k].body_rate_rad_s[i]) / r.interval_s(k);
   signal_ = rows_of(samples);
   if (r.log.power) {
@@ -167,7 +167,9 @@ void ResetPrediction::compare_streams() {
 /// Weighs mean forces over beats like a second difference of positions, in W; result in B. `more_m_s2`: added in W,
 /// [axis][beat]: for measured forces, what motion capture says beyond the IMU.
 void ResetPrediction::smooth_forces(Rows& rows, const Eigen::Matrix3Xd& more_m_s2) const {
-  const auto row = [&](std::size_t j, std::size_t i) { return j * kRowsPerBeat + (kForceX + i) * kCoefficients; };
+  const auto row = [&](std::size_t j, std::size_t i) {
+    return j * kRowsPerBeat + (kSpecificForceX + i) * kCoefficients;
+  };
   std::vector<Eigen::Vector3d> force(recording_.beats);
   for (std::size_t j = 0; j < recording_.beats; ++j)
     force[j] = attitude_[j] * Eigen::Vector3d(rows[row(j, 0)], rows[row(j, 1)], rows[row(j, 2)]);
@@ -210,9 +212,9 @@ Rows ResetPrediction::declared_noise(std::uint64_t seed) const {
     for (int i = 0; i < 3; ++i) {
       // the simulation was reset to a rate that has the noise of the sample before
       const double rate = h.imu.gyro_noise_rad_s * normal(random);
-      s[kTorqueX + i] = (rate - before[i]) / recording_.interval_s(k);
+      s[kAngularAccelerationX + i] = (rate - before[i]) / recording_.interval_s(k);
       before[i] = rate;
-      s[kForceX + i] = h.imu.accel_noise_m_s2 * normal(random);
+      s[kSpecificForceX + i] = h.imu.accel_noise_m_s2 * normal(random);
     }
     for (int i = 0; i < 2; ++i) s[kStrokeLeft + i] = recording_.log.wings ? h.wings->noise_rad * normal(random) : 0;
   }
@@ -228,14 +230,15 @@ Rows ResetPrediction::declared_noise(std::uint64_t seed) const {
   const std::vector<StreamRow> streams = stream_noise(recording_, seed, true);
   for (std::size_t j = 0; j < recording_.beats; ++j)
     for (std::size_t i = 0; i < 3; ++i)
-      rows[j * kRowsPerBeat + (kForceX + i) * kCoefficients] = streams[j].path_m_s2[static_cast<Eigen::Index>(i)];
+      rows[j * kRowsPerBeat + (kSpecificForceX + i) * kCoefficients] =
+          streams[j].path_m_s2[static_cast<Eigen::Index>(i)];
   return rows;
 }
 
 bool ResetPrediction::covers(std::size_t beat, int channel) const {
   if (channel >= kPathX) return compared_[beat] != 0;
   if (channel >= kBattery) return imu_.covers(beat) && beat < power_.beats() && power_.covers(beat);
-  if (channel >= kForceX && channel <= kForceZ) return smoothed_[beat] != 0;
+  if (channel >= kSpecificForceX && channel <= kSpecificForceZ) return smoothed_[beat] != 0;
   if (channel >= kStrokeLeft) return has_wings_ && imu_.covers(beat) && wings_.covers(beat);
   return imu_.covers(beat);
 }
@@ -342,8 +345,8 @@ std::vector<ImuResidual> ResetPrediction::imu_residuals(const VehicleHypothesis&
       const auto predicted = [&](int row) {
         return double{seen.samples[k * kSample + static_cast<std::size_t>(row + i) * kVehicles]};
       };
-      left.force_m_s2[i] -= predicted(kForceX);
-      left.rate_rad_s[i] = -r.interval_s(k) * predicted(kTorqueX);
+      left.force_m_s2[i] -= predicted(kSpecificForceX);
+      left.rate_rad_s[i] = -r.interval_s(k) * predicted(kAngularAccelerationX);
     }
     list.push_back(left);
   }

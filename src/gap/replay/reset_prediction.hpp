@@ -28,7 +28,8 @@ class ResetPrediction final : public PredictedFlight {
   bool has_ground() const override { return recording_.world.has_ground(); }
   std::size_t beats() const override { return recording_.beats; }
   double beats_Hz() const override { return recording_.log.header.flapping_Hz; }
-  /// Force needs mocap in the beat and the IMU in two more on each side; path and turn need mocap, the others a log.
+  /// Specific force needs mocap in the beat and the IMU in two more on each side; path and turn need mocap, the others
+  /// a log.
   bool covers(std::size_t beat, int channel) const override;
   /// Coefficient 0 is the mean of a beat, the others are its harmonics; path and turn have only the mean.
   bool has_rows(int channel, int coefficient) const override { return channel < kPathX || coefficient == 0; }

@@ -9,7 +9,7 @@
 namespace flappy::gap {
 
 /// Schema of diagnosis.json. Size: a number of the format.
-inline constexpr int kDiagnosisSchema = 2;
+inline constexpr int kDiagnosisSchema = 3;
 /// Files of a diagnosis in its folder.
 inline constexpr const char *kDiagnosisFile = "diagnosis.json", *kVehicleFile = "vehicle_corrected.toml";
 

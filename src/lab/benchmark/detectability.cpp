@@ -27,7 +27,8 @@ constexpr double kMaxDetectable = 2, kMaxHover = 1000;
 /// Only rich flight has these. Effects that act in them alone need a contrast of their own in hover.
 constexpr const char* kOfFlight[] = {"height", "ceiling",      "wall",    "place",      "velocity",
                                      "rate",   "acceleration", "heading", "difference", "bias"};
-constexpr const char* kChannels[] = {"force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z"};
+constexpr const char* kChannels[] = {"specific_force_x",       "specific_force_y",       "specific_force_z",
+                                     "angular_acceleration_x", "angular_acceleration_y", "angular_acceleration_z"};
 constexpr const char* kOrders[] = {"mean", "first harmonic", "second harmonic"};
 
 /// Mean square of the waveform of one order of a beat.
@@ -58,7 +59,7 @@ Detectable detectable_of(const blind::FamilyEffect& effect, const std::vector<Fo
     if (f.where.share > s.where.share) s.where = f.where;
   }
   s.of_sensors = s.where.share == 0 && std::ranges::none_of(effect.channels, [](const std::string& c) {
-                   return c.starts_with("force") || c.starts_with("torque");
+                   return c.starts_with("specific_force") || c.starts_with("angular_acceleration");
                  });
   if (s.of_sensors) magnitudes = {1}, hovers = {1};
   s.detectable = io::median(magnitudes);

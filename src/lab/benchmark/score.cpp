@@ -187,11 +187,19 @@ ScoreLine redeclared_line(const Cases& cases, const Cases& singles) {
 }
 
 /// A maker's word, and how the channels and regimes of a diagnosis that it covers begin.
-constexpr std::pair<const char*, const char*> kCovers[] = {
-    {"mocap", "path_"},          {"mocap", "rotate_"},       {"gyro", "torque_"},     {"gyro", "rotate_"},
-    {"accelerometer", "force_"}, {"accelerometer", "path_"}, {"current", "current_"}, {"current", "battery"},
-    {"place", "height"},         {"place", "ceiling"},       {"place", "wall"},       {"temperature", "time"},
-    {"stroke", "always"}};
+constexpr std::pair<const char*, const char*> kCovers[] = {{"mocap", "path_"},
+                                                           {"mocap", "rotate_"},
+                                                           {"gyro", "angular_acceleration_"},
+                                                           {"gyro", "rotate_"},
+                                                           {"accelerometer", "specific_force_"},
+                                                           {"accelerometer", "path_"},
+                                                           {"current", "current_"},
+                                                           {"current", "battery"},
+                                                           {"place", "height"},
+                                                           {"place", "ceiling"},
+                                                           {"place", "wall"},
+                                                           {"temperature", "time"},
+                                                           {"stroke", "always"}};
 
 bool covered(const Names& sealed, const std::string& said) {
   return std::ranges::any_of(sealed, [&](const std::string& word) {

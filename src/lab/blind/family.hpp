@@ -17,9 +17,9 @@ namespace flappy::blind {
 struct FamilyEffect {
   std::string id;       ///< id of the catalogue's effect with this cause; outside_* if the catalogue has none
   std::string typical;  ///< the effect at magnitude 1, in words and units
-  /// Sealed with a case: channels in which it acts (force_x .. torque_z in B, gyro, accelerometer, mocap, current), and
-  /// quantities with which it grows ("always", height, ceiling, wall, place, amplitude, difference, bias, split_cycle,
-  /// velocity, rate, acceleration, time, temperature, charge, stroke, heading).
+  /// Sealed with a case: channels in which it acts (specific_force_x .. angular_acceleration_z in B, gyro, accelerometer,
+  /// mocap, current), and quantities with which it grows ("always", height, ceiling, wall, place, amplitude, difference,
+  /// bias, split_cycle, velocity, rate, acceleration, time, temperature, charge, stroke, heading).
   std::vector<std::string> channels, regimes;
 };
 

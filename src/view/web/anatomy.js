@@ -57,10 +57,10 @@ function sideOf(sign) {
 
 /** @param {string} channel @returns {{points: number[][], label: number[]} | null} */
 function shapeOf(channel) {
-  const [kind, which] = channel.split("_");
+  const at = channel.lastIndexOf("_"), kind = at < 0 ? channel : channel.slice(0, at), which = channel.slice(at + 1);
   const axis = /** @type {"x" | "y" | "z"} */ (which), way = kAxes[axis];
-  if (kind === "force") return {points: [0.016, 0.066].map((length) => way.map((v) => v * length)), label: way.map((v) => v * 0.076)};
-  if (kind === "torque") {
+  if (kind === "specific_force") return {points: [0.016, 0.066].map((length) => way.map((v) => v * length)), label: way.map((v) => v * 0.076)};
+  if (kind === "angular_acceleration") {
     const along = axis === "z" ? 0.05 : 0.042, aside = {x: [0, -0.016, 0.012], y: [0, 0.004, -0.026], z: [0, 0.04, 0]}[axis];
     return {points: arcAbout(axis, 0.013, along), label: way.map((v, k) => v * along + aside[k])};
   }

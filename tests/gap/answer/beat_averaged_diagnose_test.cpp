@@ -185,7 +185,8 @@ TEST(BeatAveragedDiagnosis, SaysTheSameOfForcesThatItsSimulatorPredicted) {
   EXPECT_LT((magnitudes(d) - magnitudes(by_equations)).cwiseAbs().maxCoeff(), 1e-3);
   for (std::size_t f = 0; f < d.nominal.size(); ++f)
     for (std::size_t i = 0; i < d.nominal[f].size(); i += kRowsPerBeat)
-      for (std::size_t k = i + kForceX * kCoefficients; k <= i + kForceZ * kCoefficients; k += kCoefficients)
+      for (std::size_t k = i + kSpecificForceX * kCoefficients; k <= i + kSpecificForceZ * kCoefficients;
+           k += kCoefficients)
         ASSERT_NEAR(d.nominal[f][k], by_equations.nominal[f][k], 1e-9) << f << " " << k;
   // what is between inputs and wings is in the forces already
   for (const char* id : {"command_delay", "driver_bandwidth", "battery_thrust"})
@@ -252,10 +253,10 @@ TEST(BeatAveragedDiagnosis, PredictsWhatTheSimulatorFlies) {
     return left(flight, v);
   };
   for (int c = 0; c < 6; ++c) EXPECT_LT(with[static_cast<std::size_t>(c)], c < 3 ? 0.45 : 0.06) << channel_name(c);
-  EXPECT_GT(without("flapping_counter_force")[kForceX], 5 * with[kForceX]);
-  EXPECT_GT(without("flapping_counter_force")[kForceY], 4 * with[kForceY]);
-  EXPECT_GT(without("stroke_plane_actuation")[kForceX], 5 * with[kForceX]);
-  for (const int c : {kTorqueX, kTorqueY, kTorqueZ})
+  EXPECT_GT(without("flapping_counter_force")[kSpecificForceX], 5 * with[kSpecificForceX]);
+  EXPECT_GT(without("flapping_counter_force")[kSpecificForceY], 4 * with[kSpecificForceY]);
+  EXPECT_GT(without("stroke_plane_actuation")[kSpecificForceX], 5 * with[kSpecificForceX]);
+  for (const int c : {kAngularAccelerationX, kAngularAccelerationY, kAngularAccelerationZ})
     EXPECT_GT(without("driver_bandwidth")[static_cast<std::size_t>(c)], 4 * with[static_cast<std::size_t>(c)]);
 }
 

@@ -33,8 +33,8 @@ TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
   Fit fit = fitter.fit(none, none.start(), 4);
   take(evidence.with_weights(fit.residual));
   fit = fitter.refit(none, fit, 3);
-  const int groups[] = {kTorqueX * kCoefficients, kTorqueZ * kCoefficients + 1, kForceY * kCoefficients,
-                        kStrokeLeft * kCoefficients};
+  const int groups[] = {kAngularAccelerationX * kCoefficients, kAngularAccelerationZ * kCoefficients + 1,
+                        kSpecificForceY * kCoefficients, kStrokeLeft * kCoefficients};
   std::vector<double> declared;
   const Rows noise = flights[0]->declared_noise(1);
   for (const int g : groups) {
@@ -47,7 +47,7 @@ TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
   // what a right model leaves is noise as declared, to the 8 % of a median of 200, and no less by definition; of the mean force also
   // that of the motion to which the torso is reset
   for (std::size_t i = 0; i < declared.size(); ++i)
-    EXPECT_LT(evidence.noise_sd(groups[i]), (groups[i] == kForceY * kCoefficients ? 1.7 : 1.35) * declared[i])
+    EXPECT_LT(evidence.noise_sd(groups[i]), (groups[i] == kSpecificForceY * kCoefficients ? 1.7 : 1.35) * declared[i])
         << groups[i];
   fit = fitter.refit(none, fit, 3);
   const model::Vehicle truth = model::read_vehicle(kTestConfigs + "vehicles/hummingbird_identified.toml");
@@ -146,7 +146,7 @@ TEST(Diagnose, NamesNoEffectForWhatAnyRobotMayHave) {
   const auto left = [&](const Residuals& residual) {
     double sum = 0, n = 0;
     for (std::size_t j = 0; j < flights[0]->beats(); ++j)
-      for (int g = kTorqueX * kCoefficients; g < (kForceZ + 1) * kCoefficients; ++g)
+      for (int g = kAngularAccelerationX * kCoefficients; g < (kSpecificForceZ + 1) * kCoefficients; ++g)
         if (flights[0]->covers(j, g / kCoefficients)) {
           const auto row = static_cast<std::size_t>(g);
           sum += std::pow(residual[0][j * kRowsPerBeat + row] / d.noise_sd[row], 2);

@@ -19,7 +19,7 @@ TEST(Summary, SaysWhatToDoInThirtyLines) {
   for (int i = 0; i < 50; ++i) {
     r.locations.push_back({Stage::refit,
                            i % 2 == 0 ? ResidualTest::regime : ResidualTest::phase,
-                           "force_x",
+                           "specific_force_x",
                            "m/s^2",
                            {"height", Regime::Third::low, {}, 1, "m"},
                            2,
@@ -30,7 +30,7 @@ TEST(Summary, SaysWhatToDoInThirtyLines) {
   }
   r.locations.push_back({Stage::refit,
                          ResidualTest::frequency,
-                         "torque_x",
+                         "angular_acceleration_x",
                          "rad/s^2",
                          {"frequency", Regime::Third::all, 0, 0.5, "Hz"},
                          2,

@@ -14,7 +14,7 @@ TEST(Evidence, IntegratesOutInClosedForm) {
   const Evidence evidence(question_of(flights), flights, read_model_discrepancy(), 1);
   const SufficientStatistics s = evidence.statistics({made[0]->measured()}),
                              zero = evidence.statistics({Rows(made[0]->measured().size(), 0)});
-  const int group = group_index(kForceX, 1), function = 2;
+  const int group = group_index(kSpecificForceX, 1), function = 2;
   const auto g = static_cast<std::size_t>(group);
   const BasisCoefficients none = BasisCoefficients::Zero(kGroups, evidence.basis().size());
   BasisCoefficients unit = none;
@@ -47,7 +47,7 @@ TEST(Evidence, LearnsTheNoise) {
   const auto made = synthetic_flights(2, synthetic_law);
   const Flights flights = as_flights(made);
   const Evidence declared(question_of(flights), flights, read_model_discrepancy(), 1);
-  const int group = group_index(kForceZ, 0);
+  const int group = group_index(kSpecificForceZ, 0);
   EXPECT_NEAR(declared.noise_sd(group), SyntheticFlight::kNoise, 0.2 * SyntheticFlight::kNoise);
   Residuals residual;
   for (const auto& f : made) {
@@ -75,10 +75,10 @@ TEST(Evidence, CountsRowsFarOffForLess) {
   const Flights flights = as_flights(made);
   const Evidence evidence(question_of(flights), flights, read_model_discrepancy(), 1);
   Rows spiked = made[0]->noise(5);
-  const std::size_t row = 60 * kRowsPerBeat + static_cast<std::size_t>(group_index(kForceX, 0));
+  const std::size_t row = 60 * kRowsPerBeat + static_cast<std::size_t>(group_index(kSpecificForceX, 0));
   spiked[row] += 100 * SyntheticFlight::kNoise;
   const auto moved = [&](const Evidence& e) {
-    const auto g = static_cast<std::size_t>(group_index(kForceX, 0));
+    const auto g = static_cast<std::size_t>(group_index(kSpecificForceX, 0));
     Rows without = spiked;
     without[row] -= 100 * SyntheticFlight::kNoise;
     return std::abs(e.statistics({spiked}).sums[0][g][0] - e.statistics({without}).sums[0][g][0]);
@@ -92,8 +92,8 @@ TEST(Evidence, FindsTheSmoothPartOfRows) {
   const Flights flights = as_flights(made);
   const Evidence evidence(question_of(flights), flights, read_model_discrepancy(), 1);
   BasisCoefficients smooth = BasisCoefficients::Zero(kGroups, evidence.basis().size());
-  smooth(group_index(kForceZ, 1), 3) = 0.4;
-  smooth(group_index(kTorqueY, 0), 1) = -2;
+  smooth(group_index(kSpecificForceZ, 1), 3) = 0.4;
+  smooth(group_index(kAngularAccelerationY, 0), 1) = -2;
   const Rows rows = evidence.without(0, Rows(made[0]->measured().size(), 0), -smooth);
   // a ridge of 1e-6 takes as much of them
   EXPECT_NEAR((evidence.basis_coefficients({rows}) - smooth).cwiseAbs().maxCoeff(), 0, 1e-5);
@@ -111,16 +111,16 @@ TEST(Evidence, ScalesTheDiscrepancyByBlocks) {
   const Flights flights = as_flights(made);
   const ModelDiscrepancy discrepancy = read_model_discrepancy();
   const Evidence evidence(question_of(flights), flights, discrepancy, 1);
-  const int group = group_index(kForceZ, 0);
+  const int group = group_index(kSpecificForceZ, 0);
   const BasisCoefficients sd = evidence.discrepancy_sd({});
-  EXPECT_DOUBLE_EQ(sd(group, 1), evidence.signal(group) * discrepancy.share(kForceZ, 0, BasisFunction::input));
+  EXPECT_DOUBLE_EQ(sd(group, 1), evidence.signal(group) * discrepancy.share(kSpecificForceZ, 0, BasisFunction::input));
   Scales scales;
   scales.blocks.assign(kBlocks, 1);
   scales.blocks[static_cast<std::size_t>(evidence.block_of(group, 1))] = 3;
   const BasisCoefficients scaled = evidence.discrepancy_sd(scales);
   EXPECT_DOUBLE_EQ(scaled(group, 1), 3 * sd(group, 1));
   EXPECT_EQ(scaled(group, 0), sd(group, 0));
-  EXPECT_EQ(scaled(group_index(kForceX, 0), 1), sd(group_index(kForceX, 0), 1));
+  EXPECT_EQ(scaled(group_index(kSpecificForceX, 0), 1), sd(group_index(kSpecificForceX, 0), 1));
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ TEST_F(Weigh, FindsHowFarModelsOfARobotAreOff) {
   const Evidence evidence(question_of(flights_), flights_, discrepancy, 1);
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
-  const int freed = evidence.block_of(group_index(kForceZ, 0), 1);
+  const int freed = evidence.block_of(group_index(kSpecificForceZ, 0), 1);
   BasisCoefficients delta = evidence.discrepancy_sd({});
   for (int g = 0; g < kGroups; ++g)
     for (int i = 0; i < evidence.basis().size(); ++i)
@@ -63,7 +63,7 @@ TEST_F(Weigh, FindsHowFarModelsOfARobotAreOff) {
 // and costs the second term.
 TEST_F(Weigh, FindsALargeBackgroundMagnitude) {
   const Evidence evidence(question_of(flights_), flights_, read_model_discrepancy(), 1);
-  const int group = group_index(kForceX, 0);
+  const int group = group_index(kSpecificForceX, 0);
   BasisCoefficients column = BasisCoefficients::Zero(kGroups, evidence.basis().size());
   column(group, 0) = 1;
   const double sum = statistics_of(evidence, flights_, column).sums[0][static_cast<std::size_t>(group)][0];
@@ -95,7 +95,7 @@ TEST_F(Weigh, FindsALargeBackgroundMagnitude) {
 // What the laws of effects get wrong takes part in the variance, and no scale changes it.
 TEST_F(Weigh, TakesWhatLawsGetWrong) {
   const Evidence evidence(question_of(flights_), flights_, read_model_discrepancy(), 1);
-  const int group = group_index(kForceZ, 0);
+  const int group = group_index(kSpecificForceZ, 0);
   BasisCoefficients delta = BasisCoefficients::Zero(kGroups, evidence.basis().size());
   delta(group, 3) = 30 * evidence.discrepancy_sd({})(group, 3);
   const SufficientStatistics s = statistics_of(evidence, flights_, delta);
@@ -110,7 +110,7 @@ TEST_F(Weigh, TakesWhatLawsGetWrong) {
 TEST_F(Weigh, CostsNothingWhereAllScalesAreOne) {
   const Evidence evidence(question_of(flights_), flights_, read_model_discrepancy(), 1);
   BasisCoefficients unit = BasisCoefficients::Zero(kGroups, evidence.basis().size());
-  unit(group_index(kForceX, 1), 2) = 1;
+  unit(group_index(kSpecificForceX, 1), 2) = 1;
   Regressors one;
   one.add(unit, 0.7);
   const SufficientStatistics s = evidence.statistics({made_[0]->measured()});
@@ -129,7 +129,7 @@ TEST(WeighFlights, WhatChangesFromFlightToFlightIsNoPlace) {
     flights.tests.push_back(
         std::make_shared<SyntheticFlight>("f" + std::to_string(f), f + 1, synthetic_law, f == 1 ? 3 : 0));
   const Evidence evidence(question_of(flights), flights, read_model_discrepancy(), 1);
-  const std::size_t group = static_cast<std::size_t>(group_index(kForceX, 1));
+  const std::size_t group = static_cast<std::size_t>(group_index(kSpecificForceX, 1));
   Residuals residual;
   for (std::size_t f = 0; f < flights.size(); ++f) {
     Rows rows(flights[f]->beats() * kRowsPerBeat, 0);

@@ -96,7 +96,7 @@ TEST_F(Fits, IsGivenNuisances) {
   BasisCoefficients wind = BasisCoefficients::Zero(kGroups, evidence_->basis().size()), unseen = wind;
   const int velocity = 2;
   ASSERT_EQ(evidence_->basis().name(velocity), "velocity_x");
-  wind(group_index(kForceX, 0), velocity) = 0.1;
+  wind(group_index(kSpecificForceX, 0), velocity) = 0.1;
   Regressors nuisances;
   nuisances.add(unseen, 0);
   nuisances.add(wind, 0);
@@ -134,27 +134,29 @@ TEST_F(Fits, LawsOfWhatActsByThePlaceMayDeviate) {
     fit.at = Eigen::VectorXd::Zero(ground.size());
     fit.columns.assign(static_cast<std::size_t>(ground.size()), BasisCoefficients::Zero(kGroups, basis.size()));
     fit.at[ground.shared()] = 2;
-    const int lift = group_index(kForceZ, 0);
+    const int lift = group_index(kSpecificForceZ, 0);
     fit.columns[static_cast<std::size_t>(ground.shared())](lift, function) = 0.3 * evidence_->signal(lift);
     return fit;
   };
   Fit fit = change(height);
   // a twenty-fifth of the square, as by chance
-  fit.columns[static_cast<std::size_t>(ground.shared())](group_index(kForceZ, 0), time) =
-      0.2 * 0.3 * evidence_->signal(group_index(kForceZ, 0));
+  fit.columns[static_cast<std::size_t>(ground.shared())](group_index(kSpecificForceZ, 0), time) =
+      0.2 * 0.3 * evidence_->signal(group_index(kSpecificForceZ, 0));
   ASSERT_TRUE(fitter_.law_may_deviate(ground, fit));
   // groups of loads with a signal: six, of which three channels have a mean and a harmonic
   double loads = 0;
-  for (int g = 0; g < group_index(kForceZ, kCoefficients); ++g) loads += evidence_->signal(g) > 0 ? 1 : 0;
+  for (int g = 0; g < group_index(kSpecificForceZ, kCoefficients); ++g) loads += evidence_->signal(g) > 0 ? 1 : 0;
   const double rms = 2 * 0.3 / std::sqrt(loads);
   for (const double factor : {1.0, 4.0}) {
     const BasisCoefficients sd = fitter_.law_sd(ground, fit, factor);
-    for (const int g : {group_index(kForceX, 0), group_index(kTorqueY, 1), group_index(kForceZ, 0)}) {
+    for (const int g :
+         {group_index(kSpecificForceX, 0), group_index(kAngularAccelerationY, 1), group_index(kSpecificForceZ, 0)}) {
       EXPECT_NEAR(sd(g, height), factor * rms * evidence_->signal(g), 1e-12) << g;
       EXPECT_NEAR(sd(g, time), 0.2 * rms * evidence_->signal(g), 1e-12) << g;
       EXPECT_EQ(sd(g, amplitude), 0);
     }
-    EXPECT_EQ(sd.bottomRows(kGroups - group_index(kForceZ, kCoefficients)).maxCoeff(), 0) << "strokes, motion capture";
+    EXPECT_EQ(sd.bottomRows(kGroups - group_index(kSpecificForceZ, kCoefficients)).maxCoeff(), 0)
+        << "strokes, motion capture";
   }
   EXPECT_FALSE(fitter_.law_may_deviate(ground, change(amplitude)));
   const Hypothesis tilt(priors_, {"mocap_tilt"});

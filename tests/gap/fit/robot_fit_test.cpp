@@ -68,7 +68,7 @@ TEST_F(RobotFits, KnowsWhatMagnitudesChange) {
   const double sd = std::sqrt(((*made_)[0]->velocity.squaredNorm() + (*made_)[1]->velocity.squaredNorm()) / 240 -
                               std::pow(((*made_)[0]->velocity.sum() + (*made_)[1]->velocity.sum()) / 240, 2));
   ASSERT_EQ(basis.name(2), "velocity_x");
-  EXPECT_NEAR(wind->change(group_index(kForceX, 0), 2), expected * sd, 1e-3);
+  EXPECT_NEAR(wind->change(group_index(kSpecificForceX, 0), 2), expected * sd, 1e-3);
   EXPECT_EQ(wind->near.size(), 2u);
   EXPECT_EQ(std::ranges::find(all, "tether", &MagnitudeColumn::effect), all.end()) << "withheld";
   const auto ground = std::ranges::find(all, "ground_effect", &MagnitudeColumn::effect);
@@ -173,7 +173,7 @@ TEST(Contrast, TellsWhatAppearedFromWhatWasAlwaysOff) {
       at[0] = 0.7;
       at[2] = f < 2 ? 0 : appears;
       made[f]->fly(wind.vehicle(at));
-      made[f]->add_measured(kForceX, 0, 0.3 * made[f]->velocity);
+      made[f]->add_measured(kSpecificForceX, 0, 0.3 * made[f]->velocity);
     }
     return made;
   };
@@ -204,7 +204,7 @@ TEST(Contrast, CallsUnknownOnlyWhatReferencesWouldHaveShown) {
     for (std::size_t f = 0; f < 4; ++f) {
       if (f < 2) made[f]->velocity *= calm;
       made[f]->fly(Hypothesis(priors, {}).vehicle(Hypothesis(priors, {}).start()));
-      if (f >= 2) made[f]->add_measured(kTorqueY, 1, made[f]->velocity);
+      if (f >= 2) made[f]->add_measured(kAngularAccelerationY, 1, made[f]->velocity);
     }
     const Flights flights = as_flights(made, 2), references{flights.references, {}};
     ModelDiscrepancy discrepancy = read_model_discrepancy();

@@ -41,7 +41,7 @@ TEST(Screening, RanksEffectsByTheirEvidence) {
   const Flights flights = as_flights(made);
   const auto evidence = std::make_shared<const Evidence>(question_of(flights), flights, read_model_discrepancy(), 1);
   const Fitter fitter(question_of(flights), flights, evidence, 1);
-  const int velocity = 2, height = 3, large = group_index(kForceX, 0), lift = group_index(kForceZ, 0);
+  const int velocity = 2, height = 3, large = group_index(kSpecificForceX, 0), lift = group_index(kSpecificForceZ, 0);
   BasisCoefficients wind = BasisCoefficients::Zero(kGroups, evidence->basis().size()), ground = wind, drag = wind;
   wind(large, velocity) = SyntheticFlight::kSignal;
   ground(lift, height) = 0.02;
@@ -82,7 +82,7 @@ TEST(Screening, FindsALargeMagnitude) {
   const auto evidence = std::make_shared<const Evidence>(question_of(flights), flights, read_model_discrepancy(), 1);
   const Fitter fitter(question_of(flights), flights, evidence, 1);
   BasisCoefficients unit = BasisCoefficients::Zero(kGroups, evidence->basis().size());
-  unit(group_index(kForceX, 0), 2) = SyntheticFlight::kSignal;
+  unit(group_index(kSpecificForceX, 0), 2) = SyntheticFlight::kSignal;
   Fit fit;
   fit.directions = {Eigen::MatrixXd(0, 0), Eigen::VectorXd(0)};
   Rows zero(made[0]->measured().size(), 0);

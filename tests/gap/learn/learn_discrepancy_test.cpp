@@ -18,17 +18,17 @@ TEST(LearnDiscrepancy, FindsHowFarModelsAreOff) {
     const double off = normal(random);
     const auto flight = std::make_shared<SyntheticFlight>("robot", static_cast<std::uint64_t>(r + 1), synthetic_law);
     flight->fly({synthetic_vehicle()});
-    flight->add_measured(kForceZ, 0, off * flight->velocity);
+    flight->add_measured(kSpecificForceZ, 0, off * flight->velocity);
     robots.push_back({{}, {flight}});
   }
   ModelDiscrepancy start = read_model_discrepancy();
   start.nuisances.clear();
   const ModelDiscrepancy learnt = learn_discrepancy(robots, priors, start, 2);
-  const double share = learnt.share(kForceZ, 0, BasisFunction::velocity_x);
+  const double share = learnt.share(kSpecificForceZ, 0, BasisFunction::velocity_x);
   EXPECT_GT(share, 0.02);
   EXPECT_LT(share, 0.12);
   // where models are not off, the least that is learnt, and what like channels have
-  EXPECT_LT(learnt.share(kTorqueY, 1, BasisFunction::velocity_x), 0.5 * share);
+  EXPECT_LT(learnt.share(kAngularAccelerationY, 1, BasisFunction::velocity_x), 0.5 * share);
   EXPECT_EQ(learnt.spread.robot_sd, start.spread.robot_sd) << "other parameters stay";
   // no robot has an effect: backgrounds become smaller than what was believed, or stay as small
   EXPECT_LE(learnt.background_sd("wind"), std::max(start.background_sd("wind"), 0.3));
@@ -47,7 +47,7 @@ TEST(LearnSessions, FindsHowMuchLessSessionsDiffer) {
       const auto flight =
           std::make_shared<SyntheticFlight>("robot", static_cast<std::uint64_t>(2 * r + f + 1), synthetic_law);
       flight->fly({synthetic_vehicle()});
-      flight->add_measured(kForceZ, 0, (off + f * changed) * flight->velocity);
+      flight->add_measured(kSpecificForceZ, 0, (off + f * changed) * flight->velocity);
       (f == 0 ? pairs.back().flights.references : pairs.back().flights.tests).push_back(flight);
     }
   }
@@ -55,10 +55,10 @@ TEST(LearnSessions, FindsHowMuchLessSessionsDiffer) {
   start.nuisances.clear();
   start.session = read_session_variation();
   const SessionVariation learnt = learn_sessions(pairs, priors, start, 2);
-  const double share = share_of(learnt.shares, kForceZ, 0, BasisFunction::velocity_x);
+  const double share = share_of(learnt.shares, kSpecificForceZ, 0, BasisFunction::velocity_x);
   EXPECT_GT(share, 0.004);
   EXPECT_LT(share, 0.02);
-  EXPECT_LT(share_of(learnt.shares, kTorqueY, 1, BasisFunction::velocity_x), 0.5 * share);
+  EXPECT_LT(share_of(learnt.shares, kAngularAccelerationY, 1, BasisFunction::velocity_x), 0.5 * share);
   EXPECT_LT(learnt.scale_sd, start.session.scale_sd) << "all pairs differ by as much";
   EXPECT_EQ(learnt.law_error, start.session.law_error) << "no pair has an effect";
 }

@@ -199,35 +199,35 @@ TEST(Where, FindsWhatDependsOnHeight) {
   const auto low = [&](std::size_t flight, std::size_t j) { return f.around.regimes[0].values[flight][j] < -0.43; };
   for (std::size_t flight = 0; flight < 3; ++flight)
     for (std::size_t j = 0; j < 340; ++j)
-      if (low(flight, j)) f.residual[flight][j * kRowsPerBeat + group_of(kForceZ, 0)] += 6;
+      if (low(flight, j)) f.residual[flight][j * kRowsPerBeat + group_of(kSpecificForceZ, 0)] += 6;
   const std::vector<ResidualLocation> places = locate(f.around, f.residual, Stage::refit);
-  const ResidualLocation& below = place(places, ResidualTest::regime, kForceZ, "height below");
+  const ResidualLocation& below = place(places, ResidualTest::regime, kSpecificForceZ, "height below");
   EXPECT_TRUE(below.discovered);
   EXPECT_LT(below.p_value, 1e-5);
   // noise in all nine coefficients: 4 (1 + 8/2); 36 of the offset beside
   EXPECT_DOUBLE_EQ(below.noise_floor, std::sqrt(20));
   EXPECT_NEAR(below.gap, std::sqrt(56), 0.6);
-  EXPECT_FALSE(place(places, ResidualTest::regime, kForceZ, "height above").discovered);
-  EXPECT_FALSE(place(places, ResidualTest::regime, kForceX, "height below").discovered);
-  EXPECT_TRUE(place(places, ResidualTest::phase, kForceZ, "mean").discovered);
-  EXPECT_FALSE(place(places, ResidualTest::phase, kForceZ, "harmonic 2").discovered);
+  EXPECT_FALSE(place(places, ResidualTest::regime, kSpecificForceZ, "height above").discovered);
+  EXPECT_FALSE(place(places, ResidualTest::regime, kSpecificForceX, "height below").discovered);
+  EXPECT_TRUE(place(places, ResidualTest::phase, kSpecificForceZ, "mean").discovered);
+  EXPECT_FALSE(place(places, ResidualTest::phase, kSpecificForceZ, "harmonic 2").discovered);
   // height changes over some twenty beats: slowly
-  EXPECT_TRUE(place(places, ResidualTest::frequency, kForceZ, "0 to 0.5 Hz").discovered);
-  EXPECT_FALSE(place(places, ResidualTest::frequency, kForceX, "0 to 0.5 Hz").discovered);
-  EXPECT_TRUE(place(places, ResidualTest::whiteness, kForceZ, "means").discovered);
-  EXPECT_FALSE(place(places, ResidualTest::whiteness, kForceY, "means").discovered);
+  EXPECT_TRUE(place(places, ResidualTest::frequency, kSpecificForceZ, "0 to 0.5 Hz").discovered);
+  EXPECT_FALSE(place(places, ResidualTest::frequency, kSpecificForceX, "0 to 0.5 Hz").discovered);
+  EXPECT_TRUE(place(places, ResidualTest::whiteness, kSpecificForceZ, "means").discovered);
+  EXPECT_FALSE(place(places, ResidualTest::whiteness, kSpecificForceY, "means").discovered);
 }
 
 TEST(Where, FindsWhatFollowsAnInput) {
   Flown f = flown(2, 0.3);
   for (std::size_t flight = 0; flight < 3; ++flight)
     for (std::size_t j = 0; j < 340; ++j)
-      f.residual[flight][j * kRowsPerBeat + group_of(kTorqueY, 1)] += f.around.inputs[0].values[flight][j];
+      f.residual[flight][j * kRowsPerBeat + group_of(kAngularAccelerationY, 1)] += f.around.inputs[0].values[flight][j];
   const std::vector<ResidualLocation> places = locate(f.around, f.residual, Stage::refit);
-  const ResidualLocation& p = place(places, ResidualTest::input, kTorqueY, "input");
+  const ResidualLocation& p = place(places, ResidualTest::input, kAngularAccelerationY, "input");
   EXPECT_TRUE(p.discovered);
   EXPECT_NEAR(p.gap, std::sqrt(0.5), 0.2) << "a cosine of amplitude 1 and input of rms 1";
-  EXPECT_FALSE(place(places, ResidualTest::input, kTorqueX, "input").discovered);
+  EXPECT_FALSE(place(places, ResidualTest::input, kAngularAccelerationX, "input").discovered);
 }
 
 TEST(Where, LeavesOutWhatIsNotCovered) {

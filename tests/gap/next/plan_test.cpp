@@ -107,7 +107,7 @@ TEST(Changes, ArePredictedInTheFlightsBeforeWhichTheyWereMade) {
     log.header.changes.swapped_wings = declared;
     const Flights flight{{}, {std::make_shared<ResetPrediction>(Recording("tour", std::move(log), nominal_vehicle()))}};
     const std::vector<Residuals> r = residuals(flight, {VehicleHypothesis{.vehicle = robot}}, 1);
-    return rms(*flight[0], r[0][0], kTorqueX * kCoefficients);
+    return rms(*flight[0], r[0][0], kAngularAccelerationX * kCoefficients);
   };
   const double before = left(false, false);
   EXPECT_NEAR(left(true, true), before, 0.2 * before);

@@ -152,7 +152,8 @@ TEST(PredictedLoads, ShowTheRowsOfTheEquationsTheyWereMadeFrom) {
     EXPECT_LT(difference(equations.predict({&a[i]})[0], rows), 1e-9);
     if (i > 0) EXPECT_GT(difference(plain, rows), 1e-3);
   }
-  for (int channel = kTorqueX; channel <= kForceZ; ++channel) EXPECT_TRUE(file.has_rows(channel, 0)) << channel;
+  for (int channel = kAngularAccelerationX; channel <= kSpecificForceZ; ++channel)
+    EXPECT_TRUE(file.has_rows(channel, 0)) << channel;
 }
 
 TEST(PredictedLoads, MayBeMadeAtOtherCoefficientsThanTheVehiclesFileHasNow) {

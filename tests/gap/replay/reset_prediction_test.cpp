@@ -23,13 +23,14 @@ TEST(ResetPrediction, TheVehicleThatFlewLeavesTheNoiseOfTheSensors) {
   // 250 beats: an rms of as many normal numbers varies by 4 %, of neighbours that share samples by 6 %; heavy tails, for
   // now and then a wing's landing comes a little early, add to a few. Mean forces, of which five beats share samples, by 10 %; and
   // to their noise, that of motion capture, comes that of the motion to which the torso is reset.
-  for (const int channel : {kTorqueX, kTorqueY, kTorqueZ, kForceX, kForceY, kForceZ, kStrokeLeft, kStrokeRight,
-                            kCurrentLeft, kCurrentRight, kBattery, kPathX, kTurnZ})
+  for (const int channel :
+       {kAngularAccelerationX, kAngularAccelerationY, kAngularAccelerationZ, kSpecificForceX, kSpecificForceY,
+        kSpecificForceZ, kStrokeLeft, kStrokeRight, kCurrentLeft, kCurrentRight, kBattery, kPathX, kTurnZ})
     for (int c = 0; c < (channel < kPathX ? 3 : 1); ++c) {
       const int g = channel * kCoefficients + c;
       const double ratio = rms(*flights[0], left, g) / rms(*flights[0], noise, g);
       EXPECT_GT(ratio, 0.7) << channel_name(channel) << " " << c;
-      EXPECT_LT(ratio, c == 0 && channel >= kForceX && channel <= kForceZ ? 1.7 : 1.4)
+      EXPECT_LT(ratio, c == 0 && channel >= kSpecificForceX && channel <= kSpecificForceZ ? 1.7 : 1.4)
           << channel_name(channel) << " " << c;
     }
 }
@@ -49,7 +50,7 @@ TEST(ResetPrediction, MeanForcesAreThoseOfMotionCapture) {
     return sum / n;
   };
   EXPECT_NEAR(mean(*wrong, kPathZ) - mean(*flights[0], kPathZ), -kError_m_s2, 0.02 * kError_m_s2);
-  EXPECT_NEAR(mean(*wrong, kForceZ) - mean(*flights[0], kForceZ), 0, 0.02 * kError_m_s2);
+  EXPECT_NEAR(mean(*wrong, kSpecificForceZ) - mean(*flights[0], kSpecificForceZ), 0, 0.02 * kError_m_s2);
 }
 
 }  // namespace

@@ -46,7 +46,8 @@ TEST(Diagnosis, SaysRegimesInWords) {
 }
 
 ResidualLocation location(Stage stage, ResidualTest test, double gap, bool discovered) {
-  return {stage, test, "force_z", "m/s^2", {"height", Regime::Third::low, {}, 1, "m"}, gap, 1, 0.01, discovered};
+  return {stage, test, "specific_force_z", "m/s^2", {"height", Regime::Third::low, {}, 1, "m"}, gap,
+          1,     0.01, discovered};
 }
 
 /// Something in every field.
@@ -68,16 +69,16 @@ Diagnosis whole() {
                    0.01,
                    Closure{0.9, 0.8, 0.95}},
                   {HypothesisKind::unknown, {}, "unknown", false, 0.1, -30, -1, {}, {}, 0, {}}};
-  d.unexplained = {{"torque_y", 2, "near ground", "height", 7, 21}};
+  d.unexplained = {{"angular_acceleration_y", 2, "near ground", "height", 7, 21}};
   d.jointly_with = {"wind"};
-  d.other_law = UnexplainedTerm{"force_x", 0, "cos heading", "heading", 4, 3};
+  d.other_law = UnexplainedTerm{"specific_force_x", 0, "cos heading", "heading", 4, 3};
   d.background = {{"body_drag.area_m2", 1e-4, 0, 2e-4, "m^2"}};
   d.sensors = {{"imu_clock.rate", 4e-5, 3e-5, 5e-5, ""}};
   d.moved_parameters = {{"torso.mass_kg", -1.5}};
   d.locations = {location(Stage::nominal, ResidualTest::channel, 3, false),
                  {Stage::refit,
                   ResidualTest::phase,
-                  "force_x",
+                  "specific_force_x",
                   "m/s^2",
                   {"harmonic", Regime::Third::all, 2, 2, ""},
                   2,
@@ -88,8 +89,8 @@ Diagnosis whole() {
   d.noise_floor = 0.4;
   d.closure = Closure{0.5, 0.4, 0.6};
   d.untestable = {"added_mass"};
-  d.validation = Validation{{{"file", {{"force_x", 1, 0.9, 1.1, 1.2}}}},
-                            {{"wind", "force_x", 0.2, 0.01}},
+  d.validation = Validation{{{"file", {{"specific_force_x", 1, 0.9, 1.1, 1.2}}}},
+                            {{"wind", "specific_force_x", 0.2, 0.01}},
                             {{"wind.x_m_s", {0.2, 0.4}, {0.1, 0.1}, 0.3}}};
   d.closed_loop = {{"a", "mean_bias_V", 1, NAN, 0.9}};
   d.next = NextExperiment{"dash", "swap the wings", "time", {"wind", "tether"}, 3, 0.2, 0.1, {{"x_m", {0, 1}, {0, 2}}}};

@@ -432,7 +432,7 @@ TEST_F(Benchmark, SealsWhereEffectsActAndWhatTheFileDeclares) {
   const Json labels = read_json(root_ / "bench/sealed/labels.json");
   ASSERT_EQ(labels.at("cases")[0].at("effects")[0].at("id"), "ceiling_effect");
   EXPECT_EQ(labels.at("cases")[0].at("regimes").dump(), R"(["ceiling","height"])");
-  EXPECT_EQ(labels.at("cases")[0].at("channels").dump(), R"(["force_z","torque_y","current"])");
+  EXPECT_EQ(labels.at("cases")[0].at("channels").dump(), R"(["specific_force_z","angular_acceleration_y","current"])");
   EXPECT_EQ(read_manifest(root_ / "bench").family, "a");
   fs::remove_all(root_ / "bench");
   // a robot of the published randomisation declares the file, and no file of its own stays

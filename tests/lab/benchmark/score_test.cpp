@@ -228,17 +228,18 @@ TEST(Score, FalseAlarmsAndUnknownTruths) {
   for (const ScoredCase& c : cases) which += right(c.truth, c.prediction) ? '1' : '0';
   EXPECT_EQ(which, "111001001");
   // of the two called unknown, one is described
-  for (ScoredCase& c : cases) c.truth.channels = {"force_x", "torque_y"}, c.truth.regimes = {"heading"};
+  for (ScoredCase& c : cases)
+    c.truth.channels = {"specific_force_x", "angular_acceleration_y"}, c.truth.regimes = {"heading"};
   EXPECT_DOUBLE_EQ(*main_score(cases, "unknown_where").value, 0);
-  cases[5].prediction.where = {"torque_y", "heading"};
-  cases[8].prediction.where = {"torque_y", "height"};
+  cases[5].prediction.where = {"angular_acceleration_y", "heading"};
+  cases[8].prediction.where = {"angular_acceleration_y", "height"};
   EXPECT_DOUBLE_EQ(*main_score(cases, "unknown_where").value, 0.5);
   // makers say "mocap" and "place" of what diagnoses name by channel and regime
   for (ScoredCase& c : cases) c.truth.channels = {"mocap"}, c.truth.regimes = {"place"};
   cases[5].prediction.where = {"path_x", "ceiling"};
   cases[8].prediction.where = {"path_x", "velocity"};
   EXPECT_DOUBLE_EQ(*main_score(cases, "unknown_where").value, 0.5);
-  cases[8].prediction.where = {"force_x", "ceiling"};
+  cases[8].prediction.where = {"specific_force_x", "ceiling"};
   EXPECT_DOUBLE_EQ(*main_score(cases, "unknown_where").value, 0.5);
 }
 

@@ -10,16 +10,19 @@ using Words = std::vector<std::string>;
 
 /// In the order of Effect.
 const std::vector<FamilyEffect>& table() {
-  const Words forces = {"force_x", "force_y", "force_z"}, torques = {"torque_x", "torque_y", "torque_z"};
-  const Words wrench = {"force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z"};
-  const Words lift = {"force_z", "torque_y", "current"},
-              drive = {"force_x", "force_z", "torque_x", "torque_y", "current"};
+  const Words forces = {"specific_force_x", "specific_force_y", "specific_force_z"},
+              torques = {"angular_acceleration_x", "angular_acceleration_y", "angular_acceleration_z"};
+  const Words wrench = {"specific_force_x",       "specific_force_y",       "specific_force_z",
+                        "angular_acceleration_x", "angular_acceleration_y", "angular_acceleration_z"};
+  const Words lift = {"specific_force_z", "angular_acceleration_y", "current"},
+              drive = {"specific_force_x", "specific_force_z", "angular_acceleration_x", "angular_acceleration_y",
+                       "current"};
   static const std::vector<FamilyEffect> effects = {
       {"ground_effect", "Hayden's law with 0.05 for 0.038", lift, {"height", "place"}},
       {"ceiling_effect", "10 % more force at the ceiling, halved 80 mm below", lift, {"ceiling", "height"}},
       {"wall_effect",
        "5 % less force of the wing at the wall, and a pull of 4 % of the weight within 150 mm",
-       {"force_y", "force_z", "torque_x"},
+       {"specific_force_y", "specific_force_z", "angular_acceleration_x"},
        {"wall", "place"}},
       {"body_drag", "areas of 1.2, 2.2 and 1.5e-3 m^2, each with its own component", forces, {"velocity"}},
       {"added_mass", "rho pi/4 c^2 of each strip", drive, {"always", "stroke", "acceleration"}},
@@ -29,11 +32,11 @@ const std::vector<FamilyEffect>& table() {
       {"wing_flexibility", "one mode of twist of 8e-3 N m/rad", drive, {"always", "amplitude"}},
       {"wing_damage",
        "5 % of one wing's area, at its tip",
-       {"force_z", "torque_x", "torque_z", "current"},
+       {"specific_force_z", "angular_acceleration_x", "angular_acceleration_z", "current"},
        {"always", "amplitude"}},
       {"wind",
        "0.3 m/s level, gusts of 0.1 m/s",
-       {"force_x", "force_y", "torque_x", "torque_y"},
+       {"specific_force_x", "specific_force_y", "angular_acceleration_x", "angular_acceleration_y"},
        {"always", "heading"}},
       {"spring_hardening", "4.5 %/rad and 5 %/rad^3", drive, {"amplitude", "stroke"}},
       {"gear_backlash", "1 deg between rotor and wing", drive, {"always", "stroke"}},
@@ -57,17 +60,17 @@ const std::vector<FamilyEffect>& table() {
       {"outside_magnetic_torque", "1e-4 N m in a field", torques, {"heading", "always"}},
       {"outside_vortex_shedding",
        "3 % of the weight at 3 to 6 Hz",
-       {"force_x", "force_y", "torque_x", "torque_y"},
+       {"specific_force_x", "specific_force_y", "angular_acceleration_x", "angular_acceleration_y"},
        {"time", "velocity"}},
       {"outside_slosh",
        "0.7 g on 2 cm, at 3.5 Hz",
-       {"force_x", "force_y", "torque_x", "torque_y"},
+       {"specific_force_x", "specific_force_y", "angular_acceleration_x", "angular_acceleration_y"},
        {"acceleration", "time"}},
       {"outside_yaw_thrust_loss", "up to 6 % less lift at 2 rad/s of yaw", lift, {"rate"}},
       {"outside_wing_interference", "6 % less lift where the amplitudes differ by 2 V", lift, {"difference"}},
       {"outside_brush_contact",
        "35 % more resistance on the left for 20 ms, six times a second",
-       {"force_z", "torque_x", "current"},
+       {"specific_force_z", "angular_acceleration_x", "current"},
        {"time", "amplitude"}},
       {"outside_amplitude_hysteresis", "4 % of the torque within 0.5 V of play", drive, {"amplitude"}},
       {"outside_vortex_ring", "12 % less lift at half a metre per second down", lift, {"velocity"}},

@@ -11,11 +11,13 @@ namespace {
 
 using Words = std::vector<std::string>;
 
-const Words kForces = {"force_x", "force_y", "force_z"};
-const Words kTorques = {"torque_x", "torque_y", "torque_z"};
-const Words kWrench = {"force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z"};
-const Words kLift = {"force_z", "torque_y", "current"};
-const Words kStroke = {"force_x", "force_z", "torque_x", "torque_y", "torque_z", "current"};
+const Words kForces = {"specific_force_x", "specific_force_y", "specific_force_z"};
+const Words kTorques = {"angular_acceleration_x", "angular_acceleration_y", "angular_acceleration_z"};
+const Words kWrench = {"specific_force_x",       "specific_force_y",       "specific_force_z",
+                       "angular_acceleration_x", "angular_acceleration_y", "angular_acceleration_z"};
+const Words kLift = {"specific_force_z", "angular_acceleration_y", "current"};
+const Words kStroke = {"specific_force_x",       "specific_force_z",       "angular_acceleration_x",
+                       "angular_acceleration_y", "angular_acceleration_z", "current"};
 
 std::vector<FamilyEffect> table() {
   return {
@@ -23,7 +25,7 @@ std::vector<FamilyEffect> table() {
       {"ceiling_effect", "12 % more force of the wings at the ceiling, falling by e each 60 mm", kLift, {"ceiling"}},
       {"wall_effect",
        "4 % of the weight towards the wall and 5 % less lift of a wing whose tip touches it, falling by e each 80 mm",
-       {"force_y", "force_z", "torque_x"},
+       {"specific_force_y", "specific_force_z", "angular_acceleration_x"},
        {"wall"}},
       {"body_drag",
        "drag areas of 1.6, 1.3 and 1.0e-3 m^2 along the axes of B, each with its own component of velocity",
@@ -45,11 +47,12 @@ std::vector<FamilyEffect> table() {
        {"always", "amplitude"}},
       {"wing_damage",
        "5 % of the area lost at the trailing edge of one tip",
-       {"force_x", "force_z", "torque_x", "torque_y", "torque_z", "current"},
+       {"specific_force_x", "specific_force_z", "angular_acceleration_x", "angular_acceleration_y",
+        "angular_acceleration_z", "current"},
        {"always", "amplitude"}},
       {"wind",
        "0.3 m/s with gusts of 0.06 m/s",
-       {"force_x", "force_y", "torque_x", "torque_y"},
+       {"specific_force_x", "specific_force_y", "angular_acceleration_x", "angular_acceleration_y"},
        {"always", "place", "heading"}},
       {"spring_hardening", "hyperbolic sine of the stroke: 0.1/rad^2 at first order", kStroke, {"amplitude", "stroke"}},
       {"gear_backlash", "1 deg between rotor and wing", kStroke, {"always", "stroke"}},
@@ -72,7 +75,10 @@ std::vector<FamilyEffect> table() {
        kStroke,
        {"always", "acceleration"}},
       {"stop_compliance", "stops of the wing five times softer", kStroke, {"always", "amplitude"}},
-      {"com_offset", "1 mm", {"torque_x", "torque_y", "torque_z"}, {"always"}},
+      {"com_offset",
+       "1 mm",
+       {"angular_acceleration_x", "angular_acceleration_y", "angular_acceleration_z"},
+       {"always"}},
       {"inertia_products", "5 % of the mean moment in each product", kTorques, {"rate", "acceleration"}},
       {"wing_inertia",
        "centre of mass 10 % along the chord, one way on the left and the other on the right, and 10 % product",
@@ -87,7 +93,7 @@ std::vector<FamilyEffect> table() {
       {"mocap_delay", "5 ms more than declared, or less", {"mocap"}, {"velocity", "rate"}},
       {"outside_loose_screw",
        "0.3 g that rattles over 1.2 mm along z",
-       {"force_z", "torque_x", "torque_y", "accelerometer"},
+       {"specific_force_z", "angular_acceleration_x", "angular_acceleration_y", "accelerometer"},
        {"always", "amplitude"}},
       {"outside_leading_edge_bending",
        "leading edges whose tips lag by 2.5 deg in hover",

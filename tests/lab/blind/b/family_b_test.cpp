@@ -125,8 +125,16 @@ TEST(FamilyBEffects, AreInTheCatalogueOrOutside) {
   ASSERT_EQ(all.size(), static_cast<std::size_t>(kEffects));
   EXPECT_EQ(all[kMocapDelay].id, "mocap_delay");
   EXPECT_EQ(all[kCommonSupply].id, "outside_common_supply");
-  const std::vector<std::string> channels = {"force_x",  "force_y", "force_z",       "torque_x", "torque_y",
-                                             "torque_z", "gyro",    "accelerometer", "mocap",    "current"};
+  const std::vector<std::string> channels = {"specific_force_x",
+                                             "specific_force_y",
+                                             "specific_force_z",
+                                             "angular_acceleration_x",
+                                             "angular_acceleration_y",
+                                             "angular_acceleration_z",
+                                             "gyro",
+                                             "accelerometer",
+                                             "mocap",
+                                             "current"};
   const std::vector<std::string> regimes = {
       "always",   "height", "ceiling",      "wall", "place",       "amplitude", "difference", "bias",   "split_cycle",
       "velocity", "rate",   "acceleration", "time", "temperature", "charge",    "stroke",     "heading"};
