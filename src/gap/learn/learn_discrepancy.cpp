@@ -102,7 +102,7 @@ constexpr std::array<std::pair<int, int>, 7> kAlike = {{{kAngularAccelerationX, 
                                                         {kBattery, kBattery},
                                                         {kCurrentLeft, kCurrentRight},
                                                         {kPathX, kPathZ},
-                                                        {kTurnX, kTurnZ}}};
+                                                        {kRotateX, kRotateZ}}};
 
 void shrink(ShareMoments& shares) {
   for (const auto& [first, last] : kAlike)

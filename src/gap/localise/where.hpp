@@ -5,7 +5,7 @@
 //   phase       the mean or one harmonic of the beats: where in the stroke
 //   frequency   a band of the beat means, against the highest band and the spectrum of autoregressive noise
 //   input       the part that is proportional to an input
-//   whiteness   correlation between blocks of beats; not for path and turn, whose rows are differences over beats
+//   whiteness   correlation between blocks of beats; not for path and rotate, whose rows are differences over beats
 // The tests of channel, regime, phase and input use sums over blocks (significance.hpp) and the smallest p value of a
 // channel's coefficients times their number (Bonferroni). The share of false discoveries of a stage is held to
 // kFalseDiscoveries.

@@ -28,7 +28,7 @@ const char* channel_unit(int channel) {
   if (channel < kStrokeLeft) return "m/s^2";
   if (channel < kBattery) return "rad";
   if (channel < kPathX) return channel == kBattery ? "V" : "A";
-  return channel < kTurnX ? "m/s^2" : "rad/s";
+  return channel < kRotateX ? "m/s^2" : "rad/s";
 }
 
 FlightList Flights::all() const {

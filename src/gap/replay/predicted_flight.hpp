@@ -31,9 +31,9 @@ enum Channel : int {
   kPathX,
   kPathY,
   kPathZ,  ///< acceleration of the torso origin by motion capture less that by the IMU, m/s^2, W
-  kTurnX,
-  kTurnY,
-  kTurnZ,  ///< angular rate by motion capture less that by the gyro and a constant bias, rad/s, B
+  kRotateX,
+  kRotateY,
+  kRotateZ,  ///< angular rate by motion capture less that by the gyro and a constant bias, rad/s, B
   kChannels
 };
 const char* channel_name(int channel);
@@ -103,7 +103,7 @@ class PredictedFlight {
   virtual const Rows& measured() const = 0;
   /// The signal of each channel, which the model discrepancy is a share of: the measured rows. Exceptions for vehicles
   /// with wings and motors: for the angular acceleration the recorded one, as the rows are already differences from it;
-  /// for the battery its voltage less the full voltage; for path and turn constants. For moments that an autopilot
+  /// for the battery its voltage less the full voltage; for path and rotate constants. For moments that an autopilot
   /// counteracts, which add up to nothing: the root of the sum of their squares.
   virtual const Rows& signal() const = 0;
   /// Rows that the sensors of each vehicle would have measured, [vehicle]; empty if its simulation diverges.

@@ -27,7 +27,7 @@ constexpr std::size_t kSample = kSignals * kVehicles, kMeter = kMetered * kVehic
 
 /// Rounding error of a time, in steps. Choice.
 constexpr double kSameStep = 1e-3;
-/// Signals of path and turn; times the shares of the discrepancy, how much both sensors may disagree without an effect.
+/// Signals of path and rotate; times the shares of the discrepancy, how much both sensors may disagree without an effect.
 /// Choice: so the shares are in these units.
 constexpr double kStreamSignal_m_s2 = 1, kStreamSignal_rad_s = 1;
 
@@ -136,7 +136,7 @@ void put_streams(const std::vector<StreamRow>& streams, Rows& rows) {
   for (std::size_t j = 0; j < streams.size(); ++j)
     for (std::size_t i = 0; i < 3; ++i) {
       rows[j * kRowsPerBeat + (kPathX + i) * kCoefficients] = streams[j].path_m_s2[static_cast<Eigen::Index>(i)];
-      rows[j * kRowsPerBeat + (kTurnX + i) * kCoefficients] = streams[j].turn_rad_s[static_cast<Eigen::Index>(i)];
+      rows[j * kRowsPerBeat + (kRotateX + i) * kCoefficients] = streams[j].rotate_rad_s[static_cast<Eigen::Index>(i)];
     }
 }
 
@@ -160,7 +160,7 @@ void ResetPrediction::compare_streams() {
   for (std::size_t j = 0; j < recording_.beats; ++j)
     for (std::size_t i = 0; i < 3; ++i) {
       signal_[j * kRowsPerBeat + (kPathX + i) * kCoefficients] = kStreamSignal_m_s2;
-      signal_[j * kRowsPerBeat + (kTurnX + i) * kCoefficients] = kStreamSignal_rad_s;
+      signal_[j * kRowsPerBeat + (kRotateX + i) * kCoefficients] = kStreamSignal_rad_s;
     }
 }
 

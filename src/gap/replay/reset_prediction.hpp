@@ -28,10 +28,10 @@ class ResetPrediction final : public PredictedFlight {
   bool has_ground() const override { return recording_.world.has_ground(); }
   std::size_t beats() const override { return recording_.beats; }
   double beats_Hz() const override { return recording_.log.header.flapping_Hz; }
-  /// Specific force needs mocap in the beat and the IMU in two more on each side; path and turn need mocap, the others
+  /// Specific force needs mocap in the beat and the IMU in two more on each side; path and rotate need mocap, the others
   /// a log.
   bool covers(std::size_t beat, int channel) const override;
-  /// Coefficient 0 is the mean of a beat, the others are its harmonics; path and turn have only the mean.
+  /// Coefficient 0 is the mean of a beat, the others are its harmonics; path and rotate have only the mean.
   bool has_rows(int channel, int coefficient) const override { return channel < kPathX || coefficient == 0; }
   const Rows& measured() const override { return measured_; }
   const Rows& signal() const override { return signal_; }
@@ -70,7 +70,7 @@ class ResetPrediction final : public PredictedFlight {
   Recording recording_;
 
   BeatProjection imu_, wings_, power_;
-  std::vector<char> compared_, smoothed_;  ///< [beat] has path and turn rows; has mean forces of motion capture
+  std::vector<char> compared_, smoothed_;  ///< [beat] has path and rotate rows; has mean forces of motion capture
   Eigen::Matrix3Xd path_m_s2_;             ///< [axis][beat] rows of the path channels, W
   std::vector<Eigen::Matrix3d> attitude_;  ///< [beat] B to W
   bool has_wings_ = false;

@@ -70,13 +70,13 @@ std::vector<StreamRow> differences(const Recording& r, const std::vector<double>
     row.valid = true;
     row.path_m_s2 = (mean(j + kSpan, 0) - 2 * mean(j, 0) + mean(j - kSpan, 0)) / (span_s * span_s);
     // in W, where an accumulated drift stays constant while the body turns
-    row.turn_rad_s = r.smoother.at(r.regimes[j].t_s).attitude.conjugate() *
-                     Vector3d((mean(j + kSpan, 3) - mean(j - kSpan, 3)) / (2 * span_s));
-    sum += row.turn_rad_s;
+    row.rotate_rad_s = r.smoother.at(r.regimes[j].t_s).attitude.conjugate() *
+                       Vector3d((mean(j + kSpan, 3) - mean(j - kSpan, 3)) / (2 * span_s));
+    sum += row.rotate_rad_s;
     n += 1;
   }
   for (StreamRow& row : list)
-    if (row.valid) row.turn_rad_s -= sum / n;
+    if (row.valid) row.rotate_rad_s -= sum / n;
   return list;
 }
 

@@ -1,9 +1,9 @@
 // Motion capture against the IMU's dead reckoning, without a vehicle model. Reckoning drifts, but over a few beats its
 // curvature and rate must agree. Differences show errors of sensors:
-//   path  second difference over kSpan beats of (measured - reckoned) origin / span^2, in W: tilted vertical, marker
-//         off the origin, late poses, misaligned or biased accelerometer
-//   turn  central difference over 2 kSpan beats of the rotation from reckoned to measured attitude / (2 span), taken
-//         in W, in B, less its mean over the flight: changing gyro bias, late poses
+//   path    second difference over kSpan beats of (measured - reckoned) origin / span^2, in W: tilted vertical, marker
+//           off the origin, late poses, misaligned or biased accelerometer
+//   rotate  central difference over 2 kSpan beats of the rotation from reckoned to measured attitude / (2 span), taken
+//           in W, in B, less its mean over the flight: changing gyro bias, late poses
 #pragma once
 
 #include <vector>
@@ -14,7 +14,7 @@
 namespace flappy::gap {
 
 struct StreamRow {
-  Eigen::Vector3d path_m_s2 = Eigen::Vector3d::Zero(), turn_rad_s = Eigen::Vector3d::Zero();
+  Eigen::Vector3d path_m_s2 = Eigen::Vector3d::Zero(), rotate_rad_s = Eigen::Vector3d::Zero();
   bool valid = false;
 };
 

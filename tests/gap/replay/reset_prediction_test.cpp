@@ -25,7 +25,7 @@ TEST(ResetPrediction, TheVehicleThatFlewLeavesTheNoiseOfTheSensors) {
   // to their noise, that of motion capture, comes that of the motion to which the torso is reset.
   for (const int channel :
        {kAngularAccelerationX, kAngularAccelerationY, kAngularAccelerationZ, kSpecificForceX, kSpecificForceY,
-        kSpecificForceZ, kStrokeLeft, kStrokeRight, kCurrentLeft, kCurrentRight, kBattery, kPathX, kTurnZ})
+        kSpecificForceZ, kStrokeLeft, kStrokeRight, kCurrentLeft, kCurrentRight, kBattery, kPathX, kRotateZ})
     for (int c = 0; c < (channel < kPathX ? 3 : 1); ++c) {
       const int g = channel * kCoefficients + c;
       const double ratio = rms(*flights[0], left, g) / rms(*flights[0], noise, g);
