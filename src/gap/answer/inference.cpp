@@ -35,8 +35,8 @@ void hold_out(const Question& question, const Fitter& fitter, const sim::Randomi
     }
   std::vector<int> each(flights.tests.size());
   std::iota(each.begin(), each.end(), 0);
-  std::vector<Residuals> left = question.held_out(fitter, flights, fits, each, threads);
-  for (std::size_t i = 0; i < of.size(); ++i) *of[i] = std::move(left[i]);
+  std::vector<Residuals> rest = question.held_out(fitter, flights, fits, each, threads);
+  for (std::size_t i = 0; i < of.size(); ++i) *of[i] = std::move(rest[i]);
 }
 
 }  // namespace

@@ -44,10 +44,10 @@ void add_hypotheses(const RowContext& context, const sim::Randomisation& uncerta
     h.remainder = effect && a.has_remainder();
     if (effect) h.parameters = estimates_of(a, uncertain);
     if (a.fitted()) {
-      const Losses left = losses_of(context, a.held_out);
-      h.loss = left.mean();
-      h.loss_gain_sd = sd_of_difference(refit, left);
-      h.closure = closure_of(refit, left, r.noise_floor);
+      const Losses rest = losses_of(context, a.held_out);
+      h.loss = rest.mean();
+      h.loss_gain_sd = sd_of_difference(refit, rest);
+      h.closure = closure_of(refit, rest, r.noise_floor);
       if (&a == best_fitted(d)) r.effect_loss = h.loss, r.closure = h.closure;
     }
     (effect ? r.hypotheses : without_effects).push_back(std::move(h));

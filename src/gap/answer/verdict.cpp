@@ -23,10 +23,10 @@ void refute(const Evidence& evidence, const Flights& flights, double min_share, 
   if (!(explainable > kMinExplainable * refit)) return;
   for (ScoredHypothesis& a : d.hypotheses) {
     if (a.kind == HypothesisKind::unknown) continue;
-    const double left = a.kind == HypothesisKind::none ? mean_square(evidence, flights.tests, d.nominal)
+    const double rest = a.kind == HypothesisKind::none ? mean_square(evidence, flights.tests, d.nominal)
                         : a.fitted()                   ? mean_square(evidence, flights.tests, a.held_out)
                                                        : refit;
-    const double share = (refit - left) / explainable;
+    const double share = (refit - rest) / explainable;
     if (share < min_share) a.log_evidence = kRefuted;
   }
 }

@@ -190,18 +190,18 @@ void Evidence::learn(const Residuals& residual, Learn what) {
     VectorXd delta = VectorXd::Zero(q);
     if (flight(0).disturbed(channel)) delta = session_means(residual, g);
     else if (what != Learn::rest_as_noise) delta = inverse_[static_cast<std::size_t>(channel)] * right;
-    const auto left = [&](std::size_t f, std::size_t j) {
+    const auto rest = [&](std::size_t f, std::size_t j) {
       return residual[f][row_of(j, g)] - basis().values(f).row(static_cast<Index>(j)).dot(delta);
     };
     std::vector<double> sizes;
     for (std::size_t f = 0; f < flights_->size(); ++f)
-      for_rows(f, channel, [&](std::size_t j, bool) { sizes.push_back(std::abs(left(f, j))); });
+      for_rows(f, channel, [&](std::size_t j, bool) { sizes.push_back(std::abs(rest(f, j))); });
     const double clip = kClipSd * kRobustSd * io::upper_median(sizes);
     double product = 0, square = 0;
     for (std::size_t f = 0; f < flights_->size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool before) {
         if (!before) return;
-        const double a = std::clamp(left(f, j - 1), -clip, clip), b = std::clamp(left(f, j), -clip, clip);
+        const double a = std::clamp(rest(f, j - 1), -clip, clip), b = std::clamp(rest(f, j), -clip, clip);
         product += a * b;
         square += (a * a + b * b) / 2;
       });
@@ -210,7 +210,7 @@ void Evidence::learn(const Residuals& residual, Learn what) {
     group.past = square > 0 ? std::clamp(product / square, -kMaxPast, kMaxPast) : 0;
     std::vector<double> steps;
     const auto innovation = [&](std::size_t f, std::size_t j, bool before) {
-      return before ? left(f, j) - group.past * left(f, j - 1) : left(f, j) * std::sqrt(1 - group.past * group.past);
+      return before ? rest(f, j) - group.past * rest(f, j - 1) : rest(f, j) * std::sqrt(1 - group.past * group.past);
     };
     for (std::size_t f = 0; f < flights_->size(); ++f)
       for_rows(f, channel, [&](std::size_t j, bool before) { steps.push_back(std::abs(innovation(f, j, before))); });

@@ -448,28 +448,28 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, c
         at(in_log) = fit.at(in_log);
         vehicles.push_back(hypothesis.vehicle(at));
       }
-      std::vector<Residuals> left = residuals(*flights_, vehicles, threads_);
-      left.push_back(fit.residual);
+      std::vector<Residuals> rest = residuals(*flights_, vehicles, threads_);
+      rest.push_back(fit.residual);
       tries.push_back(fit.at);
-      std::vector<SufficientStatistics> statistics(left.size());
-      std::vector<double> costs(left.size(), std::numeric_limits<double>::infinity());
+      std::vector<SufficientStatistics> statistics(rest.size());
+      std::vector<double> costs(rest.size(), std::numeric_limits<double>::infinity());
       Regressors nuisances;
       add_nuisances(true, nuisances);
       const Index others = static_cast<Index>(nuisances.columns.size()),
                   first = static_cast<Index>(r.columns.size()) - others;
       const MatrixXd sums = reduced.sums.block(first, first, others, others);
       const auto weigh = [&](std::size_t i, const std::vector<Index>& linear) {
-        if (left[i].empty()) return;
-        statistics[i] = evidence_->statistics(left[i]);
+        if (rest[i].empty()) return;
+        statistics[i] = evidence_->statistics(rest[i]);
         for (const Index k : linear)
           if (const BasisCoefficients& column = fit.columns[static_cast<std::size_t>(k)]; column.size() > 0)
             evidence_->add(fit.at[k] - tries[i][k], column, statistics[i]);
         costs[i] = cost(nuisances, sums, statistics[i], tries[i]);
       };
-      io::parallel_for(left.size(), threads_, [&](std::size_t i) { weigh(i, in_log); });
+      io::parallel_for(rest.size(), threads_, [&](std::size_t i) { weigh(i, in_log); });
       const auto best = static_cast<std::size_t>(std::ranges::min_element(costs) - costs.begin());
-      if (!in_log.empty() && best + 1 < left.size()) {
-        left[best] = std::move(residuals(*flights_, {hypothesis.vehicle(tries[best])}, threads_)[0]);
+      if (!in_log.empty() && best + 1 < rest.size()) {
+        rest[best] = std::move(residuals(*flights_, {hypothesis.vehicle(tries[best])}, threads_)[0]);
         costs[best] = std::numeric_limits<double>::infinity();
         weigh(best, {});
       }
@@ -480,7 +480,7 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, c
           if (!linearise_here(tries[best])) return fit;
         } else {
           fit.at = tries[best];
-          fit.residual = std::move(left[best]);
+          fit.residual = std::move(rest[best]);
           fit.statistics = std::move(statistics[best]);
           columns_are_here = false;
         }

@@ -273,9 +273,9 @@ void RobotFit::learn_rest_as_noise() {
                             r.all, r.prior_mean());
     BasisCoefficients all = BasisCoefficients::Zero(kGroups, evidence().basis().size());
     for (std::size_t k = 0; k < r.columns.size(); ++k) all += p.mean[static_cast<Eigen::Index>(k)] * *r.columns[k];
-    Residuals left = parameters_.residual;
-    for (std::size_t f = 0; f < left.size(); ++f) left[f] = evidence().without(f, std::move(left[f]), all);
-    take_evidence(evidence().with_rest_as_noise(left));
+    Residuals rest = parameters_.residual;
+    for (std::size_t f = 0; f < rest.size(); ++f) rest[f] = evidence().without(f, std::move(rest[f]), all);
+    take_evidence(evidence().with_rest_as_noise(rest));
     fitter_ = fitter_.with_scales({});
   }
   parameters_.statistics = evidence().statistics(parameters_.residual);

@@ -146,7 +146,7 @@ class ChannelRows {
     std::erase_if(ends, [&](double end) { return end >= highest_Hz; });
     ends.push_back(highest_Hz);
     const double past = memory();
-    Bands left;
+    Bands rest;
     std::vector<double> noise(ends.size(), 0);  // [band] mean square of autoregressive noise of variance 1
     for (std::size_t f = 0; f < around_.beats.size(); ++f) {
       std::vector<double> y(around_.beats[f], 0);
@@ -154,7 +154,7 @@ class ChannelRows {
       for (const TestedBeat& b : beats_)
         if (b.flight == f) y[b.beat] = rows_[0][static_cast<std::size_t>(&b - beats_.data())], covered += 1;
       if (covered == 0) continue;
-      add_bands(y, around_.beats_Hz[f], ends, left);
+      add_bands(y, around_.beats_Hz[f], ends, rest);
       double from = 0;
       for (std::size_t b = 0; b < ends.size(); ++b) {
         const double to = std::min(1.0, 2 * ends[b] / around_.beats_Hz[f]);
@@ -163,14 +163,14 @@ class ChannelRows {
       }
     }
     const std::size_t highest = ends.size() - 1;
-    if (!(left.power[highest] > 0)) return;
-    const double scale = left.power[highest] / noise[highest];
+    if (!(rest.power[highest] > 0)) return;
+    const double scale = rest.power[highest] / noise[highest];
     for (std::size_t b = 0; b < highest; ++b)
-      if (left.bins[b] > 0)
+      if (rest.bins[b] > 0)
         add(ResidualTest::frequency, {"frequency", Regime::Third::all, b == 0 ? 0 : ends[b - 1], ends[b], "Hz"},
-            std::sqrt(left.power[b] / static_cast<double>(beats_.size())), noise_sd(0) * std::sqrt(noise[b]),
-            io::f_tail(left.power[b] / noise[b] / scale, 2 * static_cast<double>(left.bins[b]),
-                       2 * static_cast<double>(left.bins[highest])),
+            std::sqrt(rest.power[b] / static_cast<double>(beats_.size())), noise_sd(0) * std::sqrt(noise[b]),
+            io::f_tail(rest.power[b] / noise[b] / scale, 2 * static_cast<double>(rest.bins[b]),
+                       2 * static_cast<double>(rest.bins[highest])),
             places);
   }
 

@@ -105,14 +105,14 @@ void add_open(const std::vector<Rival>& rivals, const Flights& flights, const Ev
     open.push_back(i);
   }
   if (open.empty()) return;
-  std::vector<Residuals> left = residuals(flights, vehicles, 1);
-  if (left[0].empty()) return;
-  const SufficientStatistics without = evidence.statistics(left[0]);
+  std::vector<Residuals> rest = residuals(flights, vehicles, 1);
+  if (rest[0].empty()) return;
+  const SufficientStatistics without = evidence.statistics(rest[0]);
   for (std::size_t k = 0; k < open.size(); ++k) {
-    if (left[k + 1].empty()) continue;
+    if (rest[k + 1].empty()) continue;
     Expected e = *expected[0];
     e.law_sd.setZero();
-    const SufficientStatistics with = evidence.statistics(left[k + 1]);
+    const SufficientStatistics with = evidence.statistics(rest[k + 1]);
     for (std::size_t f = 0; f < with.sums.size(); ++f)
       for (std::size_t g = 0; g < with.sums[f].size(); ++g)
         e.residual.sums[f][g] += with.sums[f][g] - without.sums[f][g];

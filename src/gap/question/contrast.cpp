@@ -165,8 +165,8 @@ VectorXd Contrast::next_effects(const Fitter& fitter, const Hypothesis& hypothes
   }
   std::vector<VehicleHypothesis> vehicles;
   for (const VectorXd& at : tries) vehicles.push_back(hypothesis.vehicle(at));
-  std::vector<Residuals> left = residuals(fitter.flights(), vehicles, fitter.threads());
-  left.push_back(fit.residual);
+  std::vector<Residuals> rest = residuals(fitter.flights(), vehicles, fitter.threads());
+  rest.push_back(fit.residual);
   tries.push_back(fit.at);
   Fit parameters = fit;
   parameters.columns.resize(static_cast<std::size_t>(shared));
@@ -175,9 +175,9 @@ VectorXd Contrast::next_effects(const Fitter& fitter, const Hypothesis& hypothes
   const VectorXd prior_mean = r.prior_mean();
   std::vector<double> values(tries.size(), -std::numeric_limits<double>::infinity());
   io::parallel_for(tries.size(), fitter.threads(), [&](std::size_t i) {
-    if (left[i].empty()) return;
+    if (rest[i].empty()) return;
     const Reduced reduced =
-        fitter.evidence().reduce(fitter.evidence().statistics(left[i]), r.columns, fitter.all_flights(), sd);
+        fitter.evidence().reduce(fitter.evidence().statistics(rest[i]), r.columns, fitter.all_flights(), sd);
     values[i] = Evidence::posterior(reduced, r.all, prior_mean, false).log_evidence -
                 0.5 * tries[i].tail(effects).squaredNorm();
   });
@@ -251,15 +251,15 @@ std::vector<Residuals> Contrast::held_out(const Fitter& fitter, const Flights& f
                                           int /*threads*/) const {
   const std::size_t first = flights.references.size();
   const std::vector<std::vector<char>> others = others_of(flights, fold);
-  std::vector<Residuals> left(fits.size(), Residuals(fold.size()));
+  std::vector<Residuals> rest(fits.size(), Residuals(fold.size()));
   for (std::size_t i = 0; i < fits.size(); ++i)
     for (std::size_t k = 0; k < others.size(); ++k) {
       const BasisCoefficients explained = fitter.explained(*fits[i].fit, others[k]);
       for (std::size_t f = 0; f < fold.size(); ++f)
         if (fold[f] == static_cast<int>(k))
-          left[i][f] = fitter.evidence().without(first + f, fits[i].fit->residual[first + f], explained);
+          rest[i][f] = fitter.evidence().without(first + f, fits[i].fit->residual[first + f], explained);
     }
-  return left;
+  return rest;
 }
 
 /// In none and parameters, nothing that matters changed.

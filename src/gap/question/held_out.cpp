@@ -26,15 +26,15 @@ std::vector<Residuals> held_out_by_simulation(const Fitter& fitter, const Flight
       nuisances.push_back(std::move(joint.nuisances));
     }
   std::vector<Residuals> rows = residuals(flights, vehicles, threads);
-  std::vector<Residuals> left(fits.size(), Residuals(fold.size()));
+  std::vector<Residuals> rest(fits.size(), Residuals(fold.size()));
   for (std::size_t i = 0; i < fits.size(); ++i)
     for (std::size_t f = 0; f < fold.size(); ++f) {
       const std::size_t k = i * others.size() + static_cast<std::size_t>(fold[f]);
       if (rows[k].empty()) continue;
-      left[i][f] =
+      rest[i][f] =
           less_nuisances ? fitter.evidence().without(f, std::move(rows[k][f]), nuisances[k]) : std::move(rows[k][f]);
     }
-  return left;
+  return rest;
 }
 
 }  // namespace flappy::gap

@@ -40,11 +40,11 @@ void for_rows(const FlightList& flights, int channel, const Use& use) {
         use(f, j, j * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients);
 }
 
-double rms_of(const FlightList& flights, const Residuals& left, int channel) {
+double rms_of(const FlightList& flights, const Residuals& rest, int channel) {
   double sum = 0, n = 0;
   for_rows(flights, channel, [&](std::size_t f, std::size_t, std::size_t row) {
-    if (left[f].empty()) return;
-    sum += left[f][row] * left[f][row];
+    if (rest[f].empty()) return;
+    sum += rest[f][row] * rest[f][row];
     n += 1;
   });
   return n > 0 ? std::sqrt(sum / n) : 0;
@@ -122,16 +122,16 @@ void control(const Flights& flights, const FittedHypothesis& all, const VectorXd
     }
     vehicles.push_back(all.hypothesis.vehicle(without));
   }
-  const std::vector<Residuals> left = residuals(flights, vehicles, threads);
+  const std::vector<Residuals> rest = residuals(flights, vehicles, threads);
   std::mt19937_64 random(1);
   for (std::size_t e = 0; e + 1 < vehicles.size(); ++e) {
-    if (left[0].empty() || left[e + 1].empty()) continue;
+    if (rest[0].empty() || rest[e + 1].empty()) continue;
     Validation::Control best{all.hypothesis.effects()[e], "", 0, 0};
     for (const int channel : channels_of(flights.tests)) {
       std::vector<std::vector<double>> y(flights.size()), x(flights.size());
       for_rows(flights.tests, channel, [&](std::size_t f, std::size_t, std::size_t row) {
-        y[f].push_back(left[e + 1][f][row]);
-        x[f].push_back(left[e + 1][f][row] - left[0][f][row]);
+        y[f].push_back(rest[e + 1][f][row]);
+        x[f].push_back(rest[e + 1][f][row] - rest[0][f][row]);
       });
       centre(y);
       centre(x);
@@ -192,7 +192,7 @@ Residuals smoothed_away(const Evidence& evidence, const Flights& flights, const 
   const auto values = [&](std::size_t f, std::size_t j) {
     return basis.values(flights.references.size() + f).row(static_cast<Index>(j));
   };
-  Residuals left = residual;
+  Residuals rest = residual;
   for (const int channel : channels_of(tests)) {
     struct Sums {
       Eigen::MatrixXd normal;
@@ -218,10 +218,10 @@ Residuals smoothed_away(const Evidence& evidence, const Flights& flights, const 
       fits.push_back(others.normal.ldlt().solve(others.right));
     }
     for_rows(tests, channel, [&](std::size_t f, std::size_t j, std::size_t row) {
-      if (!left[f].empty()) left[f][row] -= values(f, j).dot(fits[f]);
+      if (!rest[f].empty()) rest[f][row] -= values(f, j).dot(fits[f]);
     });
   }
-  return left;
+  return rest;
 }
 
 double mean_square(const Evidence& evidence, const FlightList& tests, const Residuals& residual) {
@@ -239,7 +239,7 @@ Validation validation_of(const Question& question, const Fitter& fitter, const s
                          const Flights& flights, const Inference& d, int threads) {
   Validation v;
   std::vector<FittedHypothesis> fits = {{Hypothesis(uncertain, {}), &d.parameters}};
-  std::vector<const Residuals*> left = {&d.refit};
+  std::vector<const Residuals*> rest = {&d.refit};
   const std::vector<std::string>& effects = d.conclusion().effects;
   for (std::size_t n = 1; n <= effects.size(); ++n) {
     const std::vector<std::string> set(effects.begin(), effects.begin() + static_cast<std::ptrdiff_t>(n));
@@ -248,7 +248,7 @@ Validation validation_of(const Question& question, const Fitter& fitter, const s
     });
     if (found == d.hypotheses.end()) continue;
     fits.push_back({Hypothesis(uncertain, set), &found->fit});
-    left.push_back(&found->held_out);
+    rest.push_back(&found->held_out);
   }
   std::vector<int> type;
   std::vector<std::string> types;
@@ -260,7 +260,7 @@ Validation validation_of(const Question& question, const Fitter& fitter, const s
   std::vector<Residuals> by_type;
   if (types.size() > 1) by_type = question.held_out(fitter, flights, fits, type, threads);
   else
-    for (const Residuals* each : left) by_type.push_back(*each);  // holding out the only type leaves no flight
+    for (const Residuals* each : rest) by_type.push_back(*each);  // holding out the only type leaves no flight
   const auto rung = [&](const std::string& added, const Residuals& each, const Residuals& by_types) {
     v.ladder.push_back({added, {}});
     for (const int channel : channels_of(flights.tests))
@@ -268,7 +268,7 @@ Validation validation_of(const Question& question, const Fitter& fitter, const s
   };
   rung("file", d.nominal, d.nominal);
   for (std::size_t i = 0; i < fits.size(); ++i)
-    rung(i == 0 ? "parameters" : fits[i].hypothesis.effects().back(), *left[i], by_type[i]);
+    rung(i == 0 ? "parameters" : fits[i].hypothesis.effects().back(), *rest[i], by_type[i]);
   const FittedHypothesis& last = fits.back();
   control(flights, last, fitter.joint_fit(last.hypothesis, *last.fit, fitter.all_flights()).at, threads, v);
   agree(fitter, flights, last, v);

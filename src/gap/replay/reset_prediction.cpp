@@ -340,15 +340,15 @@ std::vector<ImuResidual> ResetPrediction::imu_residuals(const VehicleHypothesis&
     const auto sample = r.smoother.imu_sample(r.end_s[k] - r.interval_s(k) / 2);
     if (!sample || !r.valid[k] || r.beat[k] < kSpinUpBeats) continue;
     if (!list.empty() && list.back().sample == *sample) continue;  // a gap of the IMU, cut into pieces
-    ImuResidual left{*sample, r.force_m_s2[k], Eigen::Vector3d::Zero()};
+    ImuResidual rest{*sample, r.force_m_s2[k], Eigen::Vector3d::Zero()};
     for (int i = 0; i < 3; ++i) {
       const auto predicted = [&](int row) {
         return double{seen.samples[k * kSample + static_cast<std::size_t>(row + i) * kVehicles]};
       };
-      left.force_m_s2[i] -= predicted(kSpecificForceX);
-      left.rate_rad_s[i] = -r.interval_s(k) * predicted(kAngularAccelerationX);
+      rest.force_m_s2[i] -= predicted(kSpecificForceX);
+      rest.rate_rad_s[i] = -r.interval_s(k) * predicted(kAngularAccelerationX);
     }
-    list.push_back(left);
+    list.push_back(rest);
   }
   return list;
 }
