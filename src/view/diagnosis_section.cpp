@@ -94,7 +94,7 @@ class DiagnosisSection {
       : diagnosis_(diagnosis), rivals_(rivals_of(diagnosis)), section_("diagnosis", "Diagnosis", file.string()) {
     // only vehicles with wings are tested by the harmonics of the beat
     beat_averaged_ = diagnosis.validation ||
-                     (!diagnosis.locations.empty() && of(gap::Stage::refit, gap::ResidualTest::phase).empty());
+                     (!diagnosis.locations.empty() && of(gap::Fitted::refit, gap::ResidualTest::phase).empty());
   }
 
   Section composed() {
@@ -177,17 +177,17 @@ class DiagnosisSection {
     section_.say("Next: mend the logs, until flappy-gap check finds no fault.");
   }
 
-  std::vector<const Location*> of(gap::Stage stage, gap::ResidualTest test) const {
+  std::vector<const Location*> of(gap::Fitted fitted, gap::ResidualTest test) const {
     std::vector<const Location*> list;
     for (const Location& l : diagnosis_.locations)
-      if (l.stage == stage && l.test == test) list.push_back(&l);
+      if (l.fitted == fitted && l.test == test) list.push_back(&l);
     return list;
   }
-  std::vector<const Location*> refitted(gap::ResidualTest test) const { return of(gap::Stage::refit, test); }
+  std::vector<const Location*> refitted(gap::ResidualTest test) const { return of(gap::Fitted::refit, test); }
 
   void add_where() {
     ask("Where is the gap?");
-    const std::vector<Location> where = largest_discoveries(diagnosis_, gap::Stage::refit, kMaxWhere);
+    const std::vector<Location> where = largest_discoveries(diagnosis_, gap::Fitted::refit, kMaxWhere);
     if (where.empty()) {
       section_.say("With parameters refitted nothing stands out of the noise.");
     } else {
@@ -415,7 +415,7 @@ class DiagnosisSection {
           with.c_str(), 100 * c->value, 100 * c->low, 100 * c->high));
     else section_.say("How much of the gap an effect closes cannot be told from noise.");
     const std::string brief = with.size() > kLongName ? "these effects" : with;
-    const std::pair<std::string, std::optional<double>> stages[] = {{"vehicle's file", diagnosis_.nominal_loss},
+    const std::pair<std::string, std::optional<double>> losses[] = {{"vehicle's file", diagnosis_.nominal_loss},
                                                                     {"parameters refitted", diagnosis_.refit_loss},
                                                                     {"with " + brief, diagnosis_.effect_loss},
                                                                     {"noise alone", diagnosis_.noise_floor}};
@@ -427,7 +427,7 @@ class DiagnosisSection {
         .y = {},
         .categories = {},
         .series = {{.name = "", .draw = Draw::bars, .colour = Colour::blue, .x = {}, .y = {}, .low = {}, .high = {}}}};
-    for (const auto& [name, loss] : stages) {
+    for (const auto& [name, loss] : losses) {
       if (!loss) continue;
       f.series[0].x.push_back(*loss);
       f.series[0].y.push_back(near_category(f.categories.size()));
@@ -439,10 +439,10 @@ class DiagnosisSection {
   }
 
   void add_channels(const std::string& with) {
-    const std::pair<gap::Stage, std::string> stages[] = {{gap::Stage::nominal, "vehicle's file"},
-                                                         {gap::Stage::refit, "parameters refitted"},
-                                                         {gap::Stage::effect, "with " + with}};
-    constexpr Colour kStageColours[] = {Colour::grey, Colour::vermillion, Colour::blue};
+    const std::pair<gap::Fitted, std::string> fits[] = {{gap::Fitted::nominal, "vehicle's file"},
+                                                        {gap::Fitted::refit, "parameters refitted"},
+                                                        {gap::Fitted::effect, "with " + with}};
+    constexpr Colour kFitColours[] = {Colour::grey, Colour::vermillion, Colour::blue};
     Figure f{.id = "channels",
              .title = "Residual by channel, before and after",
              .note = "Rms of the residual over that of noise, all beats: 1 is noise alone.",
@@ -451,17 +451,17 @@ class DiagnosisSection {
              .categories = {},
              .series = {}};
     std::vector<std::string> channels;
-    for (const Location* l : of(gap::Stage::nominal, gap::ResidualTest::channel)) channels.push_back(l->channel);
+    for (const Location* l : of(gap::Fitted::nominal, gap::ResidualTest::channel)) channels.push_back(l->channel);
     for (const std::string& c : channels) f.categories.push_back(channel_words(c));
     for (std::size_t s = 0; s < 3; ++s) {
-      Series series{.name = stages[s].second,
+      Series series{.name = fits[s].second,
                     .draw = Draw::bars,
-                    .colour = kStageColours[s],
+                    .colour = kFitColours[s],
                     .x = {},
                     .y = {},
                     .low = {},
                     .high = {}};
-      for (const Location* l : of(stages[s].first, gap::ResidualTest::channel)) {
+      for (const Location* l : of(fits[s].first, gap::ResidualTest::channel)) {
         const auto k = static_cast<std::size_t>(std::ranges::find(channels, l->channel) - channels.begin());
         series.x.push_back(over_noise(*l));
         series.y.push_back(near_category(k, s, 3));

@@ -316,7 +316,7 @@ Json by_the_beat() {
   json["verdict"] = {
       {"kind", "effect"}, {"effects", {"flapping_counter_force"}}, {"remainder", false}, {"probability", 0.99}};
   json["locations"] = {
-      {{"stage", "refit"},
+      {{"fitted", "refit"},
        {"test", "regime"},
        {"channel", "specific_force_x"},
        {"unit", "m/s^2"},

@@ -1,4 +1,4 @@
-// The middle stages of a diagnosis: effects are screened, fitted, and combined into hypotheses with several effects.
+// The middle of a diagnosis: effects are screened, fitted, and combined into hypotheses with several effects.
 #pragma once
 
 #include "gap/question/question.hpp"

@@ -134,12 +134,12 @@ Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flig
   });
 
   const ScoredHypothesis* best = best_fitted(inference);
-  const std::pair<Stage, const Residuals*> stages[] = {{Stage::nominal, &inference.nominal},
-                                                       {Stage::refit, &inference.refit},
-                                                       {Stage::effect, best != nullptr ? &best->held_out : nullptr}};
-  for (const auto& [stage, residual] : stages) {
+  const std::pair<Fitted, const Residuals*> fits[] = {{Fitted::nominal, &inference.nominal},
+                                                      {Fitted::refit, &inference.refit},
+                                                      {Fitted::effect, best != nullptr ? &best->held_out : nullptr}};
+  for (const auto& [fitted, residual] : fits) {
     if (residual == nullptr) continue;
-    std::vector<ResidualLocation> locations = locate(context, *residual, stage);
+    std::vector<ResidualLocation> locations = locate(context, *residual, fitted);
     r.locations.insert(r.locations.end(), std::make_move_iterator(locations.begin()),
                        std::make_move_iterator(locations.end()));
   }

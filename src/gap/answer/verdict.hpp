@@ -1,4 +1,4 @@
-// The last stage of a diagnosis: the probabilities of the hypotheses, and the verdict.
+// The end of a diagnosis: the probabilities of the hypotheses, and the verdict.
 #pragma once
 
 #include <functional>

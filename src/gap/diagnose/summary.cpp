@@ -94,7 +94,7 @@ std::string next_line(const Diagnosis& r, const std::string& out) {
 std::vector<ResidualLocation> one_of_each_test(const Diagnosis& r) {
   std::vector<ResidualLocation> list;
   for (const ResidualTest test : {ResidualTest::phase, ResidualTest::regime, ResidualTest::frequency})
-    for (const ResidualLocation& p : largest_discoveries(r, Stage::refit, r.locations.size()))
+    for (const ResidualLocation& p : largest_discoveries(r, Fitted::refit, r.locations.size()))
       if (p.test == test) {
         list.push_back(p);
         break;

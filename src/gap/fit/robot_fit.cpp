@@ -53,7 +53,7 @@ std::vector<std::string> without_idle(std::vector<std::string> withheld, const F
 
 }  // namespace
 
-RobotFit::RobotFit(Stages stages, const FitRules& rules, const Flights& flights, const sim::Randomisation& uncertain,
+RobotFit::RobotFit(Extent extent, const FitRules& rules, const Flights& flights, const sim::Randomisation& uncertain,
                    const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads)
     : flights_(flights),
       uncertain_(uncertain),
@@ -61,27 +61,27 @@ RobotFit::RobotFit(Stages stages, const FitRules& rules, const Flights& flights,
       threads_(io::thread_count(threads)),
       fitter_(rules, flights, std::make_shared<const Evidence>(rules, flights, discrepancy, threads_), threads_),
       no_effects_(uncertain_, {}) {
-  if (stages == Stages::planned) {
+  if (extent == Extent::planned) {
     parameters_ = nominal_ = fitter_.linearise(no_effects_, no_effects_.start(), Fitter::axes(no_effects_));
     find_nuisance_columns();
     return;
   }
   fit_parameters();
-  if (stages == Stages::all) refit_with_nuisances();
+  if (extent == Extent::all) refit_with_nuisances();
 }
 
 RobotFit::RobotFit(const FitRules& rules, const Flights& flights, const sim::Randomisation& uncertain,
                    const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads)
-    : RobotFit(Stages::all, rules, flights, uncertain, discrepancy, std::move(withheld), threads) {}
+    : RobotFit(Extent::all, rules, flights, uncertain, discrepancy, std::move(withheld), threads) {}
 
 RobotFit RobotFit::of_references(const FitRules& rules, const Flights& flights, const sim::Randomisation& uncertain,
                                  const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads) {
-  return RobotFit(Stages::parameters, rules, flights, uncertain, discrepancy, std::move(withheld), threads);
+  return RobotFit(Extent::parameters, rules, flights, uncertain, discrepancy, std::move(withheld), threads);
 }
 
 RobotFit RobotFit::planned(const FitRules& rules, const Flights& flights, const sim::Randomisation& uncertain,
                            const ModelDiscrepancy& discrepancy, int threads) {
-  return RobotFit(Stages::planned, rules, flights, uncertain, discrepancy, {}, threads);
+  return RobotFit(Extent::planned, rules, flights, uncertain, discrepancy, {}, threads);
 }
 
 RobotFit::RobotFit(const FitRules& rules, const RobotFit& reference, const Flights& flights)

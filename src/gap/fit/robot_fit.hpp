@@ -1,4 +1,4 @@
-// Fits a vehicle's parameters to a robot's flights, and learns what later stages share: noise, scales of the model
+// Fits a vehicle's parameters to a robot's flights, and learns what later fits share: noise, scales of the model
 // discrepancy, nuisance regressors, and the change by each magnitude of the catalogue.
 #pragma once
 
@@ -81,8 +81,8 @@ class RobotFit {
 
  private:
   /// planned: fits nothing; parameters: fits them alone; all: fits them with all nuisances.
-  enum class Stages { planned, parameters, all };
-  RobotFit(Stages stages, const FitRules& rules, const Flights& flights, const sim::Randomisation& uncertain,
+  enum class Extent { planned, parameters, all };
+  RobotFit(Extent extent, const FitRules& rules, const Flights& flights, const sim::Randomisation& uncertain,
            const ModelDiscrepancy& discrepancy, std::vector<std::string> withheld, int threads);
   void fit_parameters();
   void linearise_around(const Fit& parameters);

@@ -37,8 +37,8 @@ struct TestedBeat {
 
 class ChannelRows {
  public:
-  ChannelRows(const RowContext& around, const Residuals& residual, int channel, Stage stage)
-      : around_(around), channel_(channel), stage_(stage) {
+  ChannelRows(const RowContext& around, const Residuals& residual, int channel, Fitted fitted)
+      : around_(around), channel_(channel), fitted_(fitted) {
     const std::vector<int> all = blocks_of(around.beats, kLongBlock), fine = blocks_of(around.beats, kShortBlock);
     std::size_t i = 0;
     for (std::size_t f = 0; f < around.beats.size(); ++f)
@@ -74,7 +74,7 @@ class ChannelRows {
   void add(ResidualTest test, Regime regime, double gap, double floor, double p,
            std::vector<ResidualLocation>& places) const {
     places.push_back(
-        {stage_, test, channel_name(channel_), channel_unit(channel_), std::move(regime), gap, floor, p, false});
+        {fitted_, test, channel_name(channel_), channel_unit(channel_), std::move(regime), gap, floor, p, false});
   }
 
   /// Tests the coefficients from `first` to before `last`, in the beats where `in` is 1.
@@ -209,7 +209,7 @@ class ChannelRows {
 
   const RowContext& around_;
   int channel_;
-  Stage stage_;
+  Fitted fitted_;
   std::vector<TestedBeat> beats_;
   std::vector<int> block_, short_block_;
   std::vector<std::vector<double>> rows_;  ///< [coefficient][beat]
@@ -243,9 +243,9 @@ RowContext row_context_of(const FlightList& flights, std::vector<double> noise_s
   return s;
 }
 
-std::vector<ResidualLocation> locate(const RowContext& around, const Residuals& residual, Stage stage) {
+std::vector<ResidualLocation> locate(const RowContext& around, const Residuals& residual, Fitted fitted) {
   std::vector<ResidualLocation> places;
-  for (int channel = 0; channel < kChannels; ++channel) ChannelRows(around, residual, channel, stage).test_all(places);
+  for (int channel = 0; channel < kChannels; ++channel) ChannelRows(around, residual, channel, fitted).test_all(places);
   std::vector<double> p_values;
   for (const ResidualLocation& p : places) p_values.push_back(p.p_value);
   const std::vector<char> found = discoveries(p_values, kFalseDiscoveries);

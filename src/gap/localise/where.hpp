@@ -7,7 +7,7 @@
 //   input       the part that is proportional to an input
 //   whiteness   correlation between blocks of beats; not for path and rotate, whose rows are differences over beats
 // The tests of channel, regime, phase and input use sums over blocks (significance.hpp) and the smallest p value of a
-// channel's coefficients times their number (Bonferroni). The share of false discoveries of a stage is held to
+// channel's coefficients times their number (Bonferroni). The share of false discoveries after a fit is held to
 // kFalseDiscoveries.
 #pragma once
 
@@ -46,8 +46,8 @@ struct RowContext {
 };
 RowContext row_context_of(const FlightList& flights, std::vector<double> noise_sd);
 
-/// All rows of the table for one stage. `residual`: [flight], empty where the simulation diverged. In the test of an
-/// input, `gap` and `noise_floor` are the rms of the part proportional to it.
-std::vector<ResidualLocation> locate(const RowContext& around, const Residuals& residual, Stage stage);
+/// All rows of the table for the residual after a fit. `residual`: [flight], empty where the simulation diverged. In the
+/// test of an input, `gap` and `noise_floor` are the rms of the part proportional to it.
+std::vector<ResidualLocation> locate(const RowContext& around, const Residuals& residual, Fitted fitted);
 
 }  // namespace flappy::gap

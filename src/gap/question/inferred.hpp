@@ -1,4 +1,4 @@
-// What the stages of a diagnosis hand to each other: options, hypotheses with their evidence, and all that is inferred.
+// What the parts of a diagnosis hand to each other: options, hypotheses with their evidence, and all that is inferred.
 #pragma once
 
 #include <functional>

@@ -40,15 +40,15 @@ std::vector<Residuals> residuals_with_effects(const FlightList& flights, const s
   for (std::size_t i = 0; i < vehicles.size(); ++i) by_sensors[sensors_of(vehicles[i])].push_back(i);
   std::vector<Residuals> list(vehicles.size());
   const auto compare = [&](const FlightList& seen, const std::vector<std::size_t>& which, int at_once) {
-    std::vector<const VehicleHypothesis*> group;
-    for (const std::size_t i : which) group.push_back(&vehicles[i]);
-    std::vector<Residuals> predicted = predict_all(seen, group, at_once);
-    for (std::size_t g = 0; g < which.size(); ++g) {
-      Residuals& s = predicted[g];
+    std::vector<const VehicleHypothesis*> these;
+    for (const std::size_t i : which) these.push_back(&vehicles[i]);
+    std::vector<Residuals> predicted = predict_all(seen, these, at_once);
+    for (std::size_t k = 0; k < which.size(); ++k) {
+      Residuals& s = predicted[k];
       const bool whole = std::ranges::none_of(s, [](const Rows& rows) { return rows.empty(); });
       for (std::size_t f = 0; whole && f < seen.size(); ++f)
         for (std::size_t i = 0; i < s[f].size(); ++i) s[f][i] = seen[f]->measured()[i] - s[f][i];
-      if (whole) list[which[g]] = std::move(s);
+      if (whole) list[which[k]] = std::move(s);
     }
   };
   std::vector<std::pair<EffectValues, std::vector<std::size_t>>> corrected;

@@ -17,9 +17,9 @@ const char* name_of(VerdictKind kind) {
   return kNames[static_cast<int>(kind)];
 }
 
-const char* name_of(Stage stage) {
+const char* name_of(Fitted fitted) {
   static const char* const kNames[] = {"nominal", "refit", "effect"};
-  return kNames[static_cast<int>(stage)];
+  return kNames[static_cast<int>(fitted)];
 }
 
 const char* name_of(ResidualTest test) {
@@ -49,10 +49,10 @@ std::string text_of(const Regime& r, ResidualTest test) {
   return "";
 }
 
-std::vector<ResidualLocation> largest_discoveries(const Diagnosis& diagnosis, Stage stage, std::size_t most) {
+std::vector<ResidualLocation> largest_discoveries(const Diagnosis& diagnosis, Fitted fitted, std::size_t most) {
   std::vector<ResidualLocation> list;
   for (const ResidualLocation& l : diagnosis.locations)
-    if (l.stage == stage && l.discovered && l.test != ResidualTest::input && l.test != ResidualTest::whiteness)
+    if (l.fitted == fitted && l.discovered && l.test != ResidualTest::input && l.test != ResidualTest::whiteness)
       list.push_back(l);
   std::ranges::stable_sort(list, std::greater{},
                            [](const ResidualLocation& l) { return l.gap / std::max(l.noise_floor, 1e-300); });

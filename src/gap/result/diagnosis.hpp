@@ -59,8 +59,9 @@ struct Verdict {
   double probability = 0;            ///< for a group: the sum over all its hypotheses
 };
 
-/// Stages of the residuals: the vehicle file as it is; its parameters fitted; the most probable effects fitted as well.
-enum class Stage { nominal, refit, effect };
+/// What had been fitted before a residual is tested: nothing, the vehicle file is as it is; its parameters; the most
+/// probable effects as well.
+enum class Fitted { nominal, refit, effect };
 
 enum class ResidualTest { channel, regime, phase, frequency, input, whiteness };
 
@@ -75,13 +76,13 @@ struct Regime {
 
 /// A residual and that of noise alone, as root mean squares in the channel's unit.
 struct ResidualLocation {
-  Stage stage = Stage::refit;
+  Fitted fitted = Fitted::refit;
   ResidualTest test = ResidualTest::channel;
   std::string channel, unit;
   Regime regime;
   double gap = 0, noise_floor = 0;
   double p_value = 1;       ///< p value of the null hypothesis that the residual is noise alone
-  bool discovered = false;  ///< significant; at most 5 % of the discoveries of a stage are false
+  bool discovered = false;  ///< significant; at most 5 % of the discoveries after a fit are false
 };
 
 struct UnexplainedTerm {
@@ -185,14 +186,14 @@ struct NamedDiagnosis {
 
 const char* name_of(HypothesisKind kind);
 const char* name_of(VerdictKind kind);
-const char* name_of(Stage stage);
+const char* name_of(Fitted fitted);
 const char* name_of(ResidualTest test);
 
 /// Text of a regime, for example "height below 0.5 m", "harmonic 2 of the beat", "0.5 to 1 Hz".
 std::string text_of(const Regime& regime, ResidualTest test);
 
-/// Discoveries of a stage by channel, regime, phase or frequency only; the largest relative to its noise first.
-std::vector<ResidualLocation> largest_discoveries(const Diagnosis& diagnosis, Stage stage, std::size_t most);
+/// Discoveries after a fit by channel, regime, phase or frequency only; the largest relative to its noise first.
+std::vector<ResidualLocation> largest_discoveries(const Diagnosis& diagnosis, Fitted fitted, std::size_t most);
 
 /// Unit of a parameter by the suffix of its name: "kg/m" for line_kg_m; "" if it has none.
 std::string unit_of(const std::string& name);

@@ -36,7 +36,7 @@ constexpr HypothesisKind kHypotheses[] = {HypothesisKind::none, HypothesisKind::
                                           HypothesisKind::unknown};
 constexpr VerdictKind kVerdicts[] = {VerdictKind::effect, VerdictKind::group,   VerdictKind::parameters,
                                      VerdictKind::none,   VerdictKind::unknown, VerdictKind::data};
-constexpr Stage kStages[] = {Stage::nominal, Stage::refit, Stage::effect};
+constexpr Fitted kFitted[] = {Fitted::nominal, Fitted::refit, Fitted::effect};
 constexpr ResidualTest kTests[] = {ResidualTest::channel,   ResidualTest::regime, ResidualTest::phase,
                                    ResidualTest::frequency, ResidualTest::input,  ResidualTest::whiteness};
 
@@ -78,7 +78,7 @@ UnexplainedTerm term_of(const Json& json) {
 }
 
 Json to_json(const ResidualLocation& l) {
-  return {{"stage", name_of(l.stage)},
+  return {{"fitted", name_of(l.fitted)},
           {"test", name_of(l.test)},
           {"channel", l.channel},
           {"unit", l.unit},
@@ -99,7 +99,7 @@ ResidualLocation location_of(const Json& json) {
   const std::string third = regime.at("third");
   const auto at = std::ranges::find(kThirds, third);
   if (at == std::end(kThirds)) throw Json::other_error::create(500, "unknown third \"" + third + "\"", &regime);
-  return {value_named(json.at("stage"), name_of, kStages),
+  return {value_named(json.at("fitted"), name_of, kFitted),
           value_named(json.at("test"), name_of, kTests),
           json.at("channel"),
           json.at("unit"),

@@ -1,4 +1,4 @@
-// The stages of a diagnosis on simulated flights, where the truth is known.
+// The parts of a diagnosis on simulated flights, where the truth is known.
 #include "gap/answer/inference.hpp"
 
 #include <gtest/gtest.h>

@@ -17,7 +17,7 @@ TEST(Summary, SaysWhatToDoInThirtyLines) {
     r.hypotheses.push_back(c);
   }
   for (int i = 0; i < 50; ++i) {
-    r.locations.push_back({Stage::refit,
+    r.locations.push_back({Fitted::refit,
                            i % 2 == 0 ? ResidualTest::regime : ResidualTest::phase,
                            "specific_force_x",
                            "m/s^2",
@@ -28,7 +28,7 @@ TEST(Summary, SaysWhatToDoInThirtyLines) {
                            true});
     r.moved_parameters.emplace_back("torso.mass_kg", 1.5);
   }
-  r.locations.push_back({Stage::refit,
+  r.locations.push_back({Fitted::refit,
                          ResidualTest::frequency,
                          "angular_acceleration_x",
                          "rad/s^2",

@@ -181,7 +181,7 @@ TEST(Where, FindsNothingInNoise) {
   std::map<ResidualTest, std::pair<double, double>> low;  // p below 0.05, of all
   for (unsigned seed = 1; seed <= 20; ++seed) {
     const Flown f = flown(seed, 0.3);
-    for (const ResidualLocation& p : locate(f.around, f.residual, Stage::refit)) {
+    for (const ResidualLocation& p : locate(f.around, f.residual, Fitted::refit)) {
       found += p.discovered;
       low[p.test].first += p.p_value < 0.05;
       low[p.test].second += 1;
@@ -200,7 +200,7 @@ TEST(Where, FindsWhatDependsOnHeight) {
   for (std::size_t flight = 0; flight < 3; ++flight)
     for (std::size_t j = 0; j < 340; ++j)
       if (low(flight, j)) f.residual[flight][j * kRowsPerBeat + group_of(kSpecificForceZ, 0)] += 6;
-  const std::vector<ResidualLocation> places = locate(f.around, f.residual, Stage::refit);
+  const std::vector<ResidualLocation> places = locate(f.around, f.residual, Fitted::refit);
   const ResidualLocation& below = place(places, ResidualTest::regime, kSpecificForceZ, "height below");
   EXPECT_TRUE(below.discovered);
   EXPECT_LT(below.p_value, 1e-5);
@@ -223,7 +223,7 @@ TEST(Where, FindsWhatFollowsAnInput) {
   for (std::size_t flight = 0; flight < 3; ++flight)
     for (std::size_t j = 0; j < 340; ++j)
       f.residual[flight][j * kRowsPerBeat + group_of(kAngularAccelerationY, 1)] += f.around.inputs[0].values[flight][j];
-  const std::vector<ResidualLocation> places = locate(f.around, f.residual, Stage::refit);
+  const std::vector<ResidualLocation> places = locate(f.around, f.residual, Fitted::refit);
   const ResidualLocation& p = place(places, ResidualTest::input, kAngularAccelerationY, "input");
   EXPECT_TRUE(p.discovered);
   EXPECT_NEAR(p.gap, std::sqrt(0.5), 0.2) << "a cosine of amplitude 1 and input of rms 1";
@@ -234,10 +234,10 @@ TEST(Where, LeavesOutWhatIsNotCovered) {
   Flown f = flown(1, 0);
   for (auto& covered : f.around.covered)
     for (std::size_t j = 0; j < 340; ++j) covered[j * kChannels + kStrokeLeft] = 0;
-  for (const ResidualLocation& p : locate(f.around, f.residual, Stage::refit))
+  for (const ResidualLocation& p : locate(f.around, f.residual, Fitted::refit))
     EXPECT_NE(p.channel, channel_name(kStrokeLeft));
   f.residual[1].clear();
-  EXPECT_FALSE(locate(f.around, f.residual, Stage::refit).empty()) << "a vehicle that came apart in one flight";
+  EXPECT_FALSE(locate(f.around, f.residual, Fitted::refit).empty()) << "a vehicle that came apart in one flight";
 }
 
 // ---- how far

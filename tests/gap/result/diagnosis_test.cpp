@@ -45,9 +45,9 @@ TEST(Diagnosis, SaysRegimesInWords) {
   EXPECT_EQ(text_of({"block", Third::all, {}, 8, "beats"}, ResidualTest::whiteness), "means of 8 beats");
 }
 
-ResidualLocation location(Stage stage, ResidualTest test, double gap, bool discovered) {
-  return {stage, test, "specific_force_z", "m/s^2", {"height", Regime::Third::low, {}, 1, "m"}, gap,
-          1,     0.01, discovered};
+ResidualLocation location(Fitted fitted, ResidualTest test, double gap, bool discovered) {
+  return {fitted, test, "specific_force_z", "m/s^2", {"height", Regime::Third::low, {}, 1, "m"}, gap,
+          1,      0.01, discovered};
 }
 
 /// Something in every field.
@@ -75,8 +75,8 @@ Diagnosis whole() {
   d.background = {{"body_drag.area_m2", 1e-4, 0, 2e-4, "m^2"}};
   d.sensors = {{"imu_clock.rate", 4e-5, 3e-5, 5e-5, ""}};
   d.moved_parameters = {{"torso.mass_kg", -1.5}};
-  d.locations = {location(Stage::nominal, ResidualTest::channel, 3, false),
-                 {Stage::refit,
+  d.locations = {location(Fitted::nominal, ResidualTest::channel, 3, false),
+                 {Fitted::refit,
                   ResidualTest::phase,
                   "specific_force_x",
                   "m/s^2",
@@ -139,14 +139,14 @@ TEST(DiagnosisJson, RefusesWhatIsNone) {
 TEST(Diagnosis, ListsTheLargestDiscoveries) {
   Diagnosis d;
   for (int i = 0; i < 30; ++i)
-    d.locations.push_back(location(i < 2 ? Stage::effect : Stage::refit,
+    d.locations.push_back(location(i < 2 ? Fitted::effect : Fitted::refit,
                                    i == 2 ? ResidualTest::input : ResidualTest::regime, i, i != 29));
-  const std::vector<ResidualLocation> largest = largest_discoveries(d, Stage::refit, 20);
+  const std::vector<ResidualLocation> largest = largest_discoveries(d, Fitted::refit, 20);
   ASSERT_EQ(largest.size(), 20u);
   EXPECT_EQ(largest[0].gap, 28) << "what is no discovery does not count";
   EXPECT_EQ(largest[19].gap, 9);
-  EXPECT_EQ(largest_discoveries(d, Stage::refit, 100).size(), 26u) << "inputs do not say where";
-  EXPECT_TRUE(largest_discoveries(d, Stage::nominal, 5).empty());
+  EXPECT_EQ(largest_discoveries(d, Fitted::refit, 100).size(), 26u) << "inputs do not say where";
+  EXPECT_TRUE(largest_discoveries(d, Fitted::nominal, 5).empty());
 }
 
 }  // namespace
