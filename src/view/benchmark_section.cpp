@@ -164,10 +164,9 @@ Json rivals_of(const fs::path& folder, const std::string& number) {
   if (!json.contains("diagnosis")) return rivals;  // the prediction is of an older benchmark
   std::map<std::string, double> by_name;           // sums hypotheses with and without a remainder
   for (const gap::RankedHypothesis& h : gap::diagnosis_from(json.at("diagnosis"), file).hypotheses) {
-    std::vector<std::string> words;
-    for (const std::string& e : h.effects) words.push_back(spoken(e));
-    const bool effect = h.kind == gap::HypothesisKind::effect;
-    by_name[effect ? spoken_list(words) : "(" + std::string(name_of(h.kind)) + ")"] += h.probability;
+    gap::RankedHypothesis alike = h;
+    alike.remainder = false;
+    by_name[hypothesis_words(alike, spoken)] += h.probability;
   }
   std::vector<std::pair<double, std::string>> list;
   for (const auto& [name, probability] : by_name) list.emplace_back(probability, name);

@@ -7,6 +7,7 @@
 
 #include "flappy/vehicle.hpp"
 #include "gap/result/diagnosis_json.hpp"
+#include "gap/result/sentences.hpp"
 #include "io/files.hpp"
 #include "io/text.hpp"
 #include "model/effects/registry.hpp"
@@ -46,25 +47,11 @@ struct Rival {
   bool effect() const { return hypothesis->kind == gap::HypothesisKind::effect; }
 };
 
-/// The words of a hypothesis: effects joined by +, or a hypothesis without effects.
-std::string rival_words(const std::string& name) {
-  if (name == "none") return "no gap";
-  if (name == "parameters") return "parameters alone";
-  if (name == "unknown") return "something unknown";
-  std::string words = spoken(name);
-  for (std::size_t at = 0; (at = words.find('+', at)) != std::string::npos; at += 5) words.replace(at, 1, " and ");
-  return words;
-}
-
 std::vector<Rival> rivals_of(const gap::Diagnosis& d) {
   std::vector<Rival> rivals;
   for (std::size_t i = 0; i < d.hypotheses.size(); ++i) {
     const gap::RankedHypothesis& h = d.hypotheses[i];
-    std::vector<std::string> words;
-    for (const std::string& e : h.effects) words.push_back(spoken(e));
-    const bool effect = h.kind == gap::HypothesisKind::effect;
-    rivals.push_back({effect ? spoken_list(words) + (h.remainder ? ", and more" : "") : rival_words(name_of(h.kind)),
-                      &h, "/hypotheses/" + std::to_string(i)});
+    rivals.push_back({hypothesis_words(h, spoken), &h, "/hypotheses/" + std::to_string(i)});
   }
   std::ranges::stable_sort(rivals, std::greater{}, [](const Rival& r) { return r.hypothesis->probability; });
   return rivals;
@@ -116,57 +103,22 @@ class DiagnosisSection {
 
   void ask(const std::string& question) { section_.add(Json{{"kind", "heading"}, {"text", question}}); }
 
-  static std::string verdict_words(const gap::Diagnosis& d) {
-    const gap::Verdict& v = d.verdict;
-    const bool contrast = !d.reference.empty();
-    const std::string lacks = contrast ? "Since the reference, what appeared is " : "The model lacks ";
-    std::vector<std::string> names;
-    for (const std::string& e : v.effects) names.push_back(spoken(e));
-    switch (v.kind) {
-      case gap::VerdictKind::effect:
-        return lacks + spoken_list(names, "and") + (v.remainder ? ", and something more" : "") + ".";
-      case gap::VerdictKind::group:
-        return lacks + "one of " + spoken_list(names, "or") + ": these flights cannot tell them apart.";
-      case gap::VerdictKind::parameters:
-        return contrast ? "The robot changed by no more than sessions differ by."
-                        : "The model lacks nothing, but its parameters are off.";
-      case gap::VerdictKind::none:
-        return contrast ? "The robot is unchanged since the reference."
-                        : "There is no gap beyond noise: the vehicle's file explains the flights.";
-      case gap::VerdictKind::unknown:
-        return lacks + "something that the catalogue of effects does not have.";
-      case gap::VerdictKind::data:
-        return "The recordings are at fault, so nothing was diagnosed.";
-    }
-    return "";
-  }
-
   void add_verdict() {
     const gap::Verdict& v = diagnosis_.verdict;
-    section_.say(verdict_words(diagnosis_), "lead");
     const std::size_t references = diagnosis_.reference.size();
+    section_.say(verdict_words(v, references > 0, spoken) + ".", "lead");
     if (v.kind != gap::VerdictKind::data)
-      section_.say(format("Probability %.2f%s, from %zu flights%s.", v.probability,
-                          v.probability < 0.5 ? ", no more than a guess" : "", diagnosis_.flights.size(),
+      section_.say(format("%s, from %zu flights%s.", gap::capitalised(gap::probability_words(v.probability)).c_str(),
+                          diagnosis_.flights.size(),
                           references > 0 ? format(" and %zu of the reference", references).c_str() : ""));
     for (const gap::NamedDiagnosis& s : diagnosis_.sets)
-      section_.say(s.name + ": " + verdict_words(s.diagnosis) +
-                   format(" Probability %.2f.", s.diagnosis.verdict.probability));
+      section_.say(s.name + ": " + verdict_words(s.diagnosis.verdict, true, spoken) + " (" +
+                   gap::probability_words(s.diagnosis.verdict.probability) + ").");
     for (const std::string& w : diagnosis_.warnings) section_.say("Warning: " + w + ".");
-    if (references == 0 && v.kind != gap::VerdictKind::effect && !diagnosis_.suspects.empty()) add_suspects();
-    if (!diagnosis_.complete)
-      section_.say(
-          "It was stopped before every effect was weighed: this is no verdict, only what was weighed until then.");
-  }
-
-  void add_suspects() {
-    std::vector<std::string> words;
-    for (const gap::Suspect& s : diagnosis_.suspects)
-      words.push_back(spoken(s.effect) + (s.closure
-                                              ? format(" (%.2f, closes %.0f %%)", s.probability, 100 * s.closure->value)
-                                              : format(" (%.2f)", s.probability)));
-    section_.say("If an effect is missing, then most probably " + spoken_list(words, "or") +
-                 ". Flights of the same robot without it, given as --reference, would decide.");
+    if (references == 0 && v.kind != gap::VerdictKind::effect && !diagnosis_.suspects.empty())
+      section_.say(gap::capitalised(suspects_words(diagnosis_.suspects, spoken)) + ". " +
+                   gap::capitalised(gap::kReferenceDecides) + ".");
+    if (!diagnosis_.complete) section_.say(gap::capitalised(gap::kStopped) + ": " + gap::kNoVerdict + ".");
   }
 
   void add_faults() {
@@ -174,7 +126,7 @@ class DiagnosisSection {
     for (const flightlog::DataFault& f : diagnosis_.faults)
       rows.push_back({f.what, f.file + ":" + std::to_string(f.line)});
     section_.add(table("What forbids a diagnosis", {"fault", "where"}, std::move(rows)));
-    section_.say("Next: mend the logs, until flappy-gap check finds no fault.");
+    section_.say(gap::capitalised(gap::kMendLogs) + ".");
   }
 
   std::vector<const Location*> of(gap::Fitted fitted, gap::ResidualTest test) const {
@@ -189,7 +141,7 @@ class DiagnosisSection {
     ask("Where is the gap?");
     const std::vector<Location> where = largest_discoveries(diagnosis_, gap::Fitted::refit, kMaxWhere);
     if (where.empty()) {
-      section_.say("With parameters refitted nothing stands out of the noise.");
+      section_.say(gap::capitalised(gap::kNothingStandsOut) + ".");
     } else {
       const Location& first = where.front();
       section_.say(
@@ -413,7 +365,7 @@ class DiagnosisSection {
           "With %s the model closes %.0f %% of what refitted parameters leave (90 %%: %.0f to %.0f %%), on flights "
           "that the fit did not see.",
           with.c_str(), 100 * c->value, 100 * c->low, 100 * c->high));
-    else section_.say("How much of the gap an effect closes cannot be told from noise.");
+    else section_.say(gap::capitalised(gap::kClosureUnknown) + ".");
     const std::string brief = with.size() > kLongName ? "these effects" : with;
     const std::pair<std::string, std::optional<double>> losses[] = {{"vehicle's file", diagnosis_.nominal_loss},
                                                                     {"parameters refitted", diagnosis_.refit_loss},
@@ -529,7 +481,7 @@ class DiagnosisSection {
     if (diagnosis_.next) {
       const gap::NextExperiment& next = *diagnosis_.next;
       std::vector<std::string> rivals;
-      for (const std::string& r : next.separates) rivals.push_back(rival_words(r));
+      for (const std::string& r : next.separates) rivals.push_back(gap::hypothesis_words(r, spoken));
       section_.say(format("Of the experiments that are ready, “%s” tells %s best apart: %.3g nats are expected of it.",
                           spoken(next.manoeuvre).c_str(), spoken_list(rivals).c_str(), next.expected_nats));
       add_courses(next, rivals);
@@ -562,8 +514,7 @@ class DiagnosisSection {
       const gap::UnexplainedTerm& t = diagnosis_.unexplained[i];
       const std::string at = "/unexplained/terms/" + std::to_string(i);
       Json row = {channel_words(t.channel)};
-      if (!beat_averaged_)
-        row.push_back(t.harmonic == 0 ? "mean of the beat" : "harmonic " + std::to_string(t.harmonic));
+      if (!beat_averaged_) row.push_back(gap::harmonic_words(t.harmonic));
       row.insert(row.end(), {Json(function_words(t.function)), cell(t.times_prior_scale, at + "/times_prior_scale"),
                              cell(t.gain_nats, at + "/gain_nats")});
       rows.push_back(std::move(row));

@@ -99,13 +99,6 @@ std::string spoken(std::string identifier) {
   return identifier;
 }
 
-std::string spoken_list(const std::vector<std::string>& words, const char* last) {
-  std::string all;
-  for (std::size_t i = 0; i < words.size(); ++i)
-    all += (i == 0 ? "" : i + 1 == words.size() ? std::string(" ") + last + " " : ", ") + words[i];
-  return all;
-}
-
 std::string channel_words(const std::string& channel) {
   const auto found = kChannelNames.find(channel);
   return found == kChannelNames.end() ? spoken(channel) : found->second;

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "gap/result/sentences.hpp"
+
 namespace flappy::view {
 
 /// Throws io::InputError with line and column where the file is not JSON.
@@ -27,7 +29,7 @@ struct TextTable {
 TextTable read_text_table(const std::filesystem::path& file);
 
 std::string spoken(std::string identifier);  ///< "body_drag" -> "body drag"
-std::string spoken_list(const std::vector<std::string>& words, const char* last = "and");  ///< "a, b and c"
+using gap::spoken_list;
 std::string channel_words(const std::string& channel);  ///< "specific_force_x" -> "forward specific force"
 std::string in_print(std::string unit);                 ///< "m/s^2" -> "m/s²"
 /// The words of an effect's magnitude without its unit: "wind.speed_m_s" in "m/s" -> "wind (speed)".

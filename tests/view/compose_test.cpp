@@ -268,7 +268,7 @@ TEST(DiagnosisSection, TellsWhatTheJsonHas) {
     if (block.at("kind") == "heading") questions.push_back(block.at("text"));
   EXPECT_EQ(io::joined(questions),
             "Where is the gap?, Which effect causes it?, How far does the gap shrink?, What to fly next?");
-  EXPECT_EQ(blocks[0].at("text"), "The model lacks accelerometer misalignment and vibration rectification.");
+  EXPECT_EQ(blocks[0].at("text"), "Missing in the model: accelerometer misalignment and vibration rectification.");
   for (const Figure& f : section.figures())
     if (f.id == "loss") {
       ASSERT_EQ(f.series[0].x.size(), 4u);

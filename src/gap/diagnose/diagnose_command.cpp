@@ -7,6 +7,7 @@
 #include "flappy/vehicle_file.hpp"
 #include "gap/diagnose/summary.hpp"
 #include "gap/result/diagnosis_json.hpp"
+#include "gap/result/sentences.hpp"
 #include "io/files.hpp"
 #include "io/log.hpp"
 #include "io/program.hpp"
@@ -87,7 +88,7 @@ nlohmann::ordered_json run_diagnose(const DiagnoseCommand& command) {
   for (const std::string& line : summary_of(d.result, command.out)) print(line);
   io::log(io::LogLevel::info, faulty              ? "the flights' data have faults: no diagnosis"
                               : d.result.complete ? "diagnosed"
-                                                  : "stopped before every effect was weighed");
+                                                  : kStopped);
   if (!out.empty()) {
     std::string written = kDiagnosisFile;
     if (d.corrected) written += std::string(", ") + kVehicleFile;

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <numbers>
 
+#include "gap/result/sentences.hpp"
 #include "io/config.hpp"
 #include "io/text.hpp"
 
@@ -14,50 +15,19 @@ namespace {
 /// Rows of lists. Size: of what is printed.
 constexpr std::size_t kParameters = 6, kBackground = 2, kRunnersUp = 3, kMoved = 3, kTerms = 3, kSensors = 3;
 
-std::string listed(const std::vector<std::string>& words, const char* last) {
-  std::string all;
-  for (std::size_t i = 0; i < words.size(); ++i)
-    all += (i == 0 ? "" : i + 1 == words.size() ? std::string(" ") + last + " " : ", ") + words[i];
-  return all;
-}
-
 std::string estimate_line(const Estimate& s) {
   return io::format("  %-36s %10.3g (%.3g to %.3g)%s%s", s.name.c_str(), s.value, s.low, s.high,
                     s.unit.empty() ? "" : " ", s.unit.c_str());
 }
 
-std::string place_of(const UnexplainedTerm& u) {
-  return u.channel + ", " + (u.harmonic == 0 ? "mean of the beat" : "harmonic " + std::to_string(u.harmonic));
-}
+std::string place_of(const UnexplainedTerm& u) { return u.channel + ", " + harmonic_words(u.harmonic); }
 
-std::string verdict_line(const Verdict& c, bool contrast) {
-  const double p = c.probability;
-  const char* what = contrast ? "Changed since the reference" : "Missing in the model";
-  switch (c.kind) {
-    case VerdictKind::effect:
-      return io::format("%s: %s%s (probability %.2f%s)", what, listed(c.effects, "and").c_str(),
-                        c.remainder ? ", and something more" : "", p, p < 0.5 ? ", no more than a guess" : "");
-    case VerdictKind::group:
-      return io::format("%s: one of %s, which these flights cannot tell apart (together %.2f)", what,
-                        listed(c.effects, "or").c_str(), p);
-    case VerdictKind::parameters:
-      return io::format(contrast ? "Changed by no more than sessions differ by (probability %.2f)"
-                                 : "Nothing is missing in the model, its parameters are off (probability %.2f)",
-                        p);
-    case VerdictKind::none:
-      return io::format(contrast ? "Unchanged since the reference (probability %.2f)"
-                                 : "No gap beyond noise: the vehicle's file explains the flights (probability %.2f)",
-                        p);
-    case VerdictKind::unknown:
-      return io::format(
-          contrast
-              ? "Changed since the reference by something that no effect of the catalogue explains (probability %.2f)"
-              : "Something is missing in the model that no effect of the catalogue explains (probability %.2f)",
-          p);
-    case VerdictKind::data:
-      return "The data are at fault; nothing was diagnosed";
-  }
-  return "";
+std::string verdict_line(const Verdict& v, bool contrast) {
+  const std::string words = verdict_words(v, contrast, as_it_is);
+  if (v.kind == VerdictKind::data) return words;
+  const bool together = v.kind == VerdictKind::group;
+  return words + " (" + (together ? io::format("together %.2f", v.probability) : probability_words(v.probability)) +
+         ")";
 }
 
 std::string proposal_line(const NextExperiment& n) {
@@ -65,8 +35,9 @@ std::string proposal_line(const NextExperiment& n) {
       "configs/gap/experiments/" + (n.change.empty() ? n.manoeuvre + ".toml" : std::string("interventions.toml"));
   const std::string what =
       n.change.empty() ? "fly " + flight : n.change + ", then fly " + n.manoeuvre + " of " + flight;
-  return io::format("to tell %s from %s, %s (%.3g nats expected)", n.separates.front().c_str(),
-                    n.separates.back().c_str(), what.c_str(), n.expected_nats);
+  return io::format("to tell %s from %s, %s (%.3g nats expected)",
+                    hypothesis_words(n.separates.front(), as_it_is).c_str(),
+                    hypothesis_words(n.separates.back(), as_it_is).c_str(), what.c_str(), n.expected_nats);
 }
 
 std::string next_line(const Diagnosis& r, const std::string& out) {
@@ -85,7 +56,7 @@ std::string next_line(const Diagnosis& r, const std::string& out) {
     case VerdictKind::unknown:
       return "next: see what the residuals depend on; where that is no help, fly harder manoeuvres there";
     case VerdictKind::data:
-      return "next: mend the logs, until flappy-gap check finds no fault";
+      return std::string("next: ") + kMendLogs;
   }
   return "";
 }
@@ -132,18 +103,11 @@ std::string sensor_line(const Estimate& s) {
   return told("the IMU sits", 1e3, "mm", "along " + way + axis);
 }
 
-std::string words_of(const RankedHypothesis& c) {
-  return c.kind == HypothesisKind::effect ? listed(c.effects, "and") + (c.remainder ? " and more" : "")
-                                          : "(" + c.group + ")";
-}
-
 }  // namespace
 
 std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::string& out) {
-  std::vector<std::string> lines = {
-      diagnosis.complete
-          ? verdict_line(diagnosis.verdict, !diagnosis.reference.empty())
-          : "Stopped before every effect was weighed: this is no verdict, only what was weighed until then"};
+  std::vector<std::string> lines = {diagnosis.complete ? verdict_line(diagnosis.verdict, !diagnosis.reference.empty())
+                                                       : capitalised(kStopped) + ": " + kNoVerdict};
   if (diagnosis.verdict.kind == VerdictKind::data) {
     for (std::size_t i = 0; i < diagnosis.faults.size() && i + 3 < kSummaryLines; ++i)
       lines.push_back(io::format("  %s:%zu: %s", diagnosis.faults[i].file.c_str(), diagnosis.faults[i].line,
@@ -152,9 +116,7 @@ std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::strin
     return lines;
   }
   for (const NamedDiagnosis& s : diagnosis.sets)
-    lines.push_back(
-        s.name + ": " +
-        (s.diagnosis.complete ? verdict_line(s.diagnosis.verdict, true) : "stopped before every effect was weighed"));
+    lines.push_back(s.name + ": " + (s.diagnosis.complete ? verdict_line(s.diagnosis.verdict, true) : kStopped));
   for (const std::string& warning : diagnosis.warnings) lines.push_back("warning: " + warning);
   std::vector<const RankedHypothesis*> ranked;
   for (const RankedHypothesis& c : diagnosis.hypotheses) ranked.push_back(&c);
@@ -184,7 +146,7 @@ std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::strin
       !diagnosis.unexplained.empty()) {
     lines.push_back(diagnosis.jointly_with.empty()
                         ? "what is left depends on:"
-                        : "what is left, with " + listed(diagnosis.jointly_with, "and") + " in force, depends on:");
+                        : "what is left, with " + spoken_list(diagnosis.jointly_with) + " in force, depends on:");
     for (std::size_t i = 0; i < diagnosis.unexplained.size() && i < kTerms; ++i)
       lines.push_back(io::format("  %s on %s (%s), %.1f times what models of this robot get wrong",
                                  place_of(diagnosis.unexplained[i]).c_str(), diagnosis.unexplained[i].regime.c_str(),
@@ -196,21 +158,16 @@ std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::strin
   for (const RankedHypothesis* c : ranked) {
     const bool is = named ? c == concluded : name_of(c->kind) == std::string(name_of(diagnosis.verdict.kind));
     if (is || shown == kRunnersUp) continue;
-    others += io::format("%s%s %.2g", shown == 0 ? "" : ", ", words_of(*c).c_str(), c->probability);
+    others += io::format("%s%s %.2g", shown == 0 ? "" : ", ", hypothesis_words(*c, as_it_is).c_str(), c->probability);
     ++shown;
   }
   lines.push_back("runners-up: " + others);
   if (diagnosis.reference.empty() && diagnosis.verdict.kind != VerdictKind::effect && !diagnosis.suspects.empty()) {
-    std::string suspects;
-    for (const Suspect& s : diagnosis.suspects)
-      suspects += (suspects.empty() ? "" : ", ") + s.effect +
-                  (s.closure ? io::format(" %.2f (closes %.0f %%)", s.probability, 100 * s.closure->value)
-                             : io::format(" %.2f", s.probability));
-    lines.push_back("if an effect is missing, then most probably " + suspects);
-    lines.push_back("that would be decided by flights of the same robot without it, given as --reference");
+    lines.push_back(suspects_words(diagnosis.suspects, as_it_is));
+    lines.push_back(kReferenceDecides);
   }
   const std::vector<ResidualLocation> locations = one_of_each_test(diagnosis);
-  lines.push_back(locations.empty() ? "with parameters refitted nothing stands out of the noise"
+  lines.push_back(locations.empty() ? kNothingStandsOut
                                     : "where the gap lies, with parameters refitted (rms, that of noise):");
   for (const ResidualLocation& p : locations)
     lines.push_back(io::format("  %-22s %-34s %8.3g, noise %.3g %s", p.channel.c_str(),
@@ -223,7 +180,7 @@ std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::strin
     lines.push_back(io::format("the best effect closes %.0f %% of what refitting leaves (90 %%: %.0f to %.0f %%)",
                                100 * diagnosis.closure->value, 100 * diagnosis.closure->low,
                                100 * diagnosis.closure->high));
-  else lines.push_back("how much of that an effect closes cannot be told from noise");
+  else lines.push_back(kClosureUnknown);
   if (!diagnosis.moved_parameters.empty() && diagnosis.verdict.kind != VerdictKind::none) {
     lines.push_back("parameters that moved most, in standard deviations of what was believed:");
     for (std::size_t i = 0; i < diagnosis.moved_parameters.size() && i < kMoved; ++i)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 
+#include "gap/result/sentences.hpp"
 #include "io/text.hpp"
 
 namespace flappy::gap {
@@ -38,7 +39,7 @@ std::string text_of(const Regime& r, ResidualTest test) {
       if (r.third == Regime::Third::high) return r.quantity + " above " + number(r.low) + unit;
       return r.quantity + " " + number(r.low) + " to " + number(r.high) + unit;
     case ResidualTest::phase:
-      return r.low == 0 ? "mean of the beat" : "harmonic " + number(r.low) + " of the beat";
+      return harmonic_words(static_cast<int>(r.low.value_or(0)));
     case ResidualTest::frequency:
       return number(r.low) + " to " + number(r.high) + unit;
     case ResidualTest::input:

@@ -1,0 +1,38 @@
+// What is said of a diagnosis, in one place for the summary and the page. Sentences begin with a small letter where they
+// may stand within a line.
+#pragma once
+
+#include "gap/result/diagnosis.hpp"
+
+namespace flappy::gap {
+
+/// How the name of an effect is shown: as it is, or in words, as a page does.
+using Spoken = std::string (*)(std::string name);
+inline std::string as_it_is(std::string name) { return name; }
+
+inline constexpr const char* kStopped = "stopped before every effect was weighed";
+inline constexpr const char* kNoVerdict = "this is no verdict, only what was weighed until then";
+inline constexpr const char* kNothingStandsOut = "with parameters refitted nothing stands out of the noise";
+inline constexpr const char* kClosureUnknown = "how much of the gap an effect closes cannot be told from noise";
+inline constexpr const char* kMendLogs = "mend the logs, until flappy-gap check finds no fault";
+inline constexpr const char* kReferenceDecides =
+    "that would be decided by flights of the same robot without it, given as --reference";
+
+/// With a capital letter at its start.
+std::string capitalised(std::string words);
+/// "a, b and c".
+std::string spoken_list(const std::vector<std::string>& words, const char* last = "and");
+/// "Missing in the model: wind"; in a contrast "Changed since the reference: wind".
+std::string verdict_words(const Verdict& verdict, bool contrast, Spoken spoken);
+/// "probability 0.40, no more than a guess".
+std::string probability_words(double probability);
+/// "wind and tether and more", "parameters alone".
+std::string hypothesis_words(const RankedHypothesis& hypothesis, Spoken spoken);
+/// The same of a name as in NextExperiment::separates: "wind+tether", "parameters".
+std::string hypothesis_words(const std::string& name, Spoken spoken);
+/// "if an effect is missing, then most probably wind 0.40 (closes 30 %) or tether 0.20".
+std::string suspects_words(const std::vector<Suspect>& suspects, Spoken spoken);
+/// "mean of the beat", "harmonic 2 of the beat".
+std::string harmonic_words(int harmonic);
+
+}  // namespace flappy::gap
