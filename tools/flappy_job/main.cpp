@@ -7,28 +7,15 @@
 #include "io/progress.hpp"
 #include "server/commands/command_client.hpp"
 #include "server/http/socket_client.hpp"
+#include "server/jobs/status_json.hpp"
 
 namespace flappy::job {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 void print(const server::JobStatus& j) {
   std::printf("%6llu  %-9s %-9s %4.0f %%  %-32s %s\n", static_cast<unsigned long long>(j.id), j.state.c_str(),
               j.kind.c_str(), 100 * j.progress, j.config.c_str(), j.message.c_str());
   std::fflush(stdout);
-}
-
-Json json_of(const server::JobStatus& j) {
-  return {{"id", j.id},
-          {"kind", j.kind},
-          {"config", j.config},
-          {"state", j.state},
-          {"attempts", j.attempts},
-          {"exit_code", j.exit_code},
-          {"progress", j.progress},
-          {"message", j.message},
-          {"folder", j.folder}};
 }
 
 bool is_over(const server::JobStatus& j) { return j.state == "done" || j.state == "failed" || j.state == "cancelled"; }
@@ -90,7 +77,7 @@ int main(int argc, char** argv) {
 
     if (list.given()) {
       nlohmann::ordered_json all = nlohmann::ordered_json::array();
-      for (const server::JobStatus& each : client->list()) job::print(each), all.push_back(job::json_of(each));
+      for (const server::JobStatus& each : client->list()) job::print(each), all.push_back(json_of(each));
       return program.write_json({{"jobs", all}});
     }
     if (watch.given()) {

@@ -6,7 +6,6 @@
 #include <fstream>
 #include <optional>
 
-#include "io/log.hpp"
 #include "io/progress.hpp"
 
 namespace flappy::server {
@@ -16,7 +15,6 @@ namespace fs = std::filesystem;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kLook{50};
-constexpr int kAttempts = 3;  // at a file that is replaced while it is fetched
 
 template <std::size_t kSize>
 void put(char (&to)[kSize], const std::string& from, const char* what) {
@@ -132,69 +130,59 @@ void CommandClient::watch(const std::function<bool(const JobStatus& job)>& see,
   }
 }
 
-std::size_t CommandClient::fetch(std::uint64_t job, const fs::path& folder,
-                                 const std::function<void(const JobFile&)>& see) {
+bool CommandClient::ask_for(std::uint64_t job, const std::string& name, const std::function<void(const Piece&)>& see) {
   if (!files_) {
     files_.emplace(participant_, files_topic_, kPieces);
     waiting_.add(files_->entity());
   }
-  // false: the file is gone, as of a training that goes on, which replaces its files
-  const auto ask_for = [&](const std::string& name, const std::function<void(const Piece&)>& see_piece) {
-    pieces_.clear();
-    Command command{
-        .id = fresh_id(), .client = {}, .verb = "fetch", .kind = {}, .config = name, .job = job, .overrides = {}};
-    CommandResult r = ask(command);
-    for (const double until_s = io::steady_seconds() + timeout_s_; !r.accepted && r.message.starts_with(kTooMany);) {
-      if (io::steady_seconds() > until_s) break;
-      io::sleep_until(io::steady_seconds() + 0.2);  // every file takes one command, so many files reach the rate limit
-      r = ask(command);
+  pieces_.clear();
+  Command command{
+      .id = fresh_id(), .client = {}, .verb = "fetch", .kind = {}, .config = name, .job = job, .overrides = {}};
+  CommandResult r = ask(command);
+  for (const double until_s = io::steady_seconds() + timeout_s_; !r.accepted && r.message.starts_with(kTooMany);) {
+    if (io::steady_seconds() > until_s) break;
+    io::sleep_until(io::steady_seconds() + 0.2);  // every file takes one command, so many files reach the rate limit
+    r = ask(command);
+  }
+  if (!r.accepted && r.message.starts_with(kNoSuchFile)) return false;
+  if (!r.accepted) throw io::InputError(r.message);
+  bool over = r.message == "0 files";
+  for (double heard_s = io::steady_seconds(); !over;) {
+    for (take_pieces(command.id); !pieces_.empty(); pieces_.pop_front()) {
+      heard_s = io::steady_seconds();
+      see(pieces_.front());
+      over = pieces_.front().left == 0;
     }
-    if (!r.accepted && r.message.starts_with(kNoSuchFile)) return false;
-    if (!r.accepted) throw io::InputError(r.message);
-    bool over = r.message == "0 files";
-    for (double heard_s = io::steady_seconds(); !over;) {
-      for (take_pieces(command.id); !pieces_.empty(); pieces_.pop_front()) {
-        heard_s = io::steady_seconds();
-        see_piece(pieces_.front());
-        over = pieces_.front().left == 0;
-      }
-      if (over) break;
-      if (io::steady_seconds() - heard_s > timeout_s_)
-        throw io::InputError((name.empty() ? "the list of files" : name) + ": does not come within " +
-                             io::shortest_digits(timeout_s_) + " s");
-      waiting_.wait(kLook);
-    }
-    return true;
-  };
+    if (over) break;
+    if (io::steady_seconds() - heard_s > timeout_s_)
+      throw io::InputError((name.empty() ? "the list of files" : name) + ": does not come within " +
+                           io::shortest_digits(timeout_s_) + " s");
+    waiting_.wait(kLook);
+  }
+  return true;
+}
+
+std::vector<JobFile> CommandClient::list_files(std::uint64_t job) {
   std::vector<JobFile> files;
   std::optional<std::uint32_t> left;
-  ask_for("", [&](const Piece& m) {
+  ask_for(job, "", [&](const Piece& m) {
     if (left && m.left + 1 != *left) throw io::InputError("the list of files: a part is missing");
     left = m.left;
     files.push_back({m.name, m.size});
   });
-  std::size_t fetched = 0;
-  for (const JobFile& file : files) {
-    see(file);
-    const fs::path path = place_of(folder, file.name);
-    bool there = true, whole = false;
-    for (int attempt = 0; attempt < kAttempts && there && !whole; ++attempt) {
-      io::AtomicFile to(path);
-      std::uint64_t got = 0, size = 0;
-      there = ask_for(file.name, [&](const Piece& m) {
-        if (m.offset != got) throw io::InputError(file.name + ": a piece is missing");
-        to.write(m.data);
-        got += m.data.size();
-        size = m.size;
-      });
-      whole = there && got == size;
-      if (whole) to.commit();
-    }
-    if (!there) io::log(io::LogLevel::warning, file.name + ": is gone meanwhile, and is left out");
-    else if (!whole) throw io::InputError(file.name + ": changes while it is fetched; accepted: the same once more");
-    fetched += whole;
-  }
-  return fetched;
+  return files;
+}
+
+JobClient::Download CommandClient::download(std::uint64_t job, const std::string& name,
+                                            const std::function<void(std::string_view)>& write) {
+  std::uint64_t got = 0, size = 0;
+  const bool there = ask_for(job, name, [&](const Piece& m) {
+    if (m.offset != got) throw io::InputError(name + ": a piece is missing");
+    write(m.data);
+    got += m.data.size();
+    size = m.size;
+  });
+  return !there ? Download::gone : got == size ? Download::whole : Download::changed;
 }
 
 }  // namespace flappy::server

@@ -20,10 +20,11 @@ class CommandClient : public JobClient {
   CommandResult ask(Command command) override;
   std::vector<JobStatus> list() override;
   void watch(const std::function<bool(const JobStatus& job)>& see, const std::function<bool()>& keep_going) override;
-  std::size_t fetch(std::uint64_t job, const std::filesystem::path& folder,
-                    const std::function<void(const JobFile&)>& see) override;
 
  private:
+  std::vector<JobFile> list_files(std::uint64_t job) override;
+  Download download(std::uint64_t job, const std::string& name,
+                    const std::function<void(std::string_view)>& write) override;
   /// A FileChunk that has been received.
   struct Piece {
     std::string name, data;
@@ -31,6 +32,8 @@ class CommandClient : public JobClient {
     std::uint32_t left = 0;
   };
   CommandResult await(const std::string& id);
+  /// Asks for a file, or "" for the list of files, and passes its pieces on. False: there is no such file, or no longer.
+  bool ask_for(std::uint64_t job, const std::string& name, const std::function<void(const Piece&)>& see);
   void take_jobs();
   /// Keeps the pieces that answer command `id`. Others, which another client has asked for, are dropped, for a reader that
   /// is full holds up the server.

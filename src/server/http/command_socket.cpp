@@ -12,6 +12,7 @@
 
 #include "io/files.hpp"
 #include "server/http/listener.hpp"
+#include "server/jobs/status_json.hpp"
 
 namespace flappy::server {
 namespace {
@@ -51,18 +52,6 @@ Command command_of(const std::string& text) {
   } catch (const Json::exception&) {
     throw io::InputError("a command: is malformed; accepted: as src/server/http/command_socket.hpp says it");
   }
-}
-
-Json json_of(const JobStatus& j) {
-  return {{"id", j.id},
-          {"kind", j.kind},
-          {"config", j.config},
-          {"state", j.state},
-          {"attempts", j.attempts},
-          {"exit_code", j.exit_code},
-          {"progress", j.progress},
-          {"message", j.message},
-          {"folder", j.folder}};
 }
 
 }  // namespace

@@ -7,20 +7,13 @@
 #include <nlohmann/json.hpp>
 
 #include "io/files.hpp"
-#include "io/log.hpp"
+#include "server/jobs/status_json.hpp"
 
 namespace flappy::server {
 namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-constexpr int kFetches = 3;  // of a file that is replaced while it is fetched
-
-JobStatus job_of(const Json& j) {
-  return {j.at("id"),        j.at("kind"),     j.at("config"),  j.at("state"), j.at("attempts"),
-          j.at("exit_code"), j.at("progress"), j.at("message"), j.at("folder")};
-}
 
 /// The body of an answer. Throws io::InputError with the server's message where it refuses.
 std::string body(const httplib::Result& result, const fs::path& folder) {
@@ -60,7 +53,7 @@ CommandResult SocketClient::ask(Command command) {
 SocketClient::Listed SocketClient::ask_for_jobs(const std::string& query) {
   const Json json = Json::parse(body(client_->Get("/jobs" + query), folder_));
   Listed listed{json.at("changes"), {}};
-  for (const Json& each : json.at("jobs")) listed.jobs.push_back(job_of(each));
+  for (const Json& each : json.at("jobs")) listed.jobs.push_back(status_from(each));
   return listed;
 }
 
@@ -84,34 +77,25 @@ void SocketClient::watch(const std::function<bool(const JobStatus& job)>& see,
   }
 }
 
-std::size_t SocketClient::fetch(std::uint64_t job, const fs::path& folder,
-                                const std::function<void(const JobFile&)>& see) {
-  const std::string query = "/files?job=" + std::to_string(job);
-  const Json files = Json::parse(body(client_->Get(query), folder_));
-  std::size_t fetched = 0;
-  for (const Json& each : files) {
-    const JobFile file{each.at("name"), each.at("bytes")};
-    see(file);
-    const fs::path path = place_of(folder, file.name);
-    bool there = true, whole = false;
-    for (int attempt = 0; attempt < kFetches && there && !whole; ++attempt) {
-      io::AtomicFile to(path);
-      std::uint64_t got = 0;
-      const httplib::Result result =
-          client_->Get(query + "&name=" + file.name, [&](const char* bytes, std::size_t size) {
-            to.write({bytes, size});
-            got += size;
-            return true;
-          });
-      there = !result || result->status == 200;
-      whole = result && there && std::to_string(got) == result->get_header_value("Content-Length");
-      if (whole) to.commit();
-    }
-    if (!there) io::log(io::LogLevel::warning, file.name + ": is gone meanwhile, and is left out");
-    else if (!whole) throw io::InputError(file.name + ": changes while it is fetched; accepted: the same once more");
-    fetched += whole;
-  }
-  return fetched;
+std::vector<JobFile> SocketClient::list_files(std::uint64_t job) {
+  std::vector<JobFile> files;
+  for (const Json& each : Json::parse(body(client_->Get("/files?job=" + std::to_string(job)), folder_)))
+    files.push_back({each.at("name"), each.at("bytes")});
+  return files;
+}
+
+JobClient::Download SocketClient::download(std::uint64_t job, const std::string& name,
+                                           const std::function<void(std::string_view)>& write) {
+  std::uint64_t got = 0;
+  const httplib::Result result =
+      client_->Get("/files?job=" + std::to_string(job) + "&name=" + name, [&](const char* bytes, std::size_t size) {
+        write({bytes, size});
+        got += size;
+        return true;
+      });
+  if (result && result->status != 200) return Download::gone;
+  const bool whole = result && std::to_string(got) == result->get_header_value("Content-Length");
+  return whole ? Download::whole : Download::changed;
 }
 
 }  // namespace flappy::server

@@ -21,10 +21,11 @@ class SocketClient : public JobClient {
   CommandResult ask(Command command) override;
   std::vector<JobStatus> list() override;
   void watch(const std::function<bool(const JobStatus& job)>& see, const std::function<bool()>& keep_going) override;
-  std::size_t fetch(std::uint64_t job, const std::filesystem::path& folder,
-                    const std::function<void(const JobFile&)>& see) override;
 
  private:
+  std::vector<JobFile> list_files(std::uint64_t job) override;
+  Download download(std::uint64_t job, const std::string& name,
+                    const std::function<void(std::string_view)>& write) override;
   struct Listed {
     std::uint64_t changes;
     std::vector<JobStatus> jobs;

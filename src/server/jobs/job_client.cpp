@@ -5,11 +5,36 @@
 #include <random>
 
 #include "io/files.hpp"
+#include "io/log.hpp"
 #include "server/jobs/job.hpp"
 
 namespace flappy::server {
 
 namespace fs = std::filesystem;
+
+namespace {
+constexpr int kDownloads = 3;  // of a file that is replaced while it comes
+}
+
+std::size_t JobClient::fetch(std::uint64_t job, const fs::path& folder,
+                             const std::function<void(const JobFile&)>& see) {
+  std::size_t fetched = 0;
+  for (const JobFile& file : list_files(job)) {
+    see(file);
+    const fs::path path = place_of(folder, file.name);
+    Download got = Download::changed;
+    for (int i = 0; i < kDownloads && got == Download::changed; ++i) {
+      io::AtomicFile to(path);
+      got = download(job, file.name, [&](std::string_view bytes) { to.write(bytes); });
+      if (got == Download::whole) to.commit();
+    }
+    if (got == Download::gone) io::log(io::LogLevel::warning, file.name + ": is gone meanwhile, and is left out");
+    if (got == Download::changed)
+      throw io::InputError(file.name + ": changes while it is fetched; accepted: the same once more");
+    fetched += got == Download::whole;
+  }
+  return fetched;
+}
 
 std::string fresh_id() {
   std::random_device random;

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <string_view>
 #include <vector>
 
 #include "server/jobs/commands.hpp"
@@ -20,8 +21,16 @@ class JobClient {
   virtual void watch(const std::function<bool(const JobStatus& job)>& see, const std::function<bool()>& keep_going) = 0;
   /// Downloads a job's files into `folder`, under their names, and returns their number. Calls `see` before each. A file
   /// that is removed after the list was made, as a training does with old checkpoints, is left out with a warning.
-  virtual std::size_t fetch(std::uint64_t job, const std::filesystem::path& folder,
-                            const std::function<void(const JobFile&)>& see) = 0;
+  std::size_t fetch(std::uint64_t job, const std::filesystem::path& folder,
+                    const std::function<void(const JobFile&)>& see);
+
+ protected:
+  virtual std::vector<JobFile> list_files(std::uint64_t job) = 0;
+  /// changed: the file was replaced while it came, as a training that goes on does with its files.
+  enum class Download { whole, changed, gone };
+  /// Downloads a file once, and calls `write` with its pieces in order.
+  virtual Download download(std::uint64_t job, const std::string& name,
+                            const std::function<void(std::string_view)>& write) = 0;
 };
 
 /// 32 random hexadecimal digits.
