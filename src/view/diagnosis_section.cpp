@@ -85,6 +85,7 @@ class DiagnosisSection {
   }
 
   Section composed() {
+    if (!diagnosis_.seen.empty()) add_seen();
     add_verdict();
     if (diagnosis_.verdict.kind == gap::VerdictKind::data) {
       add_faults();
@@ -102,6 +103,35 @@ class DiagnosisSection {
   using Location = gap::ResidualLocation;
 
   void ask(const std::string& question) { section_.add(Json{{"kind", "heading"}, {"text", question}}); }
+
+  /// What changed, whatever the cause.
+  void add_seen() {
+    ask("What is seen?");
+    const std::vector<std::string> told = seen_words(diagnosis_.seen, spoken);
+    section_.say(
+        told.empty() ? "Nothing beyond what sessions of this robot differ by." : "Most of all, " + told.front() + ".",
+        "lead");
+    for (const gap::OddFlight& o : diagnosis_.odd) section_.say(gap::capitalised(odd_words(o, spoken)) + ".");
+    Figure f{
+        .id = "seen",
+        .title = "What differs from the reference",
+        .note = "In standard deviations by which sessions of this robot differ while nothing is done to it.",
+        .x = {.title = "times what sessions differ by"},
+        .y = {},
+        .categories = {},
+        .series = {{.name = "", .draw = Draw::bars, .colour = Colour::blue, .x = {}, .y = {}, .low = {}, .high = {}}}};
+    Json rows = Json::array();
+    for (const gap::SeenQuantity& s : diagnosis_.seen) {
+      f.series[0].x.push_back(s.times());
+      f.series[0].y.push_back(near_category(f.categories.size()));
+      f.categories.push_back(spoken(s.name));
+      rows.push_back({spoken(s.name), seen_value(s, s.reference, false), seen_value(s, s.tests, false),
+                      seen_value(s, s.scatter, false), format("%+.1f", s.times())});
+    }
+    section_.add(f);
+    section_.add(table("What differs from the reference, in numbers",
+                       {"quantity", "reference", "flights", "sessions differ by", "times"}, std::move(rows)));
+  }
 
   void add_verdict() {
     const gap::Verdict& v = diagnosis_.verdict;

@@ -12,7 +12,7 @@ from self_test import misjudged, run
 BASE = {"io", "model", "sim"}
 FLIGHT = BASE | {"policy", "flight"}
 ROLLOUT = FLIGHT | {"flightlog", "flightlog/check", "flightlog/ros", "rollout"}
-GAP = ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/fit", "gap/localise", "gap/question", "gap/answer", "gap/next", "gap/learn", "gap/diagnose"}
+GAP = ROLLOUT | {"gap/result", "gap/replay", "gap/evidence", "gap/fit", "gap/localise", "gap/session", "gap/question", "gap/answer", "gap/next", "gap/learn", "gap/diagnose"}
 # What a room may include besides itself. A folder is a room; a folder in it that is named here is a room of its own.
 ROOMS = {
     "io": set(),
@@ -38,10 +38,11 @@ ROOMS = {
     "gap/evidence": BASE | {"flightlog", "gap/replay"},
     "gap/fit": BASE | {"flightlog", "gap/replay", "gap/evidence"},
     "gap/localise": BASE | {"flightlog", "gap/result", "gap/replay", "gap/evidence"},
-    "gap/question": BASE | {"flightlog", "gap/result", "gap/replay", "gap/evidence", "gap/fit", "gap/localise"},
-    "gap/answer": BASE | {"flightlog", "flightlog/check", "gap/result", "gap/replay", "gap/evidence", "gap/fit", "gap/localise", "gap/question"},
+    "gap/session": BASE | {"flightlog", "gap/result", "gap/replay"},
+    "gap/question": BASE | {"flightlog", "gap/result", "gap/replay", "gap/evidence", "gap/fit", "gap/localise", "gap/session"},
+    "gap/answer": BASE | {"flightlog", "flightlog/check", "gap/result", "gap/replay", "gap/evidence", "gap/fit", "gap/localise", "gap/session", "gap/question"},
     "gap/next": GAP - {"gap/learn", "gap/diagnose"},
-    "gap/learn": BASE | {"flightlog", "gap/replay", "gap/evidence", "gap/fit", "gap/question"},
+    "gap/learn": BASE | {"flightlog", "gap/replay", "gap/evidence", "gap/fit", "gap/session", "gap/question"},
     "gap/diagnose": GAP - {"gap/learn"},
     "server": set(),  # what several of its rooms share
     "server/dds": {"io", "flightlog", "flightlog/ros"},

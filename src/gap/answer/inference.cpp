@@ -49,13 +49,8 @@ Inference infer(const Flights& flights, const sim::Randomisation& uncertain, Inf
   progress(0, "fitting parameters");
   const Question& question = question_of(flights);
   if (reference != nullptr)
-    if (std::optional<Inference> d = question.by_sessions(flights, uncertain, options, *reference)) {
-      conclude(
-          options.rule, [&](const ScoredHypothesis& a) { return question.pool(a); }, *d);
-      question.choose_predicting(*d);
-      d->corrected = question.correct_by_sessions(uncertain, *reference, *d);
+    if (std::optional<Inference> d = question.by_sessions(flights, uncertain, options, *reference))
       return std::move(*d);
-    }
   const RobotFit robot = question.fit_robot(flights, uncertain, options, reference);
   const VerdictRule& rule = options.rule = question.rule(robot, options.rule);
   const Baselines baselines = weigh_baselines(question, robot, rule);

@@ -104,6 +104,8 @@ Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flig
   r.verdict = inference.verdict;
   r.validation = inference.validation;
   r.untestable = inference.untestable;
+  r.seen = inference.seen;
+  r.odd = inference.odd;
   const RowContext context = row_context_of(flights.tests, inference.noise_sd);
   add_hypotheses(context, uncertain, inference, r);
   r.suspects = suspects_of(r.hypotheses);

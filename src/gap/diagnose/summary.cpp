@@ -13,11 +13,14 @@ namespace flappy::gap {
 namespace {
 
 /// Rows of lists. Size: of what is printed.
-constexpr std::size_t kParameters = 6, kBackground = 2, kRunnersUp = 3, kMoved = 3, kTerms = 3, kSensors = 3;
+constexpr std::size_t kParameters = 6, kBackground = 2, kRunnersUp = 3, kMoved = 3, kTerms = 3, kSensors = 3, kSeen = 5;
 
 std::string estimate_line(const Estimate& s) {
-  return io::format("  %-36s %10.3g (%.3g to %.3g)%s%s", s.name.c_str(), s.value, s.low, s.high,
-                    s.unit.empty() ? "" : " ", s.unit.c_str());
+  const bool grams = s.unit == "kg";
+  const double factor = grams ? 1e3 : 1;
+  const std::string unit = grams ? "g" : s.unit;
+  return io::format("  %-36s %10.3g (%.3g to %.3g)%s%s", s.name.c_str(), factor * s.value, factor * s.low,
+                    factor * s.high, unit.empty() ? "" : " ", unit.c_str());
 }
 
 std::string place_of(const UnexplainedTerm& u) { return u.channel + ", " + harmonic_words(u.harmonic); }
@@ -103,11 +106,25 @@ std::string sensor_line(const Estimate& s) {
   return told("the IMU sits", 1e3, "mm", "along " + way + axis);
 }
 
+/// What is seen comes first, whatever the verdict.
+std::vector<std::string> seen_lines(const Diagnosis& diagnosis) {
+  std::vector<std::string> lines;
+  if (diagnosis.seen.empty()) return lines;
+  const std::vector<std::string> told = seen_words(diagnosis.seen, as_it_is);
+  if (told.empty()) lines.push_back("Seen: nothing beyond what sessions of this robot differ by");
+  else lines.push_back("Seen, beside the reference:");
+  for (std::size_t i = 0; i < told.size() && i < kSeen; ++i) lines.push_back("  " + told[i]);
+  for (std::size_t i = 0; i < diagnosis.odd.size() && i < kSeen; ++i)
+    lines.push_back("  " + odd_words(diagnosis.odd[i], as_it_is));
+  return lines;
+}
+
 }  // namespace
 
 std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::string& out) {
-  std::vector<std::string> lines = {diagnosis.complete ? verdict_line(diagnosis.verdict, !diagnosis.reference.empty())
-                                                       : capitalised(kStopped) + ": " + kNoVerdict};
+  std::vector<std::string> lines = seen_lines(diagnosis);
+  lines.push_back(diagnosis.complete ? verdict_line(diagnosis.verdict, !diagnosis.reference.empty())
+                                     : capitalised(kStopped) + ": " + kNoVerdict);
   if (diagnosis.verdict.kind == VerdictKind::data) {
     for (std::size_t i = 0; i < diagnosis.faults.size() && i + 3 < kSummaryLines; ++i)
       lines.push_back(io::format("  %s:%zu: %s", diagnosis.faults[i].file.c_str(), diagnosis.faults[i].line,
@@ -181,7 +198,8 @@ std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::strin
                                100 * diagnosis.closure->value, 100 * diagnosis.closure->low,
                                100 * diagnosis.closure->high));
   else lines.push_back(kClosureUnknown);
-  if (!diagnosis.moved_parameters.empty() && diagnosis.verdict.kind != VerdictKind::none) {
+  // beside references that are seen, parameters are theirs
+  if (!diagnosis.moved_parameters.empty() && diagnosis.verdict.kind != VerdictKind::none && diagnosis.seen.empty()) {
     lines.push_back("parameters that moved most, in standard deviations of what was believed:");
     for (std::size_t i = 0; i < diagnosis.moved_parameters.size() && i < kMoved; ++i)
       lines.push_back(io::format("  %-36s %+10.2f", diagnosis.moved_parameters[i].first.c_str(),

@@ -59,16 +59,11 @@ class Question : public FitRules {
   /// draws of 0.
   virtual Rival rival(const ScoredHypothesis& hypothesis, const Inference& d, const sim::Randomisation& uncertain,
                       const sim::Randomisation& as_filed) const = 0;
-  /// All hypotheses with their probabilities, by the scatter of the robot's own sessions; none: not of this question.
+  /// The answer by the scatter of the robot's own sessions; none: not of this question.
   virtual std::optional<Inference> by_sessions(const Flights& /*flights*/, const sim::Randomisation& /*uncertain*/,
                                                const InferenceOptions& /*options*/,
                                                const ReferenceFit& /*reference*/) const {
     return std::nullopt;
-  }
-  /// As correct(), of what by_sessions() concluded.
-  virtual CorrectedParameters correct_by_sessions(const sim::Randomisation& /*uncertain*/,
-                                                  const ReferenceFit& reference, const Inference& /*d*/) const {
-    return reference.corrected;
   }
   /// Columns of a rival's parameters that are known. `first`: linearisation of the first rival with parameters.
   virtual std::vector<BasisCoefficients> known_columns(const Rival& rival, const std::optional<Fit>& first) const = 0;

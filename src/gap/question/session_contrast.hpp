@@ -16,8 +16,6 @@ class SessionContrast final : public Contrast {
   using Contrast::Contrast;
   std::optional<Inference> by_sessions(const Flights& flights, const sim::Randomisation& uncertain,
                                        const InferenceOptions& options, const ReferenceFit& reference) const override;
-  CorrectedParameters correct_by_sessions(const sim::Randomisation& uncertain, const ReferenceFit& reference,
-                                          const Inference& d) const override;
 };
 
 }  // namespace flappy::gap

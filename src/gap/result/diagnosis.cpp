@@ -66,6 +66,7 @@ std::string unit_of(const std::string& name) {
       {"m", "m"},    {"s", "s"},    {"V", "V"},   {"K", "K"},       {"W", "W"},     {"ohm", "ohm"},
       {"C", "C"},    {"N", "N"},    {"Nm", "Nm"}, {"kg", "kg"},     {"rad", "rad"}, {"m2", "m^2"},
       {"m3", "m^3"}, {"s2", "s^2"}, {"A", "A"},   {"rad2", "rad^2"}};
+  if (name.find("moment_") != std::string::npos && name.ends_with("_kg_m")) return "kg m";
   // words at the end of the name that are units: the first of them over the others
   std::vector<std::string> units;
   std::string rest = name;

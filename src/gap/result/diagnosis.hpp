@@ -147,6 +147,22 @@ struct Validation {
   std::vector<Agreement> agreements;
 };
 
+/// A number that the flights of a beat-averaged robot show (gap/session/quantities.hpp), in a contrast.
+struct SeenQuantity {
+  std::string name, unit;
+  double reference = 0, tests = 0;  ///< means
+  double scatter = 0;               ///< standard deviation by which sessions of the unchanged robot differ
+  double times() const { return (tests - reference) / scatter; }
+};
+
+/// A flight that differs from the others of its set, or within itself.
+struct OddFlight {
+  std::string flight, quantity;
+  double times = 0;               ///< standard deviations between sessions
+  std::optional<double> since_s;  ///< from when on it differs from its beginning; none: all of it is odd
+  std::optional<double> step;     ///< by how much, in the quantity's unit
+};
+
 struct NamedDiagnosis;
 
 struct Diagnosis {
@@ -156,6 +172,9 @@ struct Diagnosis {
   std::vector<flightlog::DataFault> faults;  ///< if not empty, nothing was diagnosed
   bool complete = true;                      ///< false: stopped before every effect was weighed
   Verdict verdict;
+  /// In a contrast of a beat-averaged vehicle: what changed, whatever the cause, and which flights stand out.
+  std::vector<SeenQuantity> seen;
+  std::vector<OddFlight> odd;
   std::vector<RankedHypothesis> hypotheses;  ///< those with effects, then the others; each by falling probability
   std::vector<Suspect> suspects;             ///< at most three, the most probable first
   /// Terms of the conclusion's remainder; without one, those of the hypothesis unknown, even an improbable one.

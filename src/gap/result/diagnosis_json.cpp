@@ -139,6 +139,19 @@ RankedHypothesis hypothesis_of(const Json& json) {
           closure_of(json.at("closure"))};
 }
 
+Json to_json(const SeenQuantity& s) {
+  return {{"name", s.name},   {"unit", s.unit},       {"reference", s.reference},
+          {"tests", s.tests}, {"scatter", s.scatter}, {"times", finite(s.times())}};
+}
+
+Json to_json(const OddFlight& o) {
+  return {{"flight", o.flight},
+          {"quantity", o.quantity},
+          {"times", finite(o.times)},
+          {"since_s", optional(o.since_s)},
+          {"step", optional(o.step)}};
+}
+
 Json to_json(const Validation& v) {
   Json ladder = Json::array(), controls = Json::array(), agreements = Json::array();
   for (const Validation::Rung& r : v.ladder) {
@@ -209,6 +222,11 @@ Diagnosis read(const Json& json) {
   const Json& verdict = json.at("verdict");
   d.verdict = {value_named(verdict.at("kind"), name_of, kVerdicts), verdict.at("effects"), verdict.at("remainder"),
                verdict.at("probability")};
+  for (const Json& s : json.at("seen"))
+    d.seen.push_back({s.at("name"), s.at("unit"), s.at("reference"), s.at("tests"), s.at("scatter")});
+  for (const Json& o : json.at("odd_flights"))
+    d.odd.push_back({o.at("flight"), o.at("quantity"), number_of(o.at("times")), optional_of(o.at("since_s")),
+                     optional_of(o.at("step"))});
   for (const Json& h : json.at("hypotheses")) d.hypotheses.push_back(hypothesis_of(h));
   for (const Json& t : json.at("unexplained").at("terms")) d.unexplained.push_back(term_of(t));
   d.jointly_with = json.at("unexplained").at("jointly_with");
@@ -240,7 +258,10 @@ Diagnosis read(const Json& json) {
 
 Json to_json(const Diagnosis& d) {
   Json faults = Json::array(), hypotheses = Json::array(), terms = Json::array(), locations = Json::array(),
-       closed_loop = Json::array(), moved = Json::object(), suspects = Json::array();
+       closed_loop = Json::array(), moved = Json::object(), suspects = Json::array(), seen = Json::array(),
+       odd = Json::array();
+  for (const SeenQuantity& s : d.seen) seen.push_back(to_json(s));
+  for (const OddFlight& o : d.odd) odd.push_back(to_json(o));
   for (const flightlog::DataFault& f : d.faults)
     faults.push_back({{"file", f.file}, {"line", f.line}, {"what", f.what}});
   for (const RankedHypothesis& h : d.hypotheses) hypotheses.push_back(to_json(h));
@@ -268,6 +289,8 @@ Json to_json(const Diagnosis& d) {
             {"effects", d.verdict.effects},
             {"remainder", d.verdict.remainder},
             {"probability", d.verdict.probability}}},
+          {"seen", seen},
+          {"odd_flights", odd},
           {"hypotheses", hypotheses},
           {"suspects", suspects},
           {"unexplained", {{"jointly_with", d.jointly_with}, {"terms", terms}}},

@@ -1,6 +1,8 @@
 #include "gap/result/sentences.hpp"
 
+#include <algorithm>
 #include <cctype>
+#include <cmath>
 
 #include "io/text.hpp"
 
@@ -78,6 +80,35 @@ std::string suspects_words(const std::vector<Suspect>& suspects, Spoken spoken) 
 
 std::string harmonic_words(int harmonic) {
   return harmonic == 0 ? "mean of the beat" : "harmonic " + std::to_string(harmonic) + " of the beat";
+}
+
+std::string seen_value(const SeenQuantity& quantity, double value, bool sign) {
+  const std::string& u = quantity.unit;
+  const auto [factor, unit] = u == "share" ? std::pair(100.0, "%")
+                              : u == "m"   ? std::pair(1e3, "mm")
+                              : u == "s"   ? std::pair(1e3, "ms")
+                                           : std::pair(1.0, u.c_str());
+  return io::format(sign ? "%+.3g" : "%.3g", factor * value) + (*unit ? std::string(" ") + unit : "");
+}
+
+std::vector<std::string> seen_words(const std::vector<SeenQuantity>& seen, Spoken spoken) {
+  std::vector<const SeenQuantity*> told;
+  for (const SeenQuantity& s : seen)
+    if (std::abs(s.times()) > kTold) told.push_back(&s);
+  std::ranges::stable_sort(told, std::greater{}, [](const SeenQuantity* s) { return std::abs(s->times()); });
+  std::vector<std::string> lines;
+  for (const SeenQuantity* s : told)
+    lines.push_back(io::format("%s %s, %.1f times what sessions differ by", spoken(s->name).c_str(),
+                               seen_value(*s, s->tests - s->reference, true).c_str(), std::abs(s->times())));
+  return lines;
+}
+
+std::string odd_words(const OddFlight& odd, Spoken spoken) {
+  if (odd.since_s)
+    return io::format("%s changes %.1f s after its begin, in %s (%.0f times its noise)", odd.flight.c_str(),
+                      *odd.since_s, spoken(odd.quantity).c_str(), odd.times);
+  return io::format("%s differs from the others of its set, most in %s (%.1f times what sessions differ by)",
+                    odd.flight.c_str(), spoken(odd.quantity).c_str(), std::abs(odd.times));
 }
 
 }  // namespace flappy::gap

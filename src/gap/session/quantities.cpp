@@ -65,7 +65,7 @@ struct Slope {
   SessionQuantity quantity;
   double prior_sd;
 };
-const Slope kSlopes[] = {{{"thrust with the battery", "", "battery"}, 0.5},
+const Slope kSlopes[] = {{{"thrust with the battery", "share", "battery"}, 0.5},
                          {{"thrust with the height", "1/m", "height"}, 0.1},
                          {{"drag along z", "1/s", "climb"}, 0.3},
                          {{"force along z with the speed squared", "1/m", "speed"}, 0.1},
@@ -81,16 +81,17 @@ struct AlongZ {
 /// `predicted`: as it is, then with a delay more and less.
 AlongZ along_z(const PredictedFlight& flight, const std::map<std::string, VectorXd>& f,
                const std::vector<Rows>& predicted, const CommonTrend& trend) {
-  AlongZ z{seen_beats(flight, kForceZ), {}, {}, {}};
-  z.thrust = of(predicted[0], z.beats, kForceZ);
-  z.residual = of(flight.measured(), z.beats, kForceZ) - z.thrust;
+  AlongZ z{seen_beats(flight, kSpecificForceZ), {}, {}, {}};
+  z.thrust = of(predicted[0], z.beats, kSpecificForceZ);
+  z.residual = of(flight.measured(), z.beats, kSpecificForceZ) - z.thrust;
   z.slopes = MatrixXd::Zero(z.thrust.size(), static_cast<Index>(std::size(kSlopes)));
   if (const auto b = f.find("battery"); b != f.end())
     z.slopes.col(0) = z.thrust.cwiseProduct((of(b->second, z.beats).array() - trend.battery).matrix());
   z.slopes.col(1) = z.thrust.cwiseProduct((of(f.at("height"), z.beats).array() - trend.height_m).matrix());
   z.slopes.col(2) = of(f.at("velocity_z"), z.beats);
   z.slopes.col(3) = of(f.at("velocity_x"), z.beats).cwiseAbs2() + of(f.at("velocity_y"), z.beats).cwiseAbs2();
-  z.slopes.col(4) = (of(predicted[1], z.beats, kForceZ) - of(predicted[2], z.beats, kForceZ)) / (2 * kLagStep_s);
+  z.slopes.col(4) =
+      (of(predicted[1], z.beats, kSpecificForceZ) - of(predicted[2], z.beats, kSpecificForceZ)) / (2 * kLagStep_s);
   return z;
 }
 
@@ -108,6 +109,13 @@ std::vector<Rows> predicted_by(const PredictedFlight& flight, const std::vector<
 }
 
 }  // namespace
+
+static double weight_over_inertia(const VehicleHypothesis& robot, int axis) {
+  constexpr double kGravity_m_s2 = 9.81;  // only a unit: moments are shown over it
+  const model::InertiaTensor& i = robot.vehicle.torso.inertia_kg_m2;
+  const double inertia[] = {i.xx, i.yy, i.zz};
+  return robot.vehicle.torso.mass_kg * kGravity_m_s2 / inertia[axis];
+}
 
 /// Each flight has a thrust of its own, so that what is common to all is found within and between flights.
 CommonTrend common_trend(const FlightList& references, const VehicleHypothesis& robot) {
@@ -132,7 +140,7 @@ CommonTrend common_trend(const FlightList& references, const VehicleHypothesis& 
   normal(k, k) = 1e-9;
   for (Index i = 0; i < n; ++i) {
     const PredictedFlight& flight = *references[static_cast<std::size_t>(i)];
-    if (!flight.has_rows(kForceZ, 0)) return trend;
+    if (!flight.has_rows(kSpecificForceZ, 0)) return trend;
     const AlongZ z =
         along_z(flight, functions[static_cast<std::size_t>(i)], predicted_by(flight, delayed(robot)), trend);
     MatrixXd x = MatrixXd::Zero(z.thrust.size(), normal.rows());
@@ -144,6 +152,27 @@ CommonTrend common_trend(const FlightList& references, const VehicleHypothesis& 
   }
   trend.slopes = normal.ldlt().solve(right).head(k);
   return trend;
+}
+
+std::vector<FlightSeries> flight_series(const PredictedFlight& flight, const VehicleHypothesis& robot,
+                                        const CommonTrend& trend) {
+  const std::map<std::string, VectorXd> f = functions_of(flight);
+  const std::vector<Rows> predicted = predicted_by(flight, delayed(robot));
+  std::vector<FlightSeries> all;
+  if (flight.has_rows(kSpecificForceZ, 0)) {
+    const AlongZ z = along_z(flight, f, predicted, trend);
+    all.push_back({"thrust", of(f.at("time"), z.beats),
+                   (z.residual - z.slopes * trend.slopes).cwiseQuotient(z.thrust.cwiseMax(1))});
+  }
+  for (int k = 0; k < 3; ++k) {
+    if (!flight.has_rows(kAngularAccelerationX + k, 0)) continue;
+    const std::vector<std::size_t> list = seen_beats(flight, kAngularAccelerationX + k);
+    all.push_back(
+        {std::string("moment about ") + "xyz"[k], of(f.at("time"), list),
+         (of(flight.measured(), list, kAngularAccelerationX + k) - of(predicted[0], list, kAngularAccelerationX + k)) /
+             weight_over_inertia(robot, k)});
+  }
+  return all;
 }
 
 /// Least squares of rows on columns; those with a prior are held at 0 by it.
@@ -233,12 +262,12 @@ FlightQuantities::FlightQuantities(const PredictedFlight& flight, const VehicleH
   Rows residual = flight.measured();
   for (std::size_t i = 0; i < residual.size(); ++i) residual[i] -= predicted[0][i];
 
-  if (flight.has_rows(kForceZ, 0)) {
+  if (flight.has_rows(kSpecificForceZ, 0)) {
     const AlongZ z = along_z(flight, f, predicted, trend);
     Regression r;
-    for (const std::size_t j : z.beats) r.rows.push_back(row_of(j, kForceZ));
+    for (const std::size_t j : z.beats) r.rows.push_back(row_of(j, kSpecificForceZ));
     Regression alone = r;
-    alone.add(z.thrust, 0, {"thrust", "", "thrust"});
+    alone.add(z.thrust, 0, {"thrust", "share", "thrust"});
     add(alone, z.residual - z.slopes * trend.slopes);
     r.add(z.thrust, 0);
     for (std::size_t i = 0; i < std::size(kSlopes); ++i)
@@ -246,19 +275,21 @@ FlightQuantities::FlightQuantities(const PredictedFlight& flight, const VehicleH
         r.add(z.slopes.col(static_cast<Index>(i)), kSlopes[i].prior_sd, kSlopes[i].quantity);
     add(r, z.residual);
   }
-  const std::vector<std::size_t> x = seen_beats(flight, kForceX), y = seen_beats(flight, kForceY);
+  const std::vector<std::size_t> x = seen_beats(flight, kSpecificForceX), y = seen_beats(flight, kSpecificForceY);
   const auto nx = static_cast<Index>(x.size()), ny = static_cast<Index>(y.size());
-  const bool has_x = flight.has_rows(kForceX, 0), has_y = flight.has_rows(kForceY, 0);
+  const bool has_x = flight.has_rows(kSpecificForceX, 0), has_y = flight.has_rows(kSpecificForceY, 0);
   if (has_x || has_y) {
     std::vector<std::size_t> both;
-    for (const std::size_t j : x) both.push_back(row_of(j, kForceX));
-    for (const std::size_t j : y) both.push_back(row_of(j, kForceY));
+    for (const std::size_t j : x) both.push_back(row_of(j, kSpecificForceX));
+    for (const std::size_t j : y) both.push_back(row_of(j, kSpecificForceY));
     const auto stacked = [&](const VectorXd& first, const VectorXd& second) {
       VectorXd v(nx + ny);
       v << first, second;
       return v;
     };
-    const auto in = [&](const Rows& rows) { return stacked(of(rows, x, kForceX), of(rows, y, kForceY)); };
+    const auto in = [&](const Rows& rows) {
+      return stacked(of(rows, x, kSpecificForceX), of(rows, y, kSpecificForceY));
+    };
     const VectorXd zero_x = VectorXd::Zero(nx), zero_y = VectorXd::Zero(ny);
     Regression r;
     r.rows = both;
@@ -274,7 +305,7 @@ FlightQuantities::FlightQuantities(const PredictedFlight& flight, const VehicleH
       Regression s = without;
       for (SessionQuantity& q : s.quantities) q.name.clear();
       s.add((in(predicted[3 + l]) - in(predicted[0])) / kLoad, 0.15,
-            {io::format("swing of %.2g m", kLengths_m[l]), "", "swing"});
+            {io::format("swing of %.2g m", kLengths_m[l]), "share", "swing"});
       // a weight that swings from the start on
       const double w = std::sqrt(9.81 / kLengths_m[l]);
       for (const char* axis : {"north", "west"})
@@ -292,15 +323,13 @@ FlightQuantities::FlightQuantities(const PredictedFlight& flight, const VehicleH
     }
   }
   for (int k = 0; k < 3; ++k) {
-    if (!flight.has_rows(kTorqueX + k, 0)) continue;
-    const std::vector<std::size_t> list = seen_beats(flight, kTorqueX + k);
-    const model::InertiaTensor& i = robot.vehicle.torso.inertia_kg_m2;
-    const double inertia[] = {i.xx, i.yy, i.zz};
+    if (!flight.has_rows(kAngularAccelerationX + k, 0)) continue;
+    const std::vector<std::size_t> list = seen_beats(flight, kAngularAccelerationX + k);
     Regression r;
-    for (const std::size_t j : list) r.rows.push_back(row_of(j, kTorqueX + k));
-    r.add(VectorXd::Constant(static_cast<Index>(list.size()), mass_kg * 9.81 / inertia[k]), 0,
+    for (const std::size_t j : list) r.rows.push_back(row_of(j, kAngularAccelerationX + k));
+    r.add(VectorXd::Constant(static_cast<Index>(list.size()), weight_over_inertia(robot, k)), 0,
           {std::string("moment about ") + "xyz"[k], "m", k < 2 ? "moment" : "yaw"});
-    add(r, of(residual, list, kTorqueX + k));
+    add(r, of(residual, list, kAngularAccelerationX + k));
   }
   if (const std::optional<double> noise = flight.log_input_noise()) {
     quantities_.push_back({"noise of the inputs (log)", "", "noise"});

@@ -29,6 +29,15 @@ struct CommonTrend {
 /// `robot`: what predicts.
 CommonTrend common_trend(const FlightList& references, const VehicleHypothesis& robot);
 
+/// What a quantity is at each instant that shows it.
+struct FlightSeries {
+  std::string quantity;
+  Eigen::VectorXd time_s, values;
+};
+/// The thrust, corrected for the trend, and the moments.
+std::vector<FlightSeries> flight_series(const PredictedFlight& flight, const VehicleHypothesis& robot,
+                                        const CommonTrend& trend);
+
 /// The regressions of one flight.
 class FlightQuantities {
  public:

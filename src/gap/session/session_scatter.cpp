@@ -17,6 +17,7 @@ SessionPrior read_session_prior(const std::filesystem::path& path) {
   root.schema(1);
   SessionPrior p;
   p.freedom = root.number("freedom", io::positive());
+  p.most_freedom = root.number("most_freedom", io::positive());
   p.share_of_noise = root.number("share_of_noise", io::non_negative());
   const io::Table prior = root.table("prior");
   p.unchanged = prior.number("unchanged", io::positive(1));
@@ -78,14 +79,15 @@ SessionScatter::SessionScatter(const std::vector<SessionQuantity>& quantities, c
     : quantities_(quantities) {
   const Index n = references.values.rows(), size = references.values.cols();
   mean_ = variance_ = variance_of_mean_ = VectorXd::Zero(size);
-  freedom_ = prior.freedom + static_cast<double>(n - 1);
+  freedom_ = std::min(prior.freedom + static_cast<double>(n - 1), prior.most_freedom);
   noise_ = references.variances.colwise().mean().transpose();
   for (Index q = 0; q < size; ++q) {
     const VectorXd x = references.values.col(q);
     const double prior_variance = std::pow(prior.of(quantities[static_cast<std::size_t>(q)]).scatter, 2) +
                                   std::pow(prior.share_of_noise, 2) * noise_[q];
     mean_[q] = x.mean();
-    variance_[q] = (prior.freedom * prior_variance + (x.array() - mean_[q]).square().sum()) / freedom_;
+    variance_[q] = (prior.freedom * prior_variance + (x.array() - mean_[q]).square().sum()) /
+                   (prior.freedom + static_cast<double>(n - 1));
     variance_of_mean_[q] = variance_[q] / static_cast<double>(n);
   }
 }

@@ -19,6 +19,7 @@ struct SessionPrior {
   };
   std::map<std::string, Block> blocks;  ///< by SessionQuantity::block
   double freedom = 0;                   ///< for how many sessions of the robot it counts
+  double most_freedom = 0;              ///< of the robot's own sessions and the prior together
   double share_of_noise = 0;            ///< by which flights differ besides
   double unchanged = 0, effect = 0, unknown = 0, further_effect = 0;
   std::map<std::string, double> together;  ///< in place of further_effect, by two effects in the order of their names

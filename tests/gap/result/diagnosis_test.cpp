@@ -23,6 +23,7 @@ TEST(Diagnosis, UnitsAreThoseOfTheNames) {
                                                            {"twist_rad_N", "rad/N"},
                                                            {"drag_area_m2", "m^2"},
                                                            {"line_kg_m", "kg/m"},
+                                                           {"moment_x_kg_m", "kg m"},
                                                            {"stiffness_N_m", "N/m"},
                                                            {"gain_s2_m", "s^2/m"},
                                                            {"stribeck_rad_s", "rad/s"},

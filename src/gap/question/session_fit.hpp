@@ -1,0 +1,50 @@
+// A hypothesis of a contrast of beat-averaged vehicles, fitted to what the test flights show as one session
+// (session_contrast.hpp).
+#pragma once
+
+#include "gap/fit/hypothesis.hpp"
+#include "gap/session/session_scatter.hpp"
+
+namespace flappy::gap {
+
+inline constexpr const char* kActuatorLoss = "actuator_loss";
+
+/// Test flights as one session.
+class TestSession {
+ public:
+  /// Keeps references. `robot`: that of the references.
+  TestSession(const FlightList& tests, const std::vector<FlightQuantities>& quantities, const SessionDensity& density,
+              const SessionPrior& prior, const VehicleHypothesis& robot);
+  const SessionDensity& density() const { return density_; }
+  /// [quantity] Variance of the inputs' noise where something shakes.
+  const Eigen::VectorXd& noise_variance() const { return noise_variance_; }
+  /// [vehicle][quantity] What vehicles would have shown less what the robot of the references would.
+  std::vector<Eigen::VectorXd> shifts(const std::vector<VehicleHypothesis>& vehicles) const;
+
+ private:
+  const FlightList& tests_;
+  const std::vector<FlightQuantities>& quantities_;
+  Eigen::MatrixXd shares_;  ///< [flight][quantity]
+  const SessionDensity& density_;
+  Eigen::VectorXd noise_variance_;
+  std::vector<Rows> unchanged_;
+};
+
+struct EffectFit {
+  Eigen::VectorXd at;                                           ///< all coordinates of the hypothesis
+  Eigen::MatrixXd covariance;                                   ///< of all coordinates
+  double explained = -std::numeric_limits<double>::infinity();  ///< log evidence
+  std::vector<Eigen::Index> free;                               ///< coordinates that were fitted
+};
+
+/// The evidence of all ways in which the effects of `h` may act, which are equally probable, and the most probable one.
+/// `robot`: coordinates of the references' parameters. `first`: a fit of the effects before the last; null: there are
+/// none. An actuator that lost some of its loads may shake, or not.
+EffectFit fit_each_way(const TestSession& tests, const Hypothesis& h, const Eigen::VectorXd& robot,
+                       const EffectFit* first);
+/// Whether an effect of the size that its prior allows changes what the flights show.
+bool shows(const TestSession& tests, const Hypothesis& h, const Eigen::VectorXd& robot);
+/// Logarithm of the sum of exponentials.
+double log_sum(const std::vector<double>& values);
+
+}  // namespace flappy::gap
