@@ -146,12 +146,11 @@ FlownHeader parse_flown(const io::Table& flown) {
 
 FlightHeader parse_header(const io::Table& root) {
   root.schema(1);
-  root.accept({"schema", "vehicle", "vehicle_sha256", "flapping_Hz", "gravity_m_s2", "ambient", "command", "mocap",
-               "imu", "power", "wings", "attitude", "policy", "changes", "flown"});
+  root.accept({"schema", "vehicle", "vehicle_sha256", "session", "flapping_Hz", "gravity_m_s2", "ambient", "command",
+               "mocap", "imu", "power", "wings", "attitude", "policy", "changes", "flown"});
   FlightHeader h;
-  h.vehicle = root.string("vehicle");
-  if (h.vehicle.empty() || h.vehicle.find_first_of("/\\") != std::string::npos)
-    root.fail("vehicle", "\"" + h.vehicle + "\" is no file name", "the name of the vehicle's file, without folder");
+  h.vehicle = read_vehicle_name(root);
+  h.session = root.string_or("session", "");
   h.vehicle_sha256 = root.string_or("vehicle_sha256", "");
   if (!h.vehicle_sha256.empty() &&
       (h.vehicle_sha256.size() != 64 || h.vehicle_sha256.find_first_not_of("0123456789abcdef") != std::string::npos))
@@ -197,6 +196,7 @@ std::string header_text(const FlightHeader& h) {
   line("schema", "1");
   line("vehicle", io::toml_string(h.vehicle));
   if (!h.vehicle_sha256.empty()) line("vehicle_sha256", io::toml_string(h.vehicle_sha256));
+  if (!h.session.empty()) line("session", io::toml_string(h.session));
   if (h.flapping_Hz > 0) number("flapping_Hz", h.flapping_Hz);
   number("gravity_m_s2", h.gravity_m_s2);
 
@@ -535,6 +535,13 @@ bool is_sparse(const Column& t_s) {
   for (std::size_t i = 1; i < t_s.size(); ++i)
     if (t_s[i] - t_s[i - 1] > kLongestGap_s) return true;
   return static_cast<double>(t_s.size()) < kSlowest_Hz * (t_s.back() - t_s.front());
+}
+
+std::string read_vehicle_name(const io::Table& root) {
+  const std::string name = root.string("vehicle");
+  if (name.empty() || name.find_first_of("/\\") != std::string::npos)
+    root.fail("vehicle", "\"" + name + "\" is no file name", "the name of the vehicle's file, without folder");
+  return name;
 }
 
 LogAmbient read_ambient(const io::Table& ambient) {

@@ -123,6 +123,7 @@ struct FlownHeader {
 struct FlightHeader {
   std::string vehicle;              ///< name of the vehicle's file, without folder
   std::string vehicle_sha256;       ///< lower-case hex; empty where not declared
+  std::string session;              ///< name of the session, as a day or a battery; empty: the flight is its own
   std::vector<std::string> inputs;  ///< columns of command.csv in place of voltages; empty: it has voltages
   double flapping_Hz = 0;           ///< 0 where inputs are declared and nothing flaps
   double gravity_m_s2 = 9.81;
@@ -242,6 +243,8 @@ inline const std::vector<std::string> kMotionNames = {"t_s",
                                                       "gyro_bias_y_rad_s",
                                                       "gyro_bias_z_rad_s"};
 
+/// Key vehicle: the name of a file, without folder.
+std::string read_vehicle_name(const io::Table& root);
 LogAmbient read_ambient(const io::Table& ambient);
 
 /// Keys of flight.toml and of mappings: [command] inputs, [policy] numbers, flapping_Hz, [mocap] source, [imu] gyro, [power] currents.

@@ -512,6 +512,11 @@ bool Table::is_table(std::string_view key) const {
   return entry.node != nullptr && entry.node->is_table();
 }
 
+bool Table::is_array(std::string_view key) const {
+  const Entry entry = find(*section_, key);
+  return entry.node != nullptr && entry.node->is_array();
+}
+
 std::vector<std::string> Table::keys() const {
   std::vector<std::string> names;
   for (const auto& [key, node] : *section_->table) names.emplace_back(key.str());

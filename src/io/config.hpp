@@ -69,6 +69,7 @@ class Table {
   void accept(const std::vector<std::string>& names) const;
   bool has(std::string_view key) const;  ///< counts as reading the key
   bool is_table(std::string_view key) const;
+  bool is_array(std::string_view key) const;
   std::vector<std::string> keys() const;  ///< sorted
   std::string path() const;               ///< full dotted path; empty for the root
   /// Throws an InputError of the caller's choice about a key, or about this table where `key` is empty.

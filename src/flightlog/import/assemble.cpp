@@ -64,6 +64,14 @@ const std::vector<double>& field_of(const Channel& channel, const io::Table& tab
   table.fail(key, "\"" + field + "\" is no field of the channel", listed(names) + io::did_you_mean(field, names));
 }
 
+/// The first field that the channel has.
+const std::vector<double>& field_of(const Channel& channel, const io::Table& table, const std::string& key,
+                                    const FieldNames& fields) {
+  for (const std::string& field : fields)
+    if (const auto* found = channel.column(field)) return *found;
+  return field_of(channel, table, key, fields.front());
+}
+
 /// The unit ("s", "ms", "us" or "ns") in which `value` lies between `least_s` and `most_s`; empty where no unit fits.
 std::string unit_for(double value, double least_s, double most_s) {
   for (const auto& [unit, seconds] :
@@ -344,7 +352,7 @@ void require_range(const Stream& s) {
 std::string fault_of(const Stream& s, std::size_t i, const Span& span) {
   if (s.t_ns[i] == kNoTime) return "no time";
   if (!span.recorded.contains(s.t_ns[i])) return "apart from the rest of the recording";
-  if (const ColumnMapping* c = s.not_measured[i]) return c->field + " is not measured, as the message says";
+  if (const ColumnMapping* c = s.not_measured[i]) return c->fields.front() + " is not measured, as the message says";
   for (const auto& [name, column] : s.columns) {
     if (std::isnan(column[i])) return "lacks " + name;
     if (!std::isfinite(column[i])) return name + " is no finite number";
@@ -439,9 +447,9 @@ Span span_of(const Channels& channels, const Mapping& mapping, const Clocks& clo
                         " s from the others",
                     "streams of one recording; another clock is named by clock, its offset by clocks.NAME.offset_s");
   const StreamMapping& command = mapping.streams.front();
-  if (command.flown_field.empty()) return span;
+  if (command.flown_fields.empty()) return span;
   const Channel& channel = channel_of(channels, command, command.channel, "channel");
-  const std::vector<double>& says = field_of(channel, command.table.table("flown"), "field", command.flown_field);
+  const std::vector<double>& says = field_of(channel, command.table.table("flown"), "field", command.flown_fields);
   const Timed times = timed(channel, command, clocks);
   std::swap(span.flown.from_ns, span.flown.to_ns);
   for (std::size_t i = 0; i < says.size(); ++i)
@@ -449,7 +457,7 @@ Span span_of(const Channels& channels, const Mapping& mapping, const Clocks& clo
         span.recorded.contains(times.t_ns[i]))
       span.flown = {std::min(span.flown.from_ns, times.t_ns[i]), std::max(span.flown.to_ns, times.t_ns[i])};
   if (span.flown.from_ns >= span.flown.to_ns)
-    command.table.table("flown").fail("above", "\"" + command.flown_field + "\" is never above it",
+    command.table.table("flown").fail("above", "\"" + command.flown_fields.front() + "\" is never above it",
                                       "what it exceeds while the robot flies");
   return span;
 }
@@ -479,10 +487,10 @@ Stream read_stream(const Channels& channels, const StreamMapping& mapping, const
     const io::Table columns = mapping.table.table("columns");
     Column column;
     if (c.channel == mapping.channel) {
-      column = field_of(channel, columns, c.column, c.field);
+      column = field_of(channel, columns, c.column, c.fields);
     } else {
       const Channel& other = channel_of(channels, mapping, c.channel, "from");
-      const std::vector<double>& values = field_of(other, columns, c.column, c.field);
+      const std::vector<double>& values = field_of(other, columns, c.column, c.fields);
       for (const std::size_t row : last_rows(own.t_ns, timed(other, mapping, clocks).t_ns))
         column.push_back(row < values.size() ? values[row] : std::numeric_limits<double>::quiet_NaN());
     }

@@ -80,6 +80,14 @@ StreamKeys narrowed(StreamKeys keys, const io::Table& table, bool declared_input
   return keys;
 }
 
+/// A name, or several of which a recording has one.
+FieldNames read_field(const io::Table& table, const std::string& key) {
+  if (!table.is_array(key)) return {table.string(key)};
+  FieldNames names = table.strings(key);
+  if (names.empty()) table.fail(key, "is empty", "names of fields");
+  return names;
+}
+
 void read_columns(const StreamKeys& keys, StreamMapping& stream) {
   const io::Table& table = stream.table;
   Names known = keys.columns;
@@ -96,7 +104,7 @@ void read_columns(const StreamKeys& keys, StreamMapping& stream) {
         if (*part && (*part)->has(name)) (*part)->fail(name, "has no such column", "columns of " + columns.path());
       continue;
     }
-    ColumnMapping column{name, stream.channel, columns.string(name)};
+    ColumnMapping column{name, stream.channel, read_field(columns, name)};
     if (scale) column.scale = scale->number_or(name, 1);
     if (offset) column.offset = offset->number_or(name, 0);
     if (from) column.channel = from->string_or(name, stream.channel);
@@ -125,7 +133,7 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
   table.accept(accepted);
   StreamMapping s{.name = keys.name, .table = table};
   if (const auto flown = keys.name == "command" ? table.optional_table("flown") : std::nullopt) {
-    s.flown_field = flown->string("field");
+    s.flown_fields = read_field(*flown, "field");
     s.flown_above = flown->number("above");
   }
   s.channel = table.string("channel");
@@ -198,9 +206,9 @@ Wanted Mapping::wanted() const {
     std::set<std::string>& own = wanted[s.channel];
     if (!s.time_field.empty()) own.insert(s.time_field);
     if (!s.sequence.empty()) own.insert(s.sequence);
-    if (!s.flown_field.empty()) own.insert(s.flown_field);
+    own.insert(s.flown_fields.begin(), s.flown_fields.end());
     for (const ColumnMapping& c : s.columns) {
-      wanted[c.channel].insert(c.field);
+      wanted[c.channel].insert(c.fields.begin(), c.fields.end());
       if (!s.time_field.empty()) wanted[c.channel].insert(s.time_field);
     }
   }
@@ -212,13 +220,14 @@ Mapping read_mapping(const std::filesystem::path& path, const std::vector<std::s
   const io::Table root = config.root();
   root.schema(1);
   Names accepted = {"schema", "vehicle", "vehicle_sha256", "flapping_Hz", "gravity_m_s2",
-                    "start",  "ambient", "clocks",         "dds"};
+                    "start",  "ambient", "clocks",         "dds",         "session"};
   for (const StreamKeys& keys : kStreams) accepted.push_back(keys.name);
   root.accept(accepted);
   Mapping m;
   m.file = path;
   FlightHeader& h = m.header;
-  h.vehicle = root.string("vehicle");
+  h.vehicle = read_vehicle_name(root);
+  h.session = root.string_or("session", "");
   h.vehicle_sha256 = root.string_or("vehicle_sha256", "");
   const io::Table command = root.table("command");
   if (command.has("inputs")) h.inputs = read_inputs(command);

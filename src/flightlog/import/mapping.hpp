@@ -89,8 +89,11 @@ namespace flappy::flightlog {
 enum class TimeOf { stamp, received, field };
 enum class World { enu, ned, ned_x_north };
 
+/// Names that a field may have: the first of them that a recording has counts.
+using FieldNames = std::vector<std::string>;
 struct ColumnMapping {
-  std::string column, channel, field;
+  std::string column, channel;
+  FieldNames fields;
   double scale = 1, offset = 0;
 };
 
@@ -105,7 +108,7 @@ struct StreamMapping {
   std::vector<ColumnMapping> columns;
   World world = World::enu;
   bool frd = false, measures_rate = false;
-  std::string flown_field;  ///< command stream only: field that is above flown_above in flight; empty: the whole log
+  FieldNames flown_fields;  ///< command stream only: what is above flown_above in flight; empty: the whole log
   double flown_above = 0;
   io::Table table;  ///< the stream's table in the file, for error messages
 };

@@ -22,6 +22,7 @@ double duration_s(const FlightList& flights) {
 
 /// A rate that import measured is never the same to the last digit.
 bool same_sensors(const flightlog::FlightHeader& a, const flightlog::FlightHeader& b) {
+  // Largest relative difference. Choice.
   constexpr double kSameRate = 0.01;
   const auto like = [](auto own, const auto& other) {
     if (std::abs(own.rate_hz - other.rate_hz) <= kSameRate * other.rate_hz) own.rate_hz = other.rate_hz;

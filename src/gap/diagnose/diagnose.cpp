@@ -114,9 +114,9 @@ DiagnosisRequest read_request(const DiagnosisSettings& settings) {
     throw io::InputError("--discrepancy " + s.discrepancy + ": is of vehicles " +
                          (beat_averaged ? "with wings" : "that are beat-averaged") +
                          "; accepted: one that was learnt from vehicles like " + vehicle.name);
-  if (contrast && beat_averaged)
-    options.sessions = read_session_prior(io::config_path("gap/beat_averaged/session_scatter.toml"));
-  if (contrast) options.discrepancy.session = read_session_variation(file(s.sessions, "session_variation.toml"));
+  if (contrast && beat_averaged) options.sessions = read_session_prior(file(s.sessions, "session_scatter.toml"));
+  if (contrast && !beat_averaged)
+    options.discrepancy.session = read_session_variation(file(s.sessions, "session_variation.toml"));
   return {s,
           std::move(sets),
           std::move(vehicle),

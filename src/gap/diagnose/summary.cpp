@@ -112,7 +112,7 @@ std::vector<std::string> seen_lines(const Diagnosis& diagnosis) {
   if (diagnosis.seen.empty()) return lines;
   const std::vector<std::string> told = seen_words(diagnosis.seen, as_it_is);
   if (told.empty()) lines.push_back("Seen: nothing beyond what sessions of this robot differ by");
-  else lines.push_back("Seen, beside the reference:");
+  else lines.push_back("Seen, compared with the reference:");
   for (std::size_t i = 0; i < told.size() && i < kSeen; ++i) lines.push_back("  " + told[i]);
   for (std::size_t i = 0; i < diagnosis.odd.size() && i < kSeen; ++i)
     lines.push_back("  " + odd_words(diagnosis.odd[i], as_it_is));
@@ -198,7 +198,7 @@ std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::strin
                                100 * diagnosis.closure->value, 100 * diagnosis.closure->low,
                                100 * diagnosis.closure->high));
   else lines.push_back(kClosureUnknown);
-  // beside references that are seen, parameters are theirs
+  // in a contrast by sessions, parameters are those of the references
   if (!diagnosis.moved_parameters.empty() && diagnosis.verdict.kind != VerdictKind::none && diagnosis.seen.empty()) {
     lines.push_back("parameters that moved most, in standard deviations of what was believed:");
     for (std::size_t i = 0; i < diagnosis.moved_parameters.size() && i < kMoved; ++i)

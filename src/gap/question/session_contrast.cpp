@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <set>
 
@@ -17,13 +18,20 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Single effects that are joined by another, and sets of two that are kept. Choices.
-constexpr std::size_t kJoined = 3, kKept = 6;
-/// A flight changes within itself beyond this many standard deviations, and this many times the clearest of the
-/// references. Choices.
-constexpr double kStepTimes = 6, kStepBeyond = 1.5;
+/// Single effects that are joined by another. Choice.
+constexpr std::size_t kJoined = 3;
+/// Sets of two effects that are kept. Choice.
+constexpr std::size_t kKept = 6;
+/// A flight changes within itself beyond this many standard deviations. Choice.
+constexpr double kStepTimes = 6;
+/// And beyond this many times the clearest step of the references. Choice.
+constexpr double kStepBeyond = 1.5;
 /// A group has at most so many sets of effects. Choice.
-constexpr std::size_t kMostSets = 3;
+constexpr std::size_t kMaxSets = 3;
+/// Step of the derivative by an actuator's share. Choice.
+constexpr double kLoss = 0.01;
+/// What is named is more probable than not. Choice.
+constexpr double kMoreThanNot = 0.5;
 
 /// Any one or two kinds of quantities change, or all, each choice as probable as any other.
 double log_density_of_unknown(const SessionDensity& density, const std::vector<SessionQuantity>& quantities,
@@ -61,11 +69,18 @@ struct Sessions {
   const std::vector<SessionQuantity>& quantities() const { return references.front().quantities(); }
 };
 
-/// Each reference flight is a session.
-SessionScatter scatter_of(const Sessions& sessions, const SessionPrior& prior) {
-  std::vector<int> each(sessions.references.size());
-  std::iota(each.begin(), each.end(), 0);
-  return {sessions.quantities(), session_values(sessions.references, each, prior), prior};
+/// Flights that name the same session are one; others are each their own.
+SessionScatter scatter_of(const FlightList& references, const Sessions& sessions, const SessionPrior& prior) {
+  std::vector<int> of;
+  std::map<std::string, int> named;
+  int next = 0;
+  for (const auto& flight : references) {
+    const std::string name = flight->session();
+    const auto [at, fresh] = named.try_emplace(name.empty() ? "/" + std::to_string(next) : name, next);
+    next += fresh;
+    of.push_back(at->second);
+  }
+  return {sessions.quantities(), session_values(sessions.references, of, prior), prior};
 }
 
 SessionDensity density_of(const Sessions& sessions, const SessionScatter& scatter, const SessionPrior& prior) {
@@ -76,7 +91,6 @@ SessionDensity density_of(const Sessions& sessions, const SessionScatter& scatte
 /// The share of its thrust that each actuator has more or less, from thrust and moments; empty: these do not tell.
 std::vector<SeenQuantity> actuators_seen(const TestSession& tests, const std::vector<SessionQuantity>& quantities,
                                          const VehicleHypothesis& robot) {
-  constexpr double kLoss = 0.01;
   const std::vector<model::BeatAveraged::Actuator>& actuators = robot.vehicle.beat_averaged->actuators;
   std::vector<Index> used;
   for (std::size_t q = 0; q < quantities.size(); ++q)
@@ -244,12 +258,11 @@ void conclude_by_sessions(Inference& d) {
   const auto find = [&](HypothesisKind kind) {
     return static_cast<std::size_t>(std::ranges::find(all, kind, &ScoredHypothesis::kind) - all.begin());
   };
-  constexpr double kMoreThanNot = 0.5;
   const std::size_t unchanged = find(HypothesisKind::parameters), unknown = find(HypothesisKind::unknown);
   d.verdict = {};
   std::vector<std::size_t> sets;
   double together = 0;
-  for (std::size_t i = 0; i < all.size() && sets.size() < kMostSets && together < kMoreThanNot; ++i)
+  for (std::size_t i = 0; i < all.size() && sets.size() < kMaxSets && together < kMoreThanNot; ++i)
     if (all[i].kind == HypothesisKind::effect && all[i].probability > all[unknown].probability / 2)
       sets.push_back(i), together += all[i].probability;
   if (all[unchanged].probability >= kMoreThanNot ||
@@ -285,7 +298,7 @@ std::optional<Inference> SessionContrast::by_sessions(const Flights& flights, co
   const VectorXd& at = reference.fit.parameters().at;
   const VehicleHypothesis robot = no_effects.vehicle(at);
   const Sessions sessions(flights, robot, options.threads);
-  const SessionScatter scatter = scatter_of(sessions, options.sessions);
+  const SessionScatter scatter = scatter_of(flights.references, sessions, options.sessions);
   const SessionDensity density = density_of(sessions, scatter, options.sessions);
   const TestSession tests(flights.tests, sessions.tests, density, options.sessions, robot);
   const Weighing weighing(flights, uncertain, options, at, tests);

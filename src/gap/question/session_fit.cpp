@@ -42,9 +42,9 @@ namespace {
 /// Step of differences, in coordinates. Choice.
 constexpr double kStep = 0.02;
 /// Largest number of Gauss-Newton steps. Choice.
-constexpr int kIterations = 12;
+constexpr int kMaxNewtonSteps = 12;
 /// A step that gains less ends the search. Choice.
-constexpr double kLeastGain_nats = 1e-3;
+constexpr double kMinStepGain_nats = 1e-3;
 
 double log_normal_integral(double x) {  // log Phi(x)
   return x > -5 ? std::log(0.5 * std::erfc(-x / std::numbers::sqrt2))
@@ -104,7 +104,7 @@ EffectFit fit_effects(const TestSession& tests, const Hypothesis& h, VectorXd at
     for (Index i = 0; i < n; ++i)
       if (!at_bound(i)) open.push_back(i);
   };
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
+  for (int iteration = 0; iteration < kMaxNewtonSteps; ++iteration) {
     linearise();
     find_open();
     if (open.empty()) break;
@@ -121,7 +121,7 @@ EffectFit fit_effects(const TestSession& tests, const Hypothesis& h, VectorXd at
       z = there, shift = moved, now = next;
       break;
     }
-    if (gained < kLeastGain_nats) break;
+    if (gained < kMinStepGain_nats) break;
   }
   linearise();
   find_open();
@@ -155,7 +155,7 @@ constexpr double kStart = 0.3;
 /// Where the first shape parameter starts, in coordinates. Choice.
 constexpr double kShapeStarts[] = {-1, 0, 1, 2, 3};
 /// Least change that shows, in standard deviations between sessions. Choice.
-constexpr double kLeastShown = 0.1;
+constexpr double kMinShown = 0.1;
 
 /// Coordinates that are free together, and points to start from.
 struct Way {
@@ -235,7 +235,7 @@ bool shows(const TestSession& tests, const Hypothesis& h, const VectorXd& robot)
       vehicles.push_back(h.vehicle(h.bounded(there)));
     }
   for (const VectorXd& shift : tests.shifts(vehicles))
-    if ((shift.array() / tests.density().variance().array().sqrt()).abs().maxCoeff() > kLeastShown) return true;
+    if ((shift.array() / tests.density().variance().array().sqrt()).abs().maxCoeff() > kMinShown) return true;
   return false;
 }
 

@@ -26,7 +26,7 @@ namespace flappy::gap {
 struct TooLittleSeen : io::InputError {
   using io::InputError::InputError;
 };
-/// Fewest instants of all flights of a robot together.
+/// Least number of instants of all flights of a robot together. Choice.
 inline constexpr std::size_t kMinInstants = 30;
 
 class BeatAveragedPrediction final : public PredictedFlight {
@@ -38,6 +38,7 @@ class BeatAveragedPrediction final : public PredictedFlight {
                          const std::vector<int>& channels = {});
 
   const std::string& name() const override { return name_; }
+  std::string session() const override { return log_.header.session; }
   bool has_ground() const override { return flightlog::world_of(log_.header).has_ground(); }
   std::size_t beats() const override { return rows_.size(); }
   double beats_Hz() const override { return 1 / (motion_.step_s * static_cast<double>(stride_)); }

@@ -90,6 +90,8 @@ class PredictedFlight {
   /// Frees what is kept to be faster: hundreds of megabytes.
   virtual void forget() const { memo_->clear(); }
   virtual const std::string& name() const = 0;
+  /// Name of the session; empty: the flight is its own.
+  virtual std::string session() const { return {}; }
   virtual bool has_ground() const = 0;    ///< whether the log declares a ground
   virtual std::size_t beats() const = 0;  ///< number of beats; of a beat-averaged vehicle, number of rows in time
   virtual double beats_Hz() const = 0;    ///< beats, or these rows, a second

@@ -222,9 +222,9 @@ Diagnosis read(const Json& json) {
   const Json& verdict = json.at("verdict");
   d.verdict = {value_named(verdict.at("kind"), name_of, kVerdicts), verdict.at("effects"), verdict.at("remainder"),
                verdict.at("probability")};
-  for (const Json& s : json.at("seen"))
+  for (const Json& s : json.value("seen", Json::array()))
     d.seen.push_back({s.at("name"), s.at("unit"), s.at("reference"), s.at("tests"), s.at("scatter")});
-  for (const Json& o : json.at("odd_flights"))
+  for (const Json& o : json.value("odd_flights", Json::array()))
     d.odd.push_back({o.at("flight"), o.at("quantity"), number_of(o.at("times")), optional_of(o.at("since_s")),
                      optional_of(o.at("step"))});
   for (const Json& h : json.at("hypotheses")) d.hypotheses.push_back(hypothesis_of(h));
@@ -278,38 +278,38 @@ Json to_json(const Diagnosis& d) {
                            {"corrected", finite(c.corrected)}});
   Json sets = Json::object();
   for (const NamedDiagnosis& s : d.sets) sets[s.name] = to_json(s.diagnosis);
-  return {{"schema", kDiagnosisSchema},
-          {"flights", d.flights},
-          {"reference", d.reference},
-          {"warnings", d.warnings},
-          {"data_faults", faults},
-          {"complete", d.complete},
-          {"verdict",
-           {{"kind", name_of(d.verdict.kind)},
-            {"effects", d.verdict.effects},
-            {"remainder", d.verdict.remainder},
-            {"probability", d.verdict.probability}}},
-          {"seen", seen},
-          {"odd_flights", odd},
-          {"hypotheses", hypotheses},
-          {"suspects", suspects},
-          {"unexplained", {{"jointly_with", d.jointly_with}, {"terms", terms}}},
-          {"other_law", d.other_law ? to_json(*d.other_law) : Json(nullptr)},
-          {"background", to_json(d.background)},
-          {"sensors", to_json(d.sensors)},
-          {"moved_parameters", moved},
-          {"gap",
-           {{"nominal", optional(d.nominal_loss)},
-            {"refit", optional(d.refit_loss)},
-            {"effect", optional(d.effect_loss)},
-            {"noise_floor", d.noise_floor},
-            {"closure", to_json(d.closure)}}},
-          {"closed_loop", closed_loop},
-          {"next_experiment", d.next ? to_json(*d.next) : Json(nullptr)},
-          {"untestable", d.untestable},
-          {"validation", d.validation ? to_json(*d.validation) : Json(nullptr)},
-          {"locations", locations},
-          {"sets", sets}};
+  Json json = {{"schema", kDiagnosisSchema},
+               {"flights", d.flights},
+               {"reference", d.reference},
+               {"warnings", d.warnings},
+               {"data_faults", faults},
+               {"complete", d.complete},
+               {"verdict",
+                {{"kind", name_of(d.verdict.kind)},
+                 {"effects", d.verdict.effects},
+                 {"remainder", d.verdict.remainder},
+                 {"probability", d.verdict.probability}}},
+               {"hypotheses", hypotheses},
+               {"suspects", suspects},
+               {"unexplained", {{"jointly_with", d.jointly_with}, {"terms", terms}}},
+               {"other_law", d.other_law ? to_json(*d.other_law) : Json(nullptr)},
+               {"background", to_json(d.background)},
+               {"sensors", to_json(d.sensors)},
+               {"moved_parameters", moved},
+               {"gap",
+                {{"nominal", optional(d.nominal_loss)},
+                 {"refit", optional(d.refit_loss)},
+                 {"effect", optional(d.effect_loss)},
+                 {"noise_floor", d.noise_floor},
+                 {"closure", to_json(d.closure)}}},
+               {"closed_loop", closed_loop},
+               {"next_experiment", d.next ? to_json(*d.next) : Json(nullptr)},
+               {"untestable", d.untestable},
+               {"validation", d.validation ? to_json(*d.validation) : Json(nullptr)},
+               {"locations", locations},
+               {"sets", sets}};
+  if (!d.seen.empty()) json["seen"] = seen, json["odd_flights"] = odd;
+  return json;
 }
 
 void write_diagnosis(const std::filesystem::path& folder, const Diagnosis& diagnosis) {

@@ -32,10 +32,11 @@ std::string hypothesis_words(const RankedHypothesis& hypothesis, Spoken spoken);
 std::string hypothesis_words(const std::string& name, Spoken spoken);
 /// "if an effect is missing, then most probably wind 0.40 (closes 30 %) or tether 0.20".
 std::string suspects_words(const std::vector<Suspect>& suspects, Spoken spoken);
-/// What changed most, whatever the cause: quantities that differ by more than kTold times what sessions differ by, the
-/// largest first: "thrust of rotor_3 -9.4 %, 6.1 times what sessions differ by". One line each.
-std::vector<std::string> seen_words(const std::vector<SeenQuantity>& seen, Spoken spoken);
+/// A quantity is told beyond so many times what sessions differ by. Choice: of twenty quantities one goes so far by chance.
 inline constexpr double kTold = 2;
+/// What changed most, whatever the cause, one line each, the largest first: "thrust of rotor_3 -9.4 %, 6.1 times what
+/// sessions differ by".
+std::vector<std::string> seen_words(const std::vector<SeenQuantity>& seen, Spoken spoken);
 /// A value of a quantity in the unit that people use: shares in %, metres in mm, seconds in ms.
 std::string seen_value(const SeenQuantity& quantity, double value, bool sign);
 /// "flight b differs from the others of its set, most in thrust (8.1 times)"; "flight b changes 12.3 s after its begin

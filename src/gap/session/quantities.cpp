@@ -13,10 +13,11 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Lines of a weight whose pull is looked for. A line between two of these shows in both. Choices.
+/// Lines of a weight whose pull is looked for. Choice: a line between two of these shows in both.
 constexpr double kLengths_m[] = {0.15, 0.25, 0.4, 0.63, 1.0};
-/// Mass of that weight, as a share of the robot's: its pull is in proportion to it. A choice.
+/// Mass of that weight, as a share of the robot's, to which its pull is in proportion. Choice.
 constexpr double kLoad = 0.01;
+/// Step of the delay, for its derivative. Choice.
 constexpr double kLagStep_s = 5e-3;
 
 std::size_t row_of(std::size_t beat, int channel) {
@@ -110,17 +111,22 @@ std::vector<Rows> predicted_by(const PredictedFlight& flight, const std::vector<
 
 }  // namespace
 
+/// Moments are shown over the weight. Source: standard gravity.
+constexpr double kGravity_m_s2 = 9.81;
+
 static double weight_over_inertia(const VehicleHypothesis& robot, int axis) {
-  constexpr double kGravity_m_s2 = 9.81;  // only a unit: moments are shown over it
   const model::InertiaTensor& i = robot.vehicle.torso.inertia_kg_m2;
   const double inertia[] = {i.xx, i.yy, i.zz};
   return robot.vehicle.torso.mass_kg * kGravity_m_s2 / inertia[axis];
 }
 
+/// Standard deviation between flights of the thrust, as a share. Choice.
+constexpr double kOwnThrust = 0.01;
+/// Standard deviation of an instant, with what the model gets wrong. Choice.
+constexpr double kNoise_m_s2 = 0.3;
+
 /// Each flight has a thrust of its own, so that what is common to all is found within and between flights.
 CommonTrend common_trend(const FlightList& references, const VehicleHypothesis& robot) {
-  constexpr double kOwnThrust = 0.01;  ///< standard deviation between flights. A choice
-  constexpr double kNoise_m_s2 = 0.3;  ///< of an instant, with what the model gets wrong. A choice
   CommonTrend trend;
   double beats = 0;
   std::vector<std::map<std::string, VectorXd>> functions;
@@ -188,9 +194,11 @@ struct FlightQuantities::Regression {
   }
 };
 
+/// Variance of what a flight does not show. Choice: far more than that of anything seen.
+constexpr double kUnseen = 1e6;
+
 /// Quantities that the flight does not show.
 void FlightQuantities::add_unseen(const Regression& r) {
-  constexpr double kUnseen = 1e6;
   for (const SessionQuantity& q : r.quantities) {
     if (q.name.empty()) continue;
     quantities_.push_back(q);
@@ -307,7 +315,7 @@ FlightQuantities::FlightQuantities(const PredictedFlight& flight, const VehicleH
       s.add((in(predicted[3 + l]) - in(predicted[0])) / kLoad, 0.15,
             {io::format("swing of %.2g m", kLengths_m[l]), "share", "swing"});
       // a weight that swings from the start on
-      const double w = std::sqrt(9.81 / kLengths_m[l]);
+      const double w = std::sqrt(kGravity_m_s2 / kLengths_m[l]);
       for (const char* axis : {"north", "west"})
         for (const bool cosine : {true, false}) {
           const auto phase = [&](const std::vector<std::size_t>& list) {
