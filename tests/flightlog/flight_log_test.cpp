@@ -131,6 +131,7 @@ flightlog::FlightLog log_of_inputs() {
 
 TEST(FlightLog, OfDeclaredInputsReadsBackExactly) {
   flightlog::FlightLog log = log_of_inputs();
+  log.header.session = "battery 2";
   EXPECT_EQ(flightlog::parse_flight_log(flight_log_files(log), "log"), log);
   EXPECT_EQ(flight_log_files(log).at("command.csv").substr(0, 31), "t_s,left_flap,pitch_servo,lamp2");
   log.header.imu = {};
@@ -271,7 +272,7 @@ TEST(FlightLog, RefusesFaultyHeaders) {
       header("gravity_m_s2", "gravity"),
       "log/flight.toml:5:1: gravity: unknown key; accepted: ambient, attitude, changes, command, flapping_Hz, flown, "
       "gravity_m_s2, imu, "
-      "mocap, policy, power, schema, vehicle, vehicle_sha256, wings");
+      "mocap, policy, power, schema, session, vehicle, vehicle_sha256, wings");
   EXPECT_EQ(header("gravity_m_s2 = 9.8", "# "),
             "log/flight.toml: gravity_m_s2: is missing; accepted: a number from 0 to 100");
   EXPECT_EQ(header("flapping_Hz = 34.0", "flapping_Hz = -34.0"),

@@ -265,8 +265,7 @@ void conclude_by_sessions(Inference& d) {
   for (std::size_t i = 0; i < all.size() && sets.size() < kMaxSets && together < kMoreThanNot; ++i)
     if (all[i].kind == HypothesisKind::effect && all[i].probability > all[unknown].probability / 2)
       sets.push_back(i), together += all[i].probability;
-  if (all[unchanged].probability >= kMoreThanNot ||
-      (together < kMoreThanNot && all[unchanged].probability > all[unknown].probability + together)) {
+  if (all[unchanged].probability >= kMoreThanNot) {
     d.concluded = unchanged;
     d.verdict.kind = VerdictKind::parameters;
     d.verdict.probability = all[unchanged].probability;

@@ -33,11 +33,28 @@ TEST(Mapping, ShippedOnesAreRead) {
   int count = 0;
   for (const auto& entry : fs::directory_iterator(kMappings)) {
     const Mapping m = read_mapping(entry.path());
-    EXPECT_GE(m.streams.size(), 3u) << entry.path();
+    EXPECT_GE(m.streams.size(), 2u) << entry.path();  // commands and poses
     EXPECT_TRUE(fs::exists(kMappings.parent_path() / "vehicles" / m.header.vehicle)) << entry.path();
     ++count;
   }
-  EXPECT_EQ(count, 8);
+  EXPECT_EQ(count, 10);
+}
+
+// Firmwares spell a field in two ways: a list of names, of which a recording has one.
+TEST(Mapping, TakesSeveralNamesOfAField) {
+  const Mapping m = read_mapping(kMappings / "crazyflie_lee.toml");
+  EXPECT_EQ(m.streams.front().columns.front().fields, (FieldNames{"ctrlLee.thrustSI", "ctrlLee.thrustSi"}));
+  EXPECT_TRUE(m.wanted().at("fixedFrequency").contains("ctrlLee.thrustSi"));
+  EXPECT_EQ(edited_of("crazyflie_lee.toml", "[\"ctrlLee.thrustSI\", \"ctrlLee.thrustSi\"]  #", "[]  #"),
+            "m.toml:17:10: command.columns.thrust: is empty; accepted: names of fields");
+}
+
+TEST(Mapping, NamesASessionAndNoPathOfAVehicle) {
+  EXPECT_EQ(read_mapping(kMappings / "csv.toml", {"session=monday"}).header.session, "monday");
+  EXPECT_EQ(
+      edited_of("crazyflie_lee.toml", "\"crazyflie_lee.toml\"", "\"../crazyflie_lee.toml\""),
+      "m.toml:4:11: vehicle: \"../crazyflie_lee.toml\" is no file name; accepted: the name of the vehicle's file, "
+      "without folder");
 }
 
 TEST(Mapping, WantsTheFieldsOfItsColumns) {

@@ -9,6 +9,7 @@
 #include "gap/diagnose/diagnose.hpp"
 #include "gap/replay/beat_averaged_prediction.hpp"
 #include "io/config.hpp"
+#include "rollout/fly_fixture.hpp"
 #include "vehicles.hpp"
 
 namespace flappy::gap::beat_averaged_contrast_test {
@@ -172,6 +173,43 @@ TEST(BeatAveragedContrast, AWeightAtAMotorIsAChange) {
   for (std::size_t rank = 0; rank < 2; ++rank)
     for (const std::string& effect : effects[rank])
       EXPECT_TRUE(effect == "payload" || effect == "slung_load" || effect == "actuator_loss") << effect;
+}
+
+// A flight that is too short, or whose data have a fault, is left out and named; flights of one session count once.
+TEST(BeatAveragedContrast, LeavesOutDoubtfulFlights) {
+  const flight::Folder folder;
+  DiagnosisSettings settings;
+  settings.vehicle = test::source_path("configs/vehicles/crazyflie_sd.toml");
+  const auto write = [&](const std::string& name, flightlog::FlightLog log) {
+    for (flightlog::Column& c : log.command.declared)
+      for (double& v : c) v = std::min(v, 1.0);
+    log.header.ambient.ground_z_m = 0;
+    flightlog::write_flight_log(folder / name, log);
+    return (folder / name).string();
+  };
+  flightlog::FlightLog brief = fly({}, 5), frozen = fly({}, 6);
+  const auto cut = [](flightlog::Column& c) { c.resize(250); };
+  flightlog::MocapStream& m = brief.mocap;
+  for (flightlog::Column* c : {&m.t_s, &m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz}) cut(*c);
+  cut(brief.command.t_s);
+  for (flightlog::Column& c : brief.command.declared) cut(c);
+  for (double& t : frozen.mocap.t_s) t *= 3;
+  settings.reference = {write("a", fly({}, 1)), write("b", fly({}, 2)), write("brief", brief)};
+  settings.flights = {write("c", fly({}, 3)), write("frozen", frozen)};
+  const Diagnosis d = diagnose(read_request(settings), nullptr).result;
+  ASSERT_EQ(d.verdict.kind, VerdictKind::parameters);
+  const auto warned = [&](const std::string& of) {
+    return std::ranges::count_if(d.warnings, [&](const std::string& w) {
+      return w.starts_with("left out: ") && w.find(of) != std::string::npos;
+    });
+  };
+  EXPECT_EQ(warned("/brief"), 1);
+  EXPECT_EQ(warned("/frozen"), 1);
+  EXPECT_EQ(warned(""), 2);
+  EXPECT_EQ(d.reference.size(), 2U);
+  EXPECT_EQ(d.flights.size(), 1U);
+  settings.flights = {settings.flights.back()};  // none is left
+  EXPECT_EQ(diagnose(read_request(settings), nullptr).result.verdict.kind, VerdictKind::data);
 }
 
 }  // namespace
