@@ -125,8 +125,8 @@ BeatAveragedMotion beat_averaged_motion(const FlightLog& log, double bandwidth_H
                          " is too slow to see motion up to the vehicle's beat.bandwidth_Hz; accepted: " +
                          io::shortest_digits(4 * bandwidth_Hz) + " or more");
   if (poses.size() < 2 || poses.back().t_s - poses.front().t_s < 3 * kEnds * period_s)
-    throw io::InputError((folder / "mocap.csv").string() + ": is too short for means over beats; accepted: " +
-                         io::shortest_digits(3 * kEnds * period_s) + " s or more of motion capture");
+    throw TooLittleSeen((folder / "mocap.csv").string() + ": is too short for means over beats; accepted: " +
+                        io::shortest_digits(3 * kEnds * period_s) + " s or more of motion capture");
   m.begin_s = poses.front().t_s;
   const auto n = static_cast<std::size_t>((poses.back().t_s - m.begin_s) / m.step_s) + 1;
   std::vector<Vector3d> position(n);

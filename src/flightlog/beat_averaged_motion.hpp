@@ -33,7 +33,12 @@ struct BeatAveragedMotion {
   double t_s(std::size_t i) const { return begin_s + step_s * static_cast<double>(i); }
 };
 
-/// io::InputError, naming `folder`, for mocap slower than four times the bandwidth and for too short a flight.
+/// A flight too short, or too little of it seen, to be compared.
+struct TooLittleSeen : io::InputError {
+  using io::InputError::InputError;
+};
+
+/// io::InputError, naming `folder`, for mocap slower than four times the bandwidth; TooLittleSeen for too short a flight.
 BeatAveragedMotion beat_averaged_motion(const FlightLog& log, double bandwidth_Hz, const std::filesystem::path& folder);
 
 }  // namespace flappy::flightlog

@@ -191,14 +191,14 @@ FlightList predictions_of(const DiagnosisRequest& request, CheckedLogs& set) {
   FlightList list;
   std::vector<std::string> folders;
   std::vector<flightlog::FlightHeader> headers;
-  std::vector<TooLittleSeen> refused;
+  std::vector<flightlog::TooLittleSeen> refused;
   std::size_t instants = 0;
   for (std::size_t i = 0; i < set.logs.size(); ++i) try {
       list.push_back(prediction_of(request.vehicle, set.folders[i], std::move(set.logs[i]), request.channels));
       instants += list.back()->beats();
       folders.push_back(std::move(set.folders[i]));
       headers.push_back(std::move(set.headers[i]));
-    } catch (const TooLittleSeen& e) {
+    } catch (const flightlog::TooLittleSeen& e) {
       refused.push_back(e);
     }
   set.logs.clear();
@@ -206,7 +206,7 @@ FlightList predictions_of(const DiagnosisRequest& request, CheckedLogs& set) {
   if (!list.empty() && list.front()->is_averaged() && instants < kMinInstants)
     throw io::InputError(folders.front() + ": all flights together have " + std::to_string(instants) +
                          " instants; accepted: " + std::to_string(kMinInstants) + " or more");
-  for (const TooLittleSeen& e : refused) set.left_out.emplace_back(e.what());
+  for (const flightlog::TooLittleSeen& e : refused) set.left_out.emplace_back(e.what());
   set.folders = std::move(folders);
   set.headers = std::move(headers);
   return list;

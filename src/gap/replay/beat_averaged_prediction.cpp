@@ -131,9 +131,9 @@ BeatAveragedPrediction::BeatAveragedPrediction(const std::filesystem::path& fold
   std::size_t seen = 0;
   for (std::size_t i = stride_ / 2; i < motion_.size(); i += stride_) rows_.push_back(i), seen += motion_.seen[i] != 0;
   if (seen < kMinRows)
-    throw TooLittleSeen(folder.string() + ": only " + std::to_string(seen) +
-                        " instants are in the air and seen; accepted: " + std::to_string(kMinRows) +
-                        " or more, higher than " + io::shortest_digits(least_z_m) + " m");
+    throw flightlog::TooLittleSeen(folder.string() + ": only " + std::to_string(seen) +
+                                   " instants are in the air and seen; accepted: " + std::to_string(kMinRows) +
+                                   " or more, higher than " + io::shortest_digits(least_z_m) + " m");
   for (const std::vector<double> smooth = flightlog::low_pass(battery_, b.bandwidth_Hz * motion_.step_s);
        const std::size_t i : rows_)
     battery_rows_.push_back(smooth[i]);

@@ -22,10 +22,6 @@
 
 namespace flappy::gap {
 
-/// A flight too short, or too little of it seen, to be compared.
-struct TooLittleSeen : io::InputError {
-  using io::InputError::InputError;
-};
 /// Least number of instants of all flights of a robot together. Choice.
 inline constexpr std::size_t kMinInstants = 30;
 
