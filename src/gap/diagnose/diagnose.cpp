@@ -42,6 +42,25 @@ std::vector<int> read_channels(const std::vector<std::string>& names, bool beat_
   return list;
 }
 
+/// The flights of each folder of a session in its place, by their names.
+std::vector<std::string> flights_of(const std::vector<std::string>& given,
+                                    std::map<std::string, std::string>& sessions) {
+  std::vector<std::string> flights;
+  std::error_code error;
+  const auto is_log = [&](const fs::path& folder) { return fs::exists(folder / "flight.toml", error); };
+  for (const std::string& folder : given) {
+    std::vector<std::string> own;
+    if (!is_log(folder))
+      for (const auto& entry : fs::directory_iterator(folder, error))
+        if (is_log(entry.path())) own.push_back(entry.path().string());
+    std::ranges::sort(own);
+    for (const std::string& flight : own) sessions[flight] = folder;
+    if (own.empty()) own = {folder};
+    flights.insert(flights.end(), own.begin(), own.end());
+  }
+  return flights;
+}
+
 rollout::FlyConfig read_pilot(const std::string& manoeuvre) {
   rollout::FlyConfig pilot =
       rollout::read_fly_config(manoeuvre.empty() ? fs::path(io::config_path("fly/hover.toml")) : fs::path(manoeuvre));
@@ -76,6 +95,9 @@ std::vector<NamedFlights> sets_of(const std::vector<std::string>& reference) {
 DiagnosisRequest read_request(const DiagnosisSettings& settings) {
   DiagnosisSettings s = settings;
   std::vector<NamedFlights> sets = sets_of(settings.reference);
+  std::map<std::string, std::string> sessions;
+  for (NamedFlights& set : sets) set.flights = flights_of(set.flights, sessions);
+  s.flights = flights_of(s.flights, sessions);
   std::vector<std::string> all;
   for (const NamedFlights& set : sets) all.insert(all.end(), set.flights.begin(), set.flights.end());
   all.insert(all.end(), s.flights.begin(), s.flights.end());
@@ -119,6 +141,7 @@ DiagnosisRequest read_request(const DiagnosisSettings& settings) {
     options.discrepancy.session = read_session_variation(file(s.sessions, "session_variation.toml"));
   return {s,
           std::move(sets),
+          std::move(sessions),
           std::move(vehicle),
           std::move(uncertain),
           std::move(options),
@@ -170,6 +193,9 @@ std::vector<CheckedLogs> read_sets(const DiagnosisRequest& request) {
     for (const std::string& folder : set.folders) {
       folders.push_back(folder);
       logs.push_back(flightlog::read_flight_log(folder));
+      const auto session = request.sessions.find(folder);
+      if (session != request.sessions.end() && logs.back().header.session.empty())
+        logs.back().header.session = session->second;
     }
   if (!request.settings.reference.empty()) check_same_streams(logs, folders);
   const std::vector<flightlog::CheckReport> reports = flightlog::check_flights(logs);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,7 +16,7 @@ namespace flappy::gap {
 
 struct DiagnosisSettings {
   std::string vehicle;               ///< the vehicle file
-  std::vector<std::string> flights;  ///< folders of logs
+  std::vector<std::string> flights;  ///< folders of logs, or of a session: a folder with such folders
   /// Folders of logs of the same robot from before the change that the flights are asked about; empty: no contrast.
   /// NAME=LOG begins a named set, to which the logs after it belong. The unnamed or first set is the reference; every
   /// other set is asked about as the flights are.
@@ -45,6 +46,8 @@ std::vector<NamedFlights> sets_of(const std::vector<std::string>& reference);
 struct DiagnosisRequest {
   DiagnosisSettings settings;        ///< `reference` without other sets and names
   std::vector<NamedFlights> others;  ///< the other sets of `reference`
+  /// By the folder of a log: the folder of a session in which it was given.
+  std::map<std::string, std::string> sessions;
   model::Vehicle vehicle;
   sim::Randomisation uncertain;
   InferenceOptions options;

@@ -208,7 +208,16 @@ TEST(BeatAveragedContrast, LeavesOutDoubtfulFlights) {
   EXPECT_EQ(warned(""), 2);
   EXPECT_EQ(d.reference.size(), 2U);
   EXPECT_EQ(d.flights.size(), 1U);
-  settings.flights = {settings.flights.back()};  // none is left
+  // by a folder of a session
+  settings.flights = {write("c2", fly({}, 7))};
+  std::filesystem::create_directory(folder / "monday");
+  for (const char* name : {"a", "b"}) std::filesystem::rename(folder / name, folder / "monday" / name);
+  settings.reference = {(folder / "monday").string()};
+  const DiagnosisRequest request = read_request(settings);
+  EXPECT_EQ(request.settings.reference.size(), 2U);
+  EXPECT_EQ(request.sessions.at((folder / "monday" / "a").string()), (folder / "monday").string());
+  EXPECT_EQ(diagnose(request, nullptr).result.verdict.kind, VerdictKind::parameters);
+  settings.flights = {(folder / "frozen").string()};  // none is left
   EXPECT_EQ(diagnose(read_request(settings), nullptr).result.verdict.kind, VerdictKind::data);
 }
 
