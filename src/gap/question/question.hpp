@@ -2,8 +2,9 @@
 //   alone          what is missing in the model of a vehicle with wings (alone.cpp)
 //   contrast       what changed between reference flights and test flights (contrast.cpp)
 //   beat-averaged  what is missing in the model of a vehicle of which only means over beats are predicted
-//                  (beat_averaged.cpp)
-// All else is the same for every question.
+//                  (beat_averaged_question.cpp)
+// All else is the same for every question, but for a contrast of a beat-averaged vehicle, which is answered by the
+// robot's own sessions alone (by_sessions(), session_contrast.cpp).
 #pragma once
 
 #include <optional>
@@ -45,7 +46,7 @@ class Question : public FitRules {
   /// Refutes hypotheses, and takes from others the evidence that is none. `fitter`: with the scales of the parameters.
   virtual void refute(const RobotFit& robot, const Fitter& fitter, const Flights& flights, const VerdictRule& rule,
                       Inference& d) const = 0;
-  /// Hypotheses of one pool count together (verdict.hpp).
+  /// Hypotheses of one pool count together (gap/answer/verdict.hpp).
   virtual std::string pool(const ScoredHypothesis& hypothesis) const = 0;
   /// Chooses whose fit predicts for the conclusion.
   virtual void choose_predicting(Inference& d) const = 0;

@@ -173,7 +173,10 @@ class Weighing {
     std::vector<ScoredHypothesis> list = {
         scored(HypothesisKind::parameters, tests_.density().log_density(none, none), prior.unchanged),
         scored(HypothesisKind::unknown, log_density_of_unknown(tests_.density(), quantities, prior), prior.unknown)};
-    if (effects_.empty()) return list;
+    if (effects_.empty()) {
+      set_probabilities(list);
+      return list;
+    }
     const double each = prior.effect / static_cast<double>(effects_.size());
     std::vector<EffectFit> singles(effects_.size());
     io::parallel_for(singles.size(), options_.threads, [&](std::size_t i) {

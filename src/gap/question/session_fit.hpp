@@ -16,7 +16,7 @@ class TestSession {
   TestSession(const FlightList& tests, const std::vector<FlightQuantities>& quantities, const SessionDensity& density,
               const SessionPrior& prior, const VehicleHypothesis& robot);
   const SessionDensity& density() const { return density_; }
-  /// [quantity] Variance of the inputs' noise where something shakes.
+  /// [quantity] Variance that is added to the noise of the inputs if a damaged actuator shakes.
   const Eigen::VectorXd& noise_variance() const { return noise_variance_; }
   /// [vehicle][quantity] What vehicles would have shown less what the robot of the references would.
   std::vector<Eigen::VectorXd> shifts(const std::vector<VehicleHypothesis>& vehicles) const;
@@ -39,7 +39,7 @@ struct EffectFit {
 
 /// The evidence of all ways in which the effects of `h` may act, which are equally probable, and the most probable one.
 /// `robot`: coordinates of the references' parameters. `first`: a fit of the effects before the last; null: there are
-/// none. An actuator that lost some of its loads may shake, or not.
+/// none. An actuator that lost a part of its thrust may shake, or not.
 EffectFit fit_each_way(const TestSession& tests, const Hypothesis& h, const Eigen::VectorXd& robot,
                        const EffectFit* first);
 /// Whether an effect of the size that its prior allows changes what the flights show.

@@ -32,7 +32,8 @@ struct RankedHypothesis {
   std::vector<std::string> effects;
   std::string group;       ///< groups of the effects, joined by +; for another kind, its name
   bool remainder = false;  ///< something unknown is missing in addition to the effects
-  /// log_evidence (nats) includes log_prior; the probability tempers the evidence (gap/answer/verdict.hpp).
+  /// log_evidence (nats) includes log_prior; the probability tempers the evidence (gap/answer/verdict.hpp),
+  /// but not in a contrast by sessions.
   double probability = 0, log_evidence = 0, log_prior = 0;
   std::vector<Estimate> parameters;  ///< effect by effect: its magnitudes, then its shape parameters
   std::optional<double> loss;        ///< mean loss in held-out flights; none: it was not fitted by simulation

@@ -105,8 +105,8 @@ std::vector<std::string> seen_words(const std::vector<SeenQuantity>& seen, Spoke
 
 std::string odd_words(const OddFlight& odd, Spoken spoken) {
   if (odd.since_s)
-    return io::format("%s changes %.1f s after its begin, in %s (%.0f times its noise)", odd.flight.c_str(),
-                      *odd.since_s, spoken(odd.quantity).c_str(), odd.times);
+    return io::format("%s changes %.1f s after its begin, in %s by %.2g (%.0f times its noise)", odd.flight.c_str(),
+                      *odd.since_s, spoken(odd.quantity).c_str(), odd.step.value_or(0), odd.times);
   return io::format("%s differs from the others of its set, most in %s (%.1f times what sessions differ by)",
                     odd.flight.c_str(), spoken(odd.quantity).c_str(), std::abs(odd.times));
 }

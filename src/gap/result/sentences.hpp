@@ -39,8 +39,8 @@ inline constexpr double kTold = 2;
 std::vector<std::string> seen_words(const std::vector<SeenQuantity>& seen, Spoken spoken);
 /// A value of a quantity in the unit that people use: shares in %, metres in mm, seconds in ms.
 std::string seen_value(const SeenQuantity& quantity, double value, bool sign);
-/// "flight b differs from the others of its set, most in thrust (8.1 times)"; "flight b changes 12.3 s after its begin
-/// by -9.4 % of thrust (14 times)".
+/// "flight b differs from the others of its set, most in thrust (8.1 times what sessions differ by)"; "flight b changes
+/// 12.3 s after its begin, in thrust by -0.094 (14 times its noise)".
 std::string odd_words(const OddFlight& odd, Spoken spoken);
 /// "mean of the beat", "harmonic 2 of the beat".
 std::string harmonic_words(int harmonic);

@@ -4,8 +4,9 @@
 //   force along z      share of the thrust; with the battery, the height, the climb and the speed squared; a delay
 //   forces along x, y  a constant and a drag of each axis; the pull of a weight on a line, for several lengths
 //   moments            where the thrust acts: mean moment over the weight
-//   inputs             the logarithm of how much they shake, which no effect of the catalogue predicts
-// Regressors that a flight does not excite are held at 0 by a prior, as are they in every other flight.
+//   inputs             the logarithm of how much they shake, which no effect of the catalogue predicts; a loss of an
+//                      actuator may come with it (gap/question/session_fit.hpp)
+// A prior draws regressors to 0, the more the less a flight excites them.
 #pragma once
 
 #include "gap/replay/predicted_flight.hpp"

@@ -1,8 +1,9 @@
 // How much the quantities of a robot differ from session to session while nothing is done to it. The yardstick of a
 // contrast is the robot itself: of a quantity with session means x_1 ... x_n,
-//   x_i ~ N(m, s^2 + v_i)    s^2 ~ scaled inverse chi-squared(nu, s_0^2),  v_i: noise of the session's own flights
-//   y   ~ t_(nu + n - 1)(m, s^2 (1 + 1/n) + v)    what another session of the unchanged robot shows
-// s_0 and nu are those of other robots (configs/gap/beat_averaged/sessions.toml) (Gelman et al., Bayesian Data
+//   x_i ~ N(m, s^2)    s^2, noise of the flights included, ~ scaled inverse chi-squared(nu, s_0^2)
+//   y   ~ t_n'(m, s^2 (1 + 1/n) + v)    what another session of the unchanged robot shows
+//   n' = nu + n - 1, at most most_freedom; v: by how much the variance of y by noise exceeds the references', at least 0
+// s_0 and nu are those of other robots (configs/gap/beat_averaged/session_scatter.toml) (Gelman et al., Bayesian Data
 // Analysis, 3rd ed., ch. 3.2 and 5.4).
 #pragma once
 
