@@ -157,7 +157,7 @@ struct CheckedLogs {
   std::vector<std::string> folders;
   std::vector<flightlog::FlightLog> logs;
   std::vector<flightlog::FlightHeader> headers;
-  std::vector<flightlog::DataFault> faults;  ///< of flights that could not be left out, as no other remains
+  std::vector<flightlog::DataFault> faults;  ///< of all flights of the set, if each has some
   std::vector<std::string> left_out;         ///< why each doubtful flight is left out, one line each
 };
 
@@ -245,6 +245,11 @@ struct Reference {
   std::unique_ptr<const ReferenceFit> fit;
 };
 
+void warn_of_left_out(std::initializer_list<const CheckedLogs*> sets, Diagnosis& result) {
+  for (const CheckedLogs* set : sets)
+    for (const std::string& why : set->left_out) result.warnings.push_back("left out: " + why);
+}
+
 Diagnosed diagnose_set(const DiagnosisRequest& request, CheckedLogs& tests, Reference& reference,
                        const std::function<bool(double share, const std::string& what)>& progress) {
   std::vector<flightlog::DataFault> faults = reference.read.faults;
@@ -253,8 +258,7 @@ Diagnosed diagnose_set(const DiagnosisRequest& request, CheckedLogs& tests, Refe
   if (!faults.empty()) {
     d.result = result_of(tests.folders, std::move(faults));
     d.result.reference = request.settings.reference;
-    for (CheckedLogs* const set : {&reference.read, &tests})
-      for (const std::string& why : set->left_out) d.result.warnings.push_back("left out: " + why);
+    warn_of_left_out({&reference.read, &tests}, d.result);
     return d;
   }
   if (reference.flights.empty()) reference.flights = predictions_of(request, reference.read);
@@ -275,8 +279,7 @@ Diagnosed diagnose_set(const DiagnosisRequest& request, CheckedLogs& tests, Refe
     headers.insert(headers.end(), tests.headers.begin(), tests.headers.end());
     d.result.warnings = contrast_warnings(headers, d.flights);
   }
-  for (CheckedLogs* const set : {&reference.read, &tests})
-    for (const std::string& why : set->left_out) d.result.warnings.push_back("left out: " + why);
+  warn_of_left_out({&reference.read, &tests}, d.result);
   if (d.inference.complete) d.corrected = corrected_vehicle(request.vehicle, d.inference, request.uncertain);
   return d;
 }

@@ -106,7 +106,7 @@ std::string sensor_line(const Estimate& s) {
   return told("the IMU sits", 1e3, "mm", "along " + way + axis);
 }
 
-/// What is seen comes first, whatever the verdict.
+/// Lines of what the flights show, which stand before the verdict.
 std::vector<std::string> seen_lines(const Diagnosis& diagnosis) {
   std::vector<std::string> lines;
   if (diagnosis.seen.empty()) return lines;

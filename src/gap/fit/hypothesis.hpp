@@ -29,6 +29,8 @@ struct Unknown {
   double low = -1e30, high = 1e30;  ///< bounds of the value
   bool magnitude = false;           ///< the effect vanishes where all of its magnitudes are 0
   bool in_log = false;              ///< it changes the log, not the simulation (gap/replay/sensor_correction.hpp)
+  /// Whether the prior is half-normal: a magnitude that cannot be negative.
+  bool one_sided() const { return magnitude && low >= 0; }
   double value(double coordinate) const;
   double coordinate(double of_value) const { return (of_value - centre) / scale; }
 };

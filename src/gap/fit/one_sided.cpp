@@ -32,7 +32,7 @@ OneSided one_sided(const Hypothesis& hypothesis, VectorXd mean, Eigen::MatrixXd 
   std::vector<Index> open;
   for (Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
     const Unknown& u = hypothesis.unknowns()[static_cast<std::size_t>(i)];
-    if (u.magnitude && u.low >= 0) open.push_back(i);
+    if (u.one_sided()) open.push_back(i);
   }
   double log_factor = 0;
   while (!open.empty()) {

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "gap/fit/one_sided.hpp"
 
 namespace flappy::gap {
 
@@ -46,13 +47,6 @@ constexpr int kMaxNewtonSteps = 12;
 /// A step that gains less ends the search. Choice.
 constexpr double kMinStepGain_nats = 1e-3;
 
-double log_normal_integral(double x) {  // log Phi(x)
-  return x > -5 ? std::log(0.5 * std::erfc(-x / std::numbers::sqrt2))
-                : -0.5 * x * x - std::log(-x * std::sqrt(2 * std::numbers::pi)) - 1 / (x * x);
-}
-
-bool one_sided(const Unknown& u) { return u.magnitude && u.low >= u.centre; }
-
 /// Most probable coordinates among `free`, and the evidence.
 EffectFit fit_effects(const TestSession& tests, const Hypothesis& h, VectorXd at, const std::vector<Index>& free,
                       const VectorXd& more) {
@@ -93,8 +87,11 @@ EffectFit fit_effects(const TestSession& tests, const Hypothesis& h, VectorXd at
     hessian = j.transpose() * precision.asDiagonal() * j + MatrixXd::Identity(n, n);
     gradient = j.transpose() * precision.cwiseProduct(density.difference() - shift) - z;
   };
+  const auto unknown_of = [&](Index i) -> const Unknown& {
+    return h.unknowns()[static_cast<std::size_t>(free[static_cast<std::size_t>(i)])];
+  };
   const auto at_bound = [&](Index i) {
-    const Unknown& u = h.unknowns()[static_cast<std::size_t>(free[static_cast<std::size_t>(i)])];
+    const Unknown& u = unknown_of(i);
     const double value_here = u.value(z[i]);
     return (value_here <= u.low && gradient[i] < 0) || (value_here >= u.high && gradient[i] > 0);
   };
@@ -127,24 +124,25 @@ EffectFit fit_effects(const TestSession& tests, const Hypothesis& h, VectorXd at
   find_open();
   EffectFit fit{coordinates(z), MatrixXd::Zero(h.size(), h.size()), now, free};
   MatrixXd inverse;
-  if (!open.empty()) inverse = MatrixXd(hessian(open, open)).inverse();
-  if (!open.empty()) fit.explained -= 0.5 * std::log(MatrixXd(hessian(open, open)).determinant());
+  if (!open.empty()) {
+    const MatrixXd own = hessian(open, open);
+    inverse = own.inverse();
+    fit.explained -= 0.5 * std::log(own.determinant());
+  }
   for (std::size_t a = 0; a < open.size(); ++a) {
     const auto ia = static_cast<Index>(a);
     for (std::size_t b = 0; b < open.size(); ++b)
       fit.covariance(free[static_cast<std::size_t>(open[a])], free[static_cast<std::size_t>(open[b])]) =
           inverse(ia, static_cast<Index>(b));
-    const Unknown& u = h.unknowns()[static_cast<std::size_t>(free[static_cast<std::size_t>(open[a])])];
-    if (one_sided(u))
-      fit.explained +=
-          std::log(2.0) + log_normal_integral((z[open[a]] - u.coordinate(u.low)) / std::sqrt(inverse(ia, ia)));
+    const Unknown& u = unknown_of(open[a]);
+    if (u.one_sided())
+      fit.explained += log_twice_positive(z[open[a]] - u.coordinate(u.low), std::sqrt(inverse(ia, ia)));
   }
   for (Index i = 0; i < n; ++i) {
     if (std::ranges::count(open, i)) continue;
-    const Unknown& u = h.unknowns()[static_cast<std::size_t>(free[static_cast<std::size_t>(i)])];
     const double precision = hessian(i, i), slope = -std::abs(gradient[i]) / std::sqrt(precision);
-    fit.explained += (one_sided(u) ? std::log(2.0) : 0) - 0.5 * std::log(precision) + 0.5 * slope * slope +
-                     log_normal_integral(slope);
+    fit.explained += log_twice_positive(slope, 1) - (unknown_of(i).one_sided() ? 0 : std::log(2.0)) -
+                     0.5 * std::log(precision) + 0.5 * slope * slope;
     fit.covariance(free[static_cast<std::size_t>(i)], free[static_cast<std::size_t>(i)]) = 1 / precision;
   }
   return fit;

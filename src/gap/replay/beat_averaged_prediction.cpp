@@ -35,10 +35,6 @@ Eigen::Matrix3d inertia_of(const model::Vehicle& v) {
   return inertia;
 }
 
-std::size_t row(std::size_t beat, int channel) {
-  return beat * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients;
-}
-
 /// A column on the grid of the motion, `late_s` later, interpolated linearly.
 std::vector<double> on_grid(const flightlog::Column& t_s, const flightlog::Column& x, double late_s,
                             const flightlog::BeatAveragedMotion& m) {
@@ -142,7 +138,7 @@ BeatAveragedPrediction::BeatAveragedPrediction(const std::filesystem::path& fold
   if (!b.trims) return;
   const std::vector<Vector3d> single = turned_by_single_loads();
   for (std::size_t j = 0; j < rows_.size(); ++j)
-    for (int k = 0; k < 3; ++k) signal_[row(j, kAngularAccelerationX + k)] = single[j][k];
+    for (int k = 0; k < 3; ++k) signal_[row_of_mean(j, kAngularAccelerationX + k)] = single[j][k];
   take_means(signal_);
 }
 
@@ -163,13 +159,13 @@ void BeatAveragedPrediction::find_trims() {
 void BeatAveragedPrediction::take_means(Rows& rows) const {
   const Rows own = rows;
   for (std::size_t j = 0; j < rows_.size(); ++j)
-    for (int k = 0; k < 3; ++k) rows[row(j, kAngularAccelerationX + k)] = 0;
+    for (int k = 0; k < 3; ++k) rows[row_of_mean(j, kAngularAccelerationX + k)] = 0;
   for (const Trim& t : trims_) {
     double n = 0;
     for (std::size_t j = t.first; j < t.end; ++j) n += motion_.seen[rows_[j]] != 0;
     for (std::size_t j = t.first; j < t.end; ++j)
       for (int k = 0; k < 3 && motion_.seen[rows_[j]]; ++k)
-        rows[row(t.row, kAngularAccelerationX + k)] += own[row(j, kAngularAccelerationX + k)] / n;
+        rows[row_of_mean(t.row, kAngularAccelerationX + k)] += own[row_of_mean(j, kAngularAccelerationX + k)] / n;
   }
 }
 
@@ -203,8 +199,8 @@ Rows BeatAveragedPrediction::rows_of(const flightlog::BeatAveragedMotion& motion
   Rows rows(rows_.size() * kRowsPerBeat, 0);
   for (std::size_t j = 0; j < rows_.size(); ++j)
     for (int k = 0; k < 3; ++k) {
-      rows[row(j, kSpecificForceX + k)] = motion.force_m_s2[rows_[j]][k];
-      rows[row(j, kAngularAccelerationX + k)] = motion.turning_rad_s2[rows_[j]][k];
+      rows[row_of_mean(j, kSpecificForceX + k)] = motion.force_m_s2[rows_[j]][k];
+      rows[row_of_mean(j, kAngularAccelerationX + k)] = motion.turning_rad_s2[rows_[j]][k];
     }
   if (nominal_.beat_averaged->trims) take_means(rows);
   return rows;
@@ -363,12 +359,12 @@ Rows BeatAveragedPrediction::predict(const VehicleHypothesis& hypothesis) const 
       if (a.effect->averaged.seen != nullptr && log_.header.mocap.source == flightlog::PoseSource::motion_capture)
         a.effect->averaged.seen(a.values.data(), s, force);
     const Vector3d f = eigen(force), w = motion_.rate_rad_s[at];
-    for (int k = 0; k < 3; ++k) rows[row(j, kSpecificForceX + k)] = f[k];
+    for (int k = 0; k < 3; ++k) rows[row_of_mean(j, kSpecificForceX + k)] = f[k];
     Vector3d turning = per_inertia * (eigen(load.moment_Nm) - w.cross(inertia * w));
     // a trim is where the thrust acts: relative to the thrust, so that no fit makes the moments small to explain their
     // scatter
     if (b.trims) turning = nominal_turning * (eigen(load.moment_Nm) / std::max(load.force_N.z, kMinThrust * nominal_N));
-    for (int k = 0; k < 3; ++k) rows[row(j, kAngularAccelerationX + k)] = turning[k];
+    for (int k = 0; k < 3; ++k) rows[row_of_mean(j, kAngularAccelerationX + k)] = turning[k];
   }
   if (b.trims) take_means(rows);
   return rows;
@@ -394,7 +390,7 @@ Rows BeatAveragedPrediction::declared_noise(std::uint64_t seed) const {
   const flightlog::BeatAveragedMotion noise =
       flightlog::beat_averaged_motion(still, nominal_.beat_averaged->bandwidth_Hz, name_);
   Rows rows = rows_of(noise);
-  for (std::size_t j = 0; j < rows_.size(); ++j) rows[row(j, kSpecificForceZ)] -= log_.header.gravity_m_s2;
+  for (std::size_t j = 0; j < rows_.size(); ++j) rows[row_of_mean(j, kSpecificForceZ)] -= log_.header.gravity_m_s2;
   return rows;
 }
 

@@ -43,6 +43,11 @@ const char* channel_unit(int channel);
 using Rows = std::vector<double>;
 inline constexpr std::size_t kRowsPerBeat = static_cast<std::size_t>(kChannels) * kCoefficients;
 
+/// Index in Rows of the mean of a channel over a beat.
+constexpr std::size_t row_of_mean(std::size_t beat, int channel) {
+  return beat * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients;
+}
+
 /// A vehicle that may have flown a recording, and the errors of its sensors.
 struct VehicleHypothesis {
   model::Vehicle vehicle;

@@ -19,14 +19,12 @@ std::vector<OddFlight> odd_flights(const std::vector<std::string>& names, const 
   std::vector<OddFlight> odd;
   if (flights.size() < 3) return odd;
   for (std::size_t f = 0; f < flights.size(); ++f) {
-    std::vector<FlightQuantities> others;
-    for (std::size_t o = 0; o < flights.size(); ++o)
-      if (o != f) others.push_back(flights[o]);
-    const std::vector<int> one(others.size(), 0);
-    const SessionValues mean = session_values(others, one, prior);
+    std::vector<int> of(flights.size(), 0);  // the others are session 0, the flight is 1
+    of[f] = 1;
+    const SessionValues mean = session_values(flights, of, prior);
     OddFlight most{names[f], "", 0, {}, {}};
     for (Index q = 0; q < scatter.variance().size(); ++q) {
-      const double n = static_cast<double>(others.size());
+      const double n = static_cast<double>(flights.size() - 1);
       const double sd = std::sqrt(scatter.variance()[q] * (1 + 1 / n) +
                                   std::max(flights[f].variances()[q] - scatter.noise()[q], 0.0));
       const double times = (flights[f].values()[q] - mean.values(0, q)) / sd;

@@ -20,10 +20,6 @@ constexpr double kLoad = 0.01;
 /// Step of the delay, for its derivative. Choice.
 constexpr double kLagStep_s = 5e-3;
 
-std::size_t row_of(std::size_t beat, int channel) {
-  return beat * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients;
-}
-
 /// The battery as a line over time: its voltage falls with the current, so that its fast changes follow the thrust.
 void smooth_battery(std::map<std::string, VectorXd>& functions) {
   const auto battery = functions.find("battery");
@@ -57,7 +53,7 @@ VectorXd of(const VectorXd& values, const std::vector<std::size_t>& list) {
 
 VectorXd of(const Rows& rows, const std::vector<std::size_t>& list, int channel) {
   VectorXd v(static_cast<Index>(list.size()));
-  for (Index j = 0; j < v.size(); ++j) v[j] = rows[row_of(list[static_cast<std::size_t>(j)], channel)];
+  for (Index j = 0; j < v.size(); ++j) v[j] = rows[row_of_mean(list[static_cast<std::size_t>(j)], channel)];
   return v;
 }
 
@@ -197,21 +193,21 @@ struct FlightQuantities::Regression {
 /// Variance of what a flight does not show. Choice: far more than that of anything seen.
 constexpr double kUnseen = 1e6;
 
-/// Quantities that the flight does not show.
-void FlightQuantities::add_unseen(const Regression& r) {
-  for (const SessionQuantity& q : r.quantities) {
-    if (q.name.empty()) continue;
-    quantities_.push_back(q);
-    values_.conservativeResize(values_.size() + 1);
-    variances_.conservativeResize(values_.size());
-    values_[values_.size() - 1] = 0;
-    variances_[values_.size() - 1] = kUnseen;
-  }
+void FlightQuantities::keep(const SessionQuantity& quantity, double value, double variance) {
+  quantities_.push_back(quantity);
+  values_.conservativeResize(values_.size() + 1);
+  variances_.conservativeResize(values_.size());
+  values_[values_.size() - 1] = value;
+  variances_[values_.size() - 1] = variance;
 }
 
 void FlightQuantities::add(const Regression& r, const VectorXd& y) {
   const auto n = static_cast<Index>(r.rows.size()), k = static_cast<Index>(r.columns.size());
-  if (n < 1 || (k > 1 && n <= k + 2)) return add_unseen(r);
+  if (n < 1 || (k > 1 && n <= k + 2)) {
+    for (const SessionQuantity& q : r.quantities)
+      if (!q.name.empty()) keep(q, 0, kUnseen);
+    return;
+  }
   MatrixXd x(n, k);
   for (Index i = 0; i < k; ++i) x.col(i) = r.columns[static_cast<std::size_t>(i)];
   const MatrixXd normal = x.transpose() * x;
@@ -235,13 +231,12 @@ void FlightQuantities::add(const Regression& r, const VectorXd& y) {
   for (Index i = 0; i < k; ++i)
     if (!r.quantities[static_cast<std::size_t>(i)].name.empty()) kept.push_back(i);
   w.weights = all(kept, Eigen::all);
-  const Index before = values_.size(), now = before + static_cast<Index>(kept.size());
-  values_.conservativeResize(now);
-  variances_.conservativeResize(now);
-  values_.tail(w.weights.rows()) = w.weights * y;
+  const VectorXd values = w.weights * y;
   // an autoregressive noise has fewer independent samples
-  variances_.tail(w.weights.rows()) = w.weights.rowwise().squaredNorm() * variance * (1 + past) / (1 - past);
-  for (const Index i : kept) quantities_.push_back(r.quantities[static_cast<std::size_t>(i)]);
+  const VectorXd variances = w.weights.rowwise().squaredNorm() * variance * (1 + past) / (1 - past);
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    keep(r.quantities[static_cast<std::size_t>(kept[i])], values[static_cast<Index>(i)],
+         variances[static_cast<Index>(i)]);
   regressions_.push_back(std::move(w));
 }
 
@@ -273,7 +268,7 @@ FlightQuantities::FlightQuantities(const PredictedFlight& flight, const VehicleH
   if (flight.has_rows(kSpecificForceZ, 0)) {
     const AlongZ z = along_z(flight, f, predicted, trend);
     Regression r;
-    for (const std::size_t j : z.beats) r.rows.push_back(row_of(j, kSpecificForceZ));
+    for (const std::size_t j : z.beats) r.rows.push_back(row_of_mean(j, kSpecificForceZ));
     Regression alone = r;
     alone.add(z.thrust, 0, {"thrust", "share", "thrust"});
     add(alone, z.residual - z.slopes * trend.slopes);
@@ -288,8 +283,8 @@ FlightQuantities::FlightQuantities(const PredictedFlight& flight, const VehicleH
   const bool has_x = flight.has_rows(kSpecificForceX, 0), has_y = flight.has_rows(kSpecificForceY, 0);
   if (has_x || has_y) {
     std::vector<std::size_t> both;
-    for (const std::size_t j : x) both.push_back(row_of(j, kSpecificForceX));
-    for (const std::size_t j : y) both.push_back(row_of(j, kSpecificForceY));
+    for (const std::size_t j : x) both.push_back(row_of_mean(j, kSpecificForceX));
+    for (const std::size_t j : y) both.push_back(row_of_mean(j, kSpecificForceY));
     const auto stacked = [&](const VectorXd& first, const VectorXd& second) {
       VectorXd v(nx + ny);
       v << first, second;
@@ -334,18 +329,13 @@ FlightQuantities::FlightQuantities(const PredictedFlight& flight, const VehicleH
     if (!flight.has_rows(kAngularAccelerationX + k, 0)) continue;
     const std::vector<std::size_t> list = seen_beats(flight, kAngularAccelerationX + k);
     Regression r;
-    for (const std::size_t j : list) r.rows.push_back(row_of(j, kAngularAccelerationX + k));
+    for (const std::size_t j : list) r.rows.push_back(row_of_mean(j, kAngularAccelerationX + k));
     r.add(VectorXd::Constant(static_cast<Index>(list.size()), weight_over_inertia(robot, k)), 0,
           {std::string("moment about ") + "xyz"[k], "m", k < 2 ? "moment" : "yaw"});
     add(r, of(residual, list, kAngularAccelerationX + k));
   }
-  if (const std::optional<double> noise = flight.log_input_noise()) {
-    quantities_.push_back({"noise of the inputs (log)", "", "noise"});
-    values_.conservativeResize(values_.size() + 1);
-    variances_.conservativeResize(values_.size());
-    values_[values_.size() - 1] = *noise;
-    variances_[values_.size() - 1] = 0;
-  }
+  if (const std::optional<double> noise = flight.log_input_noise())
+    keep({"noise of the inputs (log)", "", "noise"}, *noise, 0);
 }
 
 }  // namespace flappy::gap

@@ -55,7 +55,7 @@ class FlightQuantities {
  private:
   struct Regression;
   void add(const Regression& regression, const Eigen::VectorXd& residual);
-  void add_unseen(const Regression& regression);
+  void keep(const SessionQuantity& quantity, double value, double variance);
   std::vector<SessionQuantity> quantities_;
   Eigen::VectorXd values_, variances_;
   struct Weights {

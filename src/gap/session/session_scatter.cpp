@@ -60,17 +60,16 @@ SessionValues session_values(const std::vector<FlightQuantities>& flights, const
                              const SessionPrior& prior) {
   const Index sessions = 1 + *std::ranges::max_element(of), n = flights.front().values().size();
   SessionValues s{Eigen::MatrixXd::Zero(sessions, n), Eigen::MatrixXd::Zero(sessions, n)};
-  for (Index k = 0; k < sessions; ++k) {
-    std::vector<FlightQuantities> own;
-    for (std::size_t f = 0; f < flights.size(); ++f)
-      if (of[f] == k) own.push_back(flights[f]);
-    const Eigen::MatrixXd shares = flight_shares(own, prior);
-    for (Index f = 0; f < shares.rows(); ++f) {
-      const FlightQuantities& flight = own[static_cast<std::size_t>(f)];
-      s.values.row(k) += shares.row(f).cwiseProduct(flight.values().transpose());
-      s.variances.row(k) += shares.row(f).cwiseAbs2().cwiseProduct(flight.variances().transpose());
+  Eigen::MatrixXd weights = Eigen::MatrixXd::Zero(sessions, n);
+  for (std::size_t f = 0; f < flights.size(); ++f)
+    for (Index q = 0; q < n; ++q) {
+      const double weight = weight_of(flights[f], q, prior);
+      weights(of[f], q) += weight;
+      s.values(of[f], q) += weight * flights[f].values()[q];
+      s.variances(of[f], q) += weight * weight * flights[f].variances()[q];
     }
-  }
+  s.values.array() /= weights.array();
+  s.variances.array() /= weights.array().square();
   return s;
 }
 
@@ -112,8 +111,6 @@ SessionDensity::SessionDensity(const SessionScatter& scatter, const VectorXd& va
     blocks_.back().push_back(q);
   }
 }
-
-double SessionDensity::times(Index q) const { return difference_[q] / std::sqrt(variance_[q]); }
 
 double SessionDensity::size_of(const VectorXd& shift) const {
   double square = 0;

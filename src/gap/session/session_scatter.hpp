@@ -70,8 +70,6 @@ class SessionDensity {
   const Eigen::VectorXd& difference() const { return difference_; }
   const Eigen::VectorXd& variance() const { return variance_; }
   double freedom() const { return freedom_; }
-  /// By how many standard deviations of unchanged sessions a quantity differs.
-  double times(Eigen::Index quantity) const;
   /// `shift`: what a cause adds; `more`: variance that it adds, of causes whose shift is not known. A robot that changed
   /// much flies otherwise, so that errors of the model that are the same in all of its flights no longer cancel, and
   /// the change may leak into other quantities.
