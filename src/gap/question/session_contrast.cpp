@@ -30,7 +30,7 @@ constexpr double kStepBeyond = 1.5;
 constexpr std::size_t kMaxSets = 3;
 /// Step of the derivative by an actuator's share. Choice.
 constexpr double kLoss = 0.01;
-/// What is named is more probable than not. Choice.
+/// Least probability of what is named, and of "unchanged". Choice.
 constexpr double kMoreThanNot = 0.5;
 
 /// Any one or two kinds of quantities change, or all, each choice as probable as any other.
@@ -55,7 +55,7 @@ double log_density_of_unknown(const SessionDensity& density, const std::vector<S
   return log_sum(values) - std::log(static_cast<double>(values.size()));
 }
 
-/// What the flights of both sides show.
+/// Quantities of all reference and test flights.
 struct Sessions {
   CommonTrend trend;
   std::vector<FlightQuantities> references, tests;
@@ -167,13 +167,15 @@ class Weighing {
   }
   const std::vector<std::string>& untestable() const { return untestable_; }
 
-  std::vector<ScoredHypothesis> all(const std::vector<SessionQuantity>& quantities) const {
+  /// `go_on`: false to fit no more.
+  std::vector<ScoredHypothesis> all(const std::vector<SessionQuantity>& quantities,
+                                    const std::function<bool(double share, const std::string& what)>& go_on) const {
     const SessionPrior& prior = options_.sessions;
     const VectorXd none = VectorXd::Zero(tests_.density().difference().size());
     std::vector<ScoredHypothesis> list = {
         scored(HypothesisKind::parameters, tests_.density().log_density(none, none), prior.unchanged),
         scored(HypothesisKind::unknown, log_density_of_unknown(tests_.density(), quantities, prior), prior.unknown)};
-    if (effects_.empty()) {
+    if (effects_.empty() || !go_on(0.4, "fitting effects")) {
       set_probabilities(list);
       return list;
     }
@@ -183,7 +185,8 @@ class Weighing {
       singles[i] = fit_each_way(tests_, Hypothesis(uncertain_, {effects_[i]}), robot_, nullptr);
     });
     for (std::size_t i = 0; i < effects_.size(); ++i) list.push_back(with({effects_[i]}, singles[i], each));
-    for (const Pair& p : pairs(singles)) {
+    const bool further_ones = go_on(0.7, "fitting another jointly");
+    for (const Pair& p : further_ones ? pairs(singles) : std::vector<Pair>()) {
       const std::vector<std::string> both = {effects_[p.first], effects_[p.second]};
       list.push_back(with(both, p.fit, each * further(p)));
     }
@@ -307,7 +310,10 @@ std::optional<Inference> SessionContrast::by_sessions(const Flights& flights, co
 
   Inference d;
   d.untestable = weighing.untestable();
-  d.hypotheses = weighing.all(sessions.quantities());
+  d.hypotheses = weighing.all(sessions.quantities(), [&](double share, const std::string& what) {
+    d.complete = d.complete && (!options.progress || options.progress(share, what));
+    return d.complete;
+  });
   d.seen = all_seen(tests, scatter, robot);
   d.odd = all_odd(flights, sessions, scatter, options.sessions, robot, options.threads);
   d.parameters = reference.fit.parameters();
