@@ -125,8 +125,9 @@ class DiagnosisSection {
       f.series[0].x.push_back(s.times());
       f.series[0].y.push_back(near_category(f.categories.size()));
       f.categories.push_back(spoken(s.name));
-      rows.push_back({spoken(s.name), seen_value(s, s.reference, false), seen_value(s, s.tests, false),
-                      seen_value(s, s.scatter, false), format("%+.1f", s.times())});
+      const auto value = [&](double v) { return in_print(seen_value(s, v, false)); };
+      rows.push_back(
+          {spoken(s.name), value(s.reference), value(s.tests), value(s.scatter), format("%+.1f", s.times())});
     }
     section_.add(f);
     section_.add(table("What differs from the reference, in numbers",

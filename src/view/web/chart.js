@@ -125,9 +125,11 @@ const barsAndIntervals = {
           const top = y.getPixelForValue(s.y[i] - dataset.bar / 2), bottom = y.getPixelForValue(s.y[i] + dataset.bar / 2);
           ctx.fillRect(Math.min(base, end), Math.min(top, bottom), Math.max(1.5, Math.abs(end - base)), Math.abs(bottom - top));
           if (dataset.bar < kLabelled) return;
-          const inside = end > chartArea.right - 56;
-          Object.assign(ctx, {font: `12px ${kFont}`, textBaseline: "middle", textAlign: inside ? "right" : "left", fillStyle: inside ? "#ffffff" : kInk});
-          ctx.fillText(shortNumber(value), end + (inside ? -6 : 6), (top + bottom) / 2);
+          const way = end < base ? -1 : 1;
+          const inside = way < 0 ? end < chartArea.left + 56 : end > chartArea.right - 56;
+          const textAlign = (way > 0) === inside ? "right" : "left";
+          Object.assign(ctx, {font: `12px ${kFont}`, textBaseline: "middle", textAlign, fillStyle: inside ? "#ffffff" : kInk});
+          ctx.fillText(shortNumber(value), end + way * (inside ? -6 : 6), (top + bottom) / 2);
           ctx.fillStyle = s.colour;
         }
         if (s.draw === "interval" && s.low[i] !== null && s.high[i] !== null) {
