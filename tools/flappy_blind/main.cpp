@@ -234,6 +234,10 @@ int main(int argc, char** argv) {
       .range(std::size_t{1}, blind::Family::kFlights)
       .needs(contrast)
       .shows_default();
+  make.option("--reference-sessions", made.plan.reference_sessions, "of the references of each robot, with --contrast")
+      .range(std::size_t{1}, blind::Family::kFlights)
+      .needs(contrast)
+      .shows_default();
   make.option("--vehicle", made.vehicle, "the robot as declared").shows_default();
   make.option("--randomise", made.randomise, "what robots of the part parameters are drawn from").shows_default();
   make.option("--detectable", made.detectable, "what is detectable of every effect; none: the family's own table");

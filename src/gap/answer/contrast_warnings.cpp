@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "io/files.hpp"
 #include "io/text.hpp"
@@ -69,6 +70,14 @@ std::vector<std::string> contrast_warnings(const std::vector<flightlog::FlightHe
           io::format("the %s %.1f s: under 10 s, small changes stay hidden, and probabilities were not "
                      "tested",
                      name, s));
+  std::set<std::string> sessions;
+  for (const auto& f : references) sessions.insert(f->session());
+  if (sessions.size() == 1 && references.size() > 1 && !tests.front()->is_averaged())
+    lines.push_back(sessions.contains("")
+                        ? "reference flights name no session, so each counts as one of its own: give those of one "
+                          "battery or day the same session in flight.toml, or as one folder"
+                        : "the reference is one session: how much sessions differ is taken from other robots, and "
+                          "flights of two more sessions would make the answer surer");
   const std::vector<RegimeQuantity> quantities = tests.front()->regimes();
   for (std::size_t q = 0; q < quantities.size(); ++q) {
     if (quantities[q].name == "time" || quantities[q].name == "heading")

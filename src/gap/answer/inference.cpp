@@ -71,6 +71,7 @@ Inference infer(const Flights& flights, const sim::Randomisation& uncertain, Inf
   d.minors = robot.uncertain().minors();
   d.nominal = tests_of(flights, robot.nominal().residual);
   for (int g = 0; g < kGroups; ++g) d.noise_sd.push_back(robot.evidence().noise_sd(g));
+  d.seen = question.seen(robot);
   d.hypotheses = {baselines.none, baselines.parameters, baselines.unknown};
   for (auto* part : {&sets.hypotheses, &remainders})
     for (ScoredHypothesis& a : *part) {

@@ -134,6 +134,19 @@ Evidence Evidence::with_discrepancy(ModelDiscrepancy discrepancy) const {
   return e;
 }
 
+Evidence Evidence::with_tests(const std::vector<char>& tests, SufficientStatistics& statistics) const {
+  Evidence e = *this;
+  for (std::size_t f = 0; f < tests.size(); ++f) {
+    const MatrixXd to = basis().without_offsets(tests[f] != 0);
+    for (std::size_t g = 0; g < static_cast<std::size_t>(kGroups); ++g) {
+      if (!has_rows(static_cast<int>(g))) continue;
+      e.normal_[f][g] = to.transpose() * normal_[f][g] * to;
+      statistics.sums[f][g] = to.transpose() * statistics.sums[f][g];
+    }
+  }
+  return e;
+}
+
 Rows Evidence::without(std::size_t flight, Rows residual, const BasisCoefficients& change) const {
   for (int g = 0; g < kGroups; ++g) {
     if (!has_rows(g)) continue;

@@ -41,6 +41,9 @@ class RegimeBasis {
   Eigen::MatrixXd in_tests(const Eigen::MatrixXd& coefficients) const { return coefficients * in_tests_; }
   /// A change of the test flights alone, as it would be in all flights.
   Eigen::MatrixXd in_all(const Eigen::MatrixXd& coefficients) const { return coefficients * in_all_; }
+  /// [function][function] Takes the values of a reference flight to those that it would have as one of the tests
+  /// (`as_test`) or as a reference, without offsets of flights.
+  Eigen::MatrixXd without_offsets(bool as_test) const;
   /// Whether the references vary enough in this class of regimes to tell what differs in the tests.
   bool covers(Regimes regimes) const { return covered_[static_cast<std::size_t>(regimes)]; }
   bool covers_all() const { return std::ranges::all_of(covered_, std::identity()); }
@@ -119,10 +122,12 @@ struct Scales {
   std::vector<double> effects;  ///< scale of the background magnitude of each effect; empty: 1
   std::vector<double> blocks;   ///< [kBlocks] scale of delta; empty: 1
   std::vector<char> free;       ///< [kBlocks] whether an unknown cause lets the block exceed its prior
+  /// The scales of the test flights at the centres of their priors.
+  void centre_tests(const SessionVariation& sessions);
   /// Prior scale of a background magnitude.
   double prior_scale(ScalePrior prior) const { return prior.follows_robot ? robot : 1; }
   double block(std::size_t b) const { return blocks.empty() ? 1 : blocks[b]; }
-  /// Centre of the prior of a block's scale.
+  /// Centre of the scales of blocks.
   double centre(std::size_t b) const { return block_of_tests(b) ? session : robot; }
 };
 
@@ -154,6 +159,9 @@ class Evidence {
   /// Learns the noise from the whole residual, with its smooth part. From then on, scales stay 1 except of free blocks.
   Evidence with_rest_as_noise(const Residuals& residual) const;
   Evidence with_discrepancy(ModelDiscrepancy discrepancy) const;
+  /// As if these flights, which are references, were the tests: a contrast among references. Flights have no offsets.
+  /// `tests`: [flight]; `statistics`: of a residual, which changes alike.
+  Evidence with_tests(const std::vector<char>& tests, SufficientStatistics& statistics) const;
 
   const RegimeBasis& basis() const { return *basis_; }
   const ModelDiscrepancy& discrepancy() const { return discrepancy_; }

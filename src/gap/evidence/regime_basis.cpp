@@ -98,6 +98,18 @@ void RegimeBasis::append_of_tests(const Flights& flights, const std::vector<std:
   }
 }
 
+Eigen::MatrixXd RegimeBasis::without_offsets(bool as_test) const {
+  Eigen::MatrixXd to = Eigen::MatrixXd::Zero(size(), size());
+  int again = static_cast<int>(std::ranges::count(functions_, false, &Function::of_tests));
+  for (int i = 0; i < size() && !of_tests(i); ++i) {
+    if (kind(i) == BasisFunction::flight) continue;
+    to(i, i) = 1;
+    if (as_test) to(i, again) = 1;
+    ++again;
+  }
+  return to;
+}
+
 /// By the mean over a class's functions of their variance in the references over that in the tests, at most 1 each.
 void RegimeBasis::find_covered(const Flights& flights) {
   // References cover a class of regimes if they have this share of its variance in the tests. Choice.

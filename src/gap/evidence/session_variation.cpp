@@ -22,6 +22,12 @@ constexpr const char* kSessionLaws =
 # centre over effects and robots. spread: standard deviation of its logarithm. most: the largest over the centre; what deviates more is another cause.
 )";
 constexpr const char* kScaleSd = "  # Standard deviation of the logarithm of the scale of a pair of sessions. Learnt.";
+constexpr const char* kOwnScaleSd =
+    "  # The same among sessions of one robot, where references are of several sessions. Learnt.";
+constexpr const char* kOwnOffset =
+    "  # By how much this logarithm is larger in tests than contrasts among references say. Learnt.";
+constexpr const char* kOwnShare =
+    "  # Share of what these say of the scales of single blocks that counts: few causes move all coefficients. Learnt.";
 const char* stage_name(std::size_t stage) { return name_of(static_cast<model::Stage>(stage)); }
 constexpr const char* kSessionParametersHead =
     R"(# Prior standard deviation of the change of a parameter, in standard deviations of its prior (configs/gap/priors.toml), by a part of its name.
@@ -35,6 +41,30 @@ constexpr const char* kSessionBackground =
 )";
 
 }  // namespace
+
+double SessionVariation::log_scale() const {
+  if (!own) return 0;
+  const double within = own_scale_sd * own_scale_sd, precision = precision_of_scale();
+  return (own->count - 1) / (within * precision) * (own->mean_log_scale + own_offset + own->from_fewer());
+}
+
+double SessionVariation::sd_of_scale() const {
+  return own ? std::sqrt(own_scale_sd * own_scale_sd + 1 / precision_of_scale()) : scale_sd;
+}
+
+double SessionVariation::precision_of_scale() const {
+  const double within = own_scale_sd * own_scale_sd;
+  return 1 / (scale_sd * scale_sd - within) + (own->count - 1) / within;
+}
+
+double SessionVariation::freedom(std::size_t block) const {
+  return own ? block_freedom + own_share * (1 - 1 / own->count) * own->known[block] : block_freedom;
+}
+
+double SessionVariation::centre(std::size_t block) const {
+  if (!own) return 1;
+  return std::sqrt((block_freedom + own_share * (1 - 1 / own->count) * own->squares[block]) / freedom(block));
+}
 
 double SessionVariation::parameter_sd(const std::string& name) const {
   const auto at =
@@ -53,10 +83,11 @@ double SessionVariation::background_sd(const std::string& effect) const {
 
 std::string session_text(const SessionVariation& s, const std::string& learnt) {
   const auto number = [](double v) { return io::format("%.4g", v); };
-  std::string text = kSessionHead + learnt + ".\nschema = 1\n\n" + kSessionSpread +
-                     "[spread]\nscale_sd = " + number(s.scale_sd) + kScaleSd +
-                     "\nblock_freedom = " + number(s.block_freedom) + "\neffect_freedom = " + number(s.effect_freedom) +
-                     "\n\n" + kSessionLaws + "[law_error]\n";
+  std::string text =
+      kSessionHead + learnt + ".\nschema = 1\n\n" + kSessionSpread + "[spread]\nscale_sd = " + number(s.scale_sd) +
+      kScaleSd + "\nown_scale_sd = " + number(s.own_scale_sd) + kOwnScaleSd + "\nown_offset = " + number(s.own_offset) +
+      kOwnOffset + "\nown_share = " + number(s.own_share) + kOwnShare + "\nblock_freedom = " + number(s.block_freedom) +
+      "\neffect_freedom = " + number(s.effect_freedom) + "\n\n" + kSessionLaws + "[law_error]\n";
   for (std::size_t stage = 0; stage < model::kStages; ++stage)
     text += std::string(stage_name(stage)) + " = " + number(s.law_error[stage]) + "\n";
   text += "spread = " + number(s.law_spread) + "\nmost = " + number(s.law_most) + "\n\n" + kSessionParametersHead +
@@ -75,6 +106,9 @@ SessionVariation read_session_variation(const std::filesystem::path& path) {
   SessionVariation s;
   const io::Table spread = root.table("spread");
   s.scale_sd = spread.number("scale_sd", io::positive());
+  s.own_scale_sd = spread.number("own_scale_sd", io::positive(s.scale_sd));
+  s.own_offset = spread.number("own_offset", io::Range{-3, 3});
+  s.own_share = spread.number("own_share", io::Range{0, 1});
   s.block_freedom = spread.number("block_freedom", io::positive());
   s.effect_freedom = spread.number("effect_freedom", io::positive());
   const io::Table laws = root.table("law_error");

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,9 +17,23 @@
 
 namespace flappy::gap {
 
+/// What contrasts of each reference session of the robot with the others say (gap/fit/own_sessions.hpp).
+struct OwnSessions {
+  double count = 0;             ///< K, number of sessions
+  double mean_log_scale = 0;    ///< of the scales f_k
+  std::vector<double> squares;  ///< [block] sum of delta^2 / f_k^2, in units of the prior
+  std::vector<double> known;    ///< [block] number of coefficients that the flights determine
+  /// Of the log scale: tests are compared with all K sessions, and each of these with K - 1 others.
+  double from_fewer() const { return 0.5 * std::log(1 - 1 / (count * count)); }
+};
+
 struct SessionVariation {
   /// How far a pair of sessions differs more or less than others: log scale ~ N(0, scale_sd^2).
   double scale_sd = 0.5;
+  /// Sessions of one robot: standard deviation of the log scale; by how much it is larger in tests than contrasts among
+  /// references say, whose flights are fewer; share of what these say of the scales of blocks that counts.
+  double own_scale_sd = 0.25, own_offset = 0, own_share = 0.05;
+  std::optional<OwnSessions> own;  ///< none: the references are one session
   /// Degrees of freedom of the scales of blocks, and of those of background magnitudes (ScalePrior).
   double block_freedom = 30, effect_freedom = 30;
   /// Deviation of another law of the same cause from the catalogue's, as a share of the change by the effect. law_error:
@@ -30,11 +46,27 @@ struct SessionVariation {
   Shares shares{};                           ///< prior of the smooth differences between sessions
   std::map<std::string, double> background;  ///< prior sd of a magnitude's change, by effect; "other": not listed
 
+  /// A further session of the robot: log scale ~ N(log_scale(), sd_of_scale()^2). With own sessions, of which K - 1 say
+  /// something of their own,
+  ///   p = 1 / (scale_sd^2 - own_scale_sd^2) + (K - 1) / own_scale_sd^2
+  ///   log_scale = (K - 1) / (own_scale_sd^2 p) (mean log f_k + own_offset + 1/2 log(1 - 1/K^2))
+  ///   sd_of_scale^2 = own_scale_sd^2 + 1/p
+  /// as the mean of K - 1 others varies more than that of all K.
+  double log_scale() const;
+  double sd_of_scale() const;
+  double first_scale() const { return std::exp(log_scale()); }
+  /// Degrees of freedom of the scale of a block, and its centre over that of the session:
+  ///   freedom = block_freedom + w known,    centre^2 = (block_freedom + w squares) / freedom,    w = own_share (K - 1)/K
+  double freedom(std::size_t block) const;
+  double centre(std::size_t block) const;
   /// 0: a parameter that does not change between sessions.
   double parameter_sd(const std::string& name) const;
   double background_sd(const std::string& effect) const;
   /// Law error of the effect's stage.
   double law_error_of(const std::string& effect) const;
+
+ private:
+  double precision_of_scale() const;
 };
 
 /// Text of configs/gap/session_variation.toml. `learnt`: source of the values, for the head of the file.

@@ -36,13 +36,13 @@ double log_prior(double scale, double robot, double freedom) {
 }
 
 /// The most probable robot scale f. `freedom`: sum of nu; `inverses`: sum of nu / s^2 over scales s that follow it;
-/// `sd`: of log f.
-double robot_scale(double freedom, double inverses, double sd) {
+/// `mean`, `sd`: of log f.
+double robot_scale(double freedom, double inverses, double mean, double sd) {
   // Step of the grid of log f. Choice.
   constexpr double kGrid = 0.02;
   double best = 1, most = -std::numeric_limits<double>::infinity();
   for (double log_f = -5; log_f <= 3; log_f += kGrid) {
-    const double value = freedom * log_f - std::exp(2 * log_f) * inverses / 2 - 0.5 * std::pow(log_f / sd, 2);
+    const double value = freedom * log_f - std::exp(2 * log_f) * inverses / 2 - 0.5 * std::pow((log_f - mean) / sd, 2);
     if (value > most) most = value, best = std::exp(log_f);
   }
   return best;
@@ -61,6 +61,13 @@ Scales strided(const Scales& from, const Scales& to, double stride) {
 }
 
 }  // namespace
+
+void Scales::centre_tests(const SessionVariation& sessions) {
+  session = sessions.first_scale();
+  if (blocks.empty()) blocks.assign(kBlocks, 1);
+  for (std::size_t b = 0; b < kBlocks; ++b)
+    if (block_of_tests(b)) blocks[b] = session * sessions.centre(b);
+}
 
 int Evidence::block_of(int group, int function) const {
   const int harmonic = (group % kCoefficients + 1) / 2;
@@ -101,7 +108,7 @@ class Evidence::Weighing {
     best.posterior.log_evidence = -std::numeric_limits<double>::infinity();
     Scales now = start_, next = start_;
     double stride = 1;
-    if (max_iterations > 1)
+    if (max_iterations > 1 && start_.session == sessions().first_scale())  // not searched before
       now = e_.rules_->first_scales(now, [&](const Scales& s) { return evidence_at(s, false).posterior.log_evidence; });
     for (int iteration = 0; iteration < max_iterations; ++iteration) {
       ScaledEvidence w = evidence_at(now, true);
@@ -141,6 +148,12 @@ class Evidence::Weighing {
     void add(double nu, double scale) { freedom += nu, inverses += nu / (scale * scale); }
   };
 
+  const SessionVariation& sessions() const { return e_.discrepancy_.session; }
+  /// Centre of the prior of a block's scale.
+  double centre(const Scales& scales, std::size_t b) const {
+    return scales.centre(b) * (block_of_tests(b) ? sessions().centre(b) : 1);
+  }
+
   /// Groups with rows in the flights that count.
   void find_groups(const std::vector<char>& use) {
     for (int g = 0; g < kGroups; ++g)
@@ -153,8 +166,7 @@ class Evidence::Weighing {
 
   void count_blocks() {
     for (std::size_t b = 0; b < kBlocks; ++b)
-      nu_.push_back(block_of_tests(b) ? e_.discrepancy_.session.block_freedom
-                                      : e_.discrepancy_.freedom_of(regimes_of_block(b)));
+      nu_.push_back(block_of_tests(b) ? sessions().freedom(b) : e_.discrepancy_.freedom_of(regimes_of_block(b)));
     counts_.assign(kBlocks, 0);
     for (const int g : seen_)
       for (int i = 0; i < e_.basis().size(); ++i) ++counts_[static_cast<std::size_t>(e_.block_of(g, i))];
@@ -237,12 +249,12 @@ class Evidence::Weighing {
 
   double log_prior_of(const Scales& scales) const {
     double sum = -0.5 * std::pow(std::log(scales.robot) / e_.discrepancy_.spread.robot_sd, 2);
-    sum -= 0.5 * std::pow(std::log(scales.session) / e_.discrepancy_.session.scale_sd, 2);
+    sum -= 0.5 * std::pow((std::log(scales.session) - sessions().log_scale()) / sessions().sd_of_scale(), 2);
     for (std::size_t b = 0; b < kBlocks; ++b)
       if (counts_[b] > 0)
         sum += scales.free[b]    ? -*unknown_penalty_nats_
                : e_.scales_held_ ? 0
-                                 : log_prior(scales.blocks[b], scales.centre(b), nu_[b]);
+                                 : log_prior(scales.blocks[b], centre(scales, b), nu_[b]);
     for (std::size_t e = 0; e < of_effect_.size(); ++e)
       if (of_effect_[e] > 0 && !e_.scales_held_)
         sum += log_prior(scales.effects[e], scales.prior_scale(priors_[e]), priors_[e].freedom);
@@ -285,12 +297,14 @@ class Evidence::Weighing {
       for (std::size_t b = 0; b < kBlocks; ++b) {
         if (counts_[b] == 0) continue;
         maximise_block(b, total[b], next);
-        if (!next.free[b]) (block_of_tests(b) ? of_session : of_robot).add(nu_[b], next.blocks[b]);
+        if (!next.free[b])
+          (block_of_tests(b) ? of_session : of_robot).add(nu_[b], next.blocks[b] * next.centre(b) / centre(next, b));
       }
       if (!e_.scales_held_)
-        next.robot = robot_scale(of_robot.freedom, of_robot.inverses, e_.discrepancy_.spread.robot_sd);
+        next.robot = robot_scale(of_robot.freedom, of_robot.inverses, 0, e_.discrepancy_.spread.robot_sd);
       if (of_session.freedom > 0)  // there are blocks of test flights
-        next.session = robot_scale(of_session.freedom, of_session.inverses, e_.discrepancy_.session.scale_sd);
+        next.session =
+            robot_scale(of_session.freedom, of_session.inverses, sessions().log_scale(), sessions().sd_of_scale());
       if (next.robot == robot && next.session == session) break;
     }
     return next;
@@ -316,14 +330,14 @@ class Evidence::Weighing {
 
   /// The scale of a block, within its prior or free of it. `total`: expected squares of its coefficients.
   void maximise_block(std::size_t b, double total, Scales& next) const {
-    const double n = counts_[b], f2 = std::pow(next.centre(b), 2);
+    const double n = counts_[b], f2 = std::pow(centre(next, b), 2);
     const double bound2 = e_.scales_held_ ? 1 : (total + nu_[b] * f2) / (n + nu_[b]);
     next.blocks[b] = std::sqrt(bound2);
     next.free[b] = 0;
     if (!unknown_penalty_nats_ || !e_.rules_->may_be_free(b, e_.basis(), e_.discrepancy_)) return;
     const double free2 = std::max(total / n, kMinFree * kMinFree * f2);
     const auto objective = [&](double s2) { return -0.5 * (n * std::log(s2) + total / s2); };
-    const double bound = e_.scales_held_ ? 0 : log_prior(std::sqrt(bound2), next.centre(b), nu_[b]);
+    const double bound = e_.scales_held_ ? 0 : log_prior(std::sqrt(bound2), centre(next, b), nu_[b]);
     if (!(objective(free2) - *unknown_penalty_nats_ > objective(bound2) + bound)) return;
     next.blocks[b] = std::sqrt(free2);
     next.free[b] = 1;

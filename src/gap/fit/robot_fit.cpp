@@ -6,6 +6,7 @@
 #include <numbers>
 #include <string_view>
 
+#include "gap/fit/own_sessions.hpp"
 #include "io/parallel.hpp"
 #include "model/effects/registry.hpp"
 
@@ -94,11 +95,14 @@ RobotFit::RobotFit(const FitRules& rules, const RobotFit& reference, const Fligh
       no_effects_(uncertain_, {}) {
   linearise_around(reference.parameters_);
   find_nuisance_columns();
-  Scales scales = find_scales(no_effects_, parameters_, {});
+  ModelDiscrepancy discrepancy = evidence().discrepancy();
+  discrepancy.session.own = own_sessions(fitter_, parameters_);
+  take_evidence(evidence().with_discrepancy(std::move(discrepancy)));
+  Scales scales;
+  scales.centre_tests(evidence().discrepancy().session);
+  scales = find_scales(no_effects_, parameters_, scales);
   // what an effect explains is no difference between sessions
-  scales.session = 1;
-  for (std::size_t b = 0; b < kBlocks; ++b)
-    if (block_of_tests(b)) scales.blocks[b] = 1;
+  scales.centre_tests(evidence().discrepancy().session);
   for (std::size_t e = 0; e < scales.effects.size(); ++e)
     if (fitter_.effects()[e].starts_with(kSessionOf)) scales.effects[e] = 1;
   fitter_ = fitter_.with_scales(scales);

@@ -4,9 +4,11 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <utility>
 
+#include "gap/fit/own_sessions.hpp"
 #include "gap/question/question.hpp"
 #include "io/files.hpp"
 #include "io/log.hpp"
@@ -37,6 +39,10 @@ constexpr double kMinSpread = 0.25;
 constexpr double kShrinkLaws = 2;
 /// The quantile of errors of laws, over their centres, that is the largest of them. Choice.
 constexpr double kLargestLaw = 0.95;
+/// What counts of a robot's own sessions is learnt from no fewer robots with several. Choice.
+constexpr std::size_t kMinOwn = 5;
+/// The largest scatter of sessions of one robot, over that of all robots. Choice.
+constexpr double kMaxOwn = 0.9;
 constexpr std::size_t kKinds = static_cast<std::size_t>(BasisFunction::count);
 
 struct Moment {
@@ -164,8 +170,10 @@ void expect_sessions(const Robots& pairs, const ModelDiscrepancy& now, ShareMome
   for (const auto& pair : pairs) {
     const Fitter fitter = pair->fitter_given(now);
     const Regressors r = fitter.unscaled_regressors(pair->parameters());
+    Scales scales = fitter.scales();
+    scales.centre_tests(now.session);
     const ScaledEvidence w =
-        fitter.evidence().weigh(pair->parameters().statistics, r, fitter.all_flights(), {}, fitter.scales(), {}, 1);
+        fitter.evidence().weigh(pair->parameters().statistics, r, fitter.all_flights(), {}, scales, {}, 1);
     for (std::size_t k = 0; k < r.effects.size(); ++k) {
       if (r.effects[k] < 0) continue;
       const std::string& name = fitter.effects()[static_cast<std::size_t>(r.effects[k])];
@@ -236,6 +244,46 @@ double scale_sd(const Robots& pairs, const ModelDiscrepancy& now) {
     sum += std::pow(std::log(w.scales.session), 2);
   }
   return std::sqrt(sum / (kShrink + static_cast<double>(pairs.size())));
+}
+
+/// Sets what counts of the robots' own sessions: the mean and scatter of what the scales of tests are over those that
+/// references foretell, and the share that makes the tests most probable.
+void learn_own(const Robots& pairs, const ModelDiscrepancy& now, SessionVariation& to) {
+  // Shares that are tried. Choice.
+  constexpr double kShares[] = {0, 0.02, 0.05, 0.1, 0.2, 0.5, 1};
+  const auto weigh = [](const RobotFit& pair, const ModelDiscrepancy& d) {
+    const Fitter fitter = pair.fitter_given(d);
+    Scales start;
+    start.centre_tests(d.session);
+    return fitter.evidence().weigh(pair.parameters().statistics, fitter.unscaled_regressors(pair.parameters()),
+                                   fitter.all_flights(), {}, start);
+  };
+  std::vector<std::pair<const RobotFit*, OwnSessions>> of_several;
+  std::vector<double> over, weights;
+  for (const auto& pair : pairs)
+    if (std::optional<OwnSessions> own = own_sessions(pair->fitter_given(now), pair->parameters())) {
+      over.push_back(std::log(weigh(*pair, now).scales.session) - own->mean_log_scale - own->from_fewer());
+      weights.push_back(1 - 1 / own->count);
+      of_several.emplace_back(pair.get(), std::move(*own));
+    }
+  if (of_several.size() < kMinOwn) return;
+  const auto n = static_cast<double>(over.size());
+  to.own_offset = std::accumulate(over.begin(), over.end(), 0.0) / n;
+  double squares = 0;
+  for (std::size_t k = 0; k < over.size(); ++k) squares += weights[k] * std::pow(over[k] - to.own_offset, 2);
+  to.own_scale_sd = std::min(std::sqrt(squares / (n - 1)), kMaxOwn * to.scale_sd);
+  double most = -std::numeric_limits<double>::infinity();
+  for (const double share : kShares) {
+    ModelDiscrepancy d = now;
+    d.session.own_scale_sd = to.own_scale_sd, d.session.own_offset = to.own_offset, d.session.own_share = share;
+    double sum = 0;
+    for (const auto& [pair, own] : of_several) {
+      d.session.own = own;
+      sum += weigh(*pair, d).posterior.log_evidence;
+    }
+    io::log(io::LogLevel::info, io::format("own_share %.2f: %.2f nats", share, sum));
+    if (sum > most) most = sum, to.own_share = share;
+  }
 }
 
 /// Law errors of known effects.
@@ -328,6 +376,7 @@ SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim
     take(shares, backgrounds, now.session.shares, now.session.background);
   }
   if (!harmless.empty()) now.session.scale_sd = scale_sd(harmless, now);
+  learn_own(harmless, ModelDiscrepancy(now), now.session);
   harmless.clear();
   LawErrors errors;
   for (const SessionPair& p : pairs) {

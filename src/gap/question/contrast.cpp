@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "gap/question/alone.hpp"
+#include "gap/question/changes_seen.hpp"
 #include "io/parallel.hpp"
 #include "model/effects/registry.hpp"
 
@@ -113,7 +114,6 @@ bool Contrast::may_be_free(std::size_t block, const RegimeBasis& basis, const Mo
 
 /// All scales of the test flights times the power of two with the largest evidence: single steps are short.
 Scales Contrast::first_scales(const Scales& given, const std::function<double(const Scales&)>& log_evidence) const {
-  if (given.session != 1) return given;  // searched before
   Scales best = given;
   double most = log_evidence(given);
   for (const double factor : {2.0, 0.5})
@@ -275,6 +275,8 @@ std::optional<Validation> Contrast::validate(const Fitter& /*fitter*/, const sim
                                              int /*threads*/) const {
   return std::nullopt;
 }
+
+std::vector<SeenQuantity> Contrast::seen(const RobotFit& robot) const { return changes_seen(robot); }
 
 // ---- corrected vehicle
 

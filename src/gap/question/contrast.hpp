@@ -61,6 +61,7 @@ class Contrast : public Question {
                               const Inference& d) const override;
   std::optional<Validation> validate(const Fitter& fitter, const sim::Randomisation& uncertain, const Flights& flights,
                                      const Inference& d, int threads) const override;
+  std::vector<SeenQuantity> seen(const RobotFit& robot) const override;
   Rival rival(const ScoredHypothesis& hypothesis, const Inference& d, const sim::Randomisation& uncertain,
               const sim::Randomisation& as_filed) const override;
   std::vector<BasisCoefficients> known_columns(const Rival& rival, const std::optional<Fit>& first) const override;

@@ -75,7 +75,7 @@ struct Inference {
   Residuals nominal;                     ///< [test flight] residuals of the vehicle file
   /// [test flight] Residuals with parameters fitted to the other flights, without effects.
   Residuals refit;
-  std::vector<SeenQuantity> seen;  ///< only in a contrast of a beat-averaged vehicle
+  std::vector<SeenQuantity> seen;  ///< only in a contrast
   std::vector<OddFlight> odd;
   std::vector<double> noise_sd;  ///< [channel and coefficient of the beat] standard deviation of the noise of a row
 

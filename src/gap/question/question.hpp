@@ -66,6 +66,8 @@ class Question : public FitRules {
                                                const ReferenceFit& /*reference*/) const {
     return std::nullopt;
   }
+  /// What changed since the references, whatever the cause; none: not of this question.
+  virtual std::vector<SeenQuantity> seen(const RobotFit& /*robot*/) const { return {}; }
   /// Columns of a rival's parameters that are known. `first`: linearisation of the first rival with parameters.
   virtual std::vector<BasisCoefficients> known_columns(const Rival& rival, const std::optional<Fit>& first) const = 0;
 };

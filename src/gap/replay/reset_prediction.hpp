@@ -25,6 +25,7 @@ class ResetPrediction final : public PredictedFlight {
   explicit ResetPrediction(Recording recording);
 
   const std::string& name() const override { return recording_.name; }
+  std::string session() const override { return recording_.log.header.session; }
   bool has_ground() const override { return recording_.world.has_ground(); }
   std::size_t beats() const override { return recording_.beats; }
   double beats_Hz() const override { return recording_.log.header.flapping_Hz; }

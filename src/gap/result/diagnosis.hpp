@@ -148,7 +148,7 @@ struct Validation {
   std::vector<Agreement> agreements;
 };
 
-/// A number that the flights of a beat-averaged robot show (gap/session/quantities.hpp), in a contrast.
+/// A number that flights show, in a contrast: gap/session/quantities.hpp, of wings gap/question/changes_seen.hpp.
 struct SeenQuantity {
   std::string name, unit;
   double reference = 0, tests = 0;  ///< means

@@ -12,7 +12,8 @@ namespace {
 
 /// Below kSeedsOfAFamily: robots flown by hand or for tables of detectable magnitudes. Already used: 700001 to 799999
 /// and, from each family's first seed, the 120,000 from each of 5,000,000, 5,500,000, ..., 8,500,000 on.
-constexpr std::uint64_t kSeedsOfAFamily = 10'000'000, kReported = 9'000'000, kSeedsOfAPart = 10'000;
+constexpr std::uint64_t kSeedsOfAFamily = 10'000'000, kReported = 9'000'000, kSeedsOfAPart = 10'000,
+                        kSeedsOfSessions = 300'000;
 /// Least number of cases of most parts; rounded up so that all effects of a part have as many.
 constexpr std::size_t kAtLeast = 100;
 /// Least numbers of cases in parts of a contrast.
@@ -33,7 +34,8 @@ class Planner {
           const PlanOptions& options)
       : of_(detectability),
         options_(options),
-        first_seed_(number_of(family) * kSeedsOfAFamily + (options.reported ? kReported : 0)),
+        first_seed_(number_of(family) * kSeedsOfAFamily + (options.reported ? kReported : 0) +
+                    (options.reference_sessions - 1) * kSeedsOfSessions),
         random_(first_seed_) {
     for (const blind::FamilyEffect& e : family.effects()) {
       const auto known = of_.find(e.id);
@@ -176,6 +178,7 @@ class Planner {
         c.references = blind::Family::kFlights;
         fill(k, c);
         c.references = std::min(c.references, options_.flights);
+        c.reference_sessions = std::min(options_.reference_sessions, c.references);
         c.flights = std::min(c.flights, options_.flights);
       });
     };

@@ -37,8 +37,9 @@ struct PlannedCase {
   bool published = false;                            ///< its vehicle is drawn from the published randomisation
   /// In a contrast, the robot flies `references` flights without its effects, and then `flights` in another session.
   std::size_t references = 0, flights = blind::Family::kFlights;
-  bool calm_reference = false;        ///< the references hover and follow slow paths
-  std::vector<std::string> withheld;  ///< effects withheld from the catalogue
+  std::size_t reference_sessions = 1;  ///< the references are of so many sessions, in turn
+  bool calm_reference = false;         ///< the references hover and follow slow paths
+  std::vector<std::string> withheld;   ///< effects withheld from the catalogue
 };
 
 /// The assignment of a case to its family, without the seed.
@@ -53,6 +54,7 @@ struct PlanOptions {
   std::vector<std::string> effects;  ///< robots of contrasts have these effects alone; empty: all
   std::size_t at_most = 0;           ///< most cases of each part; 0: all
   std::size_t flights = blind::Family::kFlights;  ///< most flights of a session of a contrast
+  std::size_t reference_sessions = 1;             ///< of the references of a contrast; other numbers have other seeds
 };
 
 /// Seeds of family b begin at 20,000,000 (development) and 29,000,000 (reported); a and c: 10,000,000 and 30,000,000

@@ -53,12 +53,17 @@ std::uint64_t seed_of_draw(std::uint64_t seed, std::uint64_t draw) { return seed
 
 namespace {
 
-/// Flies until the robot crashes; how it did, or none.
-std::optional<std::string> fly_session(const Family& family, const blind::Assignment& a,
+/// Flies until the robot crashes; how it did, or none. Flights are of the session of `a` and, in turn, of `sessions` - 1
+/// others, which are no session of the tests, 1.
+std::optional<std::string> fly_session(const Family& family, blind::Assignment a, std::size_t sessions,
                                        std::vector<blind::FamilyFlight>& flights) {
   flights.clear();
+  const std::size_t first = a.session;
   while (flights.size() < Family::kFlights) {
+    const std::size_t turn = flights.size() % sessions;
+    a.session = turn == 0 ? first : first + turn + 1;
     flights.push_back(family.fly(a, flights.size()));
+    flights.back().log.header.session = "session " + std::to_string(a.session);
     if (flights.back().crashed) return "flight " + std::to_string(flights.size()) + " " + flights.back().how;
   }
   return std::nullopt;
@@ -67,8 +72,8 @@ std::optional<std::string> fly_session(const Family& family, const blind::Assign
 }  // namespace
 
 FlownRobot fly_drawn(const Family& family, blind::Assignment a, std::uint64_t seed,
-                     const std::function<void(blind::Assignment&)>& prepare,
-                     std::optional<blind::Assignment> reference) {
+                     const std::function<void(blind::Assignment&)>& prepare, std::optional<blind::Assignment> reference,
+                     std::size_t sessions) {
   FlownRobot robot;
   for (; robot.draw < blind::kTries; ++robot.draw) {
     a.seed = seed_of_draw(seed, robot.draw);
@@ -76,10 +81,10 @@ FlownRobot fly_drawn(const Family& family, blind::Assignment a, std::uint64_t se
     std::optional<std::string> lost;
     if (reference) {
       reference->seed = a.seed;
-      lost = fly_session(family, *reference, robot.reference);
+      lost = fly_session(family, *reference, sessions, robot.reference);
       if (lost) *lost += " of the reference";
     }
-    if (!lost) lost = fly_session(family, a, robot.flights);
+    if (!lost) lost = fly_session(family, a, 1, robot.flights);
     if (!lost) {
       robot.assignment = std::move(a);
       return robot;

@@ -92,7 +92,8 @@ class Maker {
     try {
       fs::remove_all(case_folder(p));  // an interrupted run may have left a part of it
       io::make_folder(case_folder(p));
-      FlownRobot flown = fly_drawn(family_, a, p.seed, prepare, reference_of(p, command_.vehicle));
+      FlownRobot flown =
+          fly_drawn(family_, a, p.seed, prepare, reference_of(p, command_.vehicle), p.reference_sessions);
       for (std::size_t k = 0; k < p.references; ++k)
         flightlog::write_flight_log(case_folder(p) / (kReferenceFolder + std::to_string(k + 1)),
                                     flown.reference[k].log);

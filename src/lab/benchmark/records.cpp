@@ -135,6 +135,7 @@ Json to_json(const PlannedCase& p) {
           {"conventions", p.conventions},
           {"published", p.published},
           {"references", p.references},
+          {"reference_sessions", p.reference_sessions},
           {"flights", p.flights},
           {"calm_reference", p.calm_reference},
           {"withheld", p.withheld}};
@@ -161,6 +162,7 @@ Label label_from(const Json& json) {
   p.conventions = json.at("conventions");
   p.published = json.at("published");
   p.references = json.value("references", std::size_t{0});
+  p.reference_sessions = json.value("reference_sessions", std::size_t{1});
   p.flights = json.value("flights", blind::Family::kFlights);
   p.calm_reference = json.value("calm_reference", false);
   p.withheld = json.at("withheld").get<Names>();

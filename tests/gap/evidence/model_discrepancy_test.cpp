@@ -49,6 +49,27 @@ TEST(ModelDiscrepancy, SortsFunctionsByClass) {
   EXPECT_EQ(regimes_of(BasisFunction::drag_z), Regimes::velocity);
 }
 
+TEST(SessionVariation, TakesTheRobotsOwnSessionsForMoreTheMoreThereAre) {
+  SessionVariation s;
+  s.scale_sd = 1, s.own_scale_sd = 0.3, s.own_offset = 0.1, s.own_share = 0.5, s.block_freedom = 30;
+  EXPECT_EQ(s.first_scale(), 1);
+  EXPECT_EQ(s.sd_of_scale(), 1);
+  EXPECT_EQ(s.centre(0), 1);
+  s.own = OwnSessions{1e6, std::log(4) - 0.1, {900, 0}, {100, 0}};
+  EXPECT_NEAR(s.first_scale(), 4, 1e-3) << "the robot's own";
+  EXPECT_NEAR(s.sd_of_scale(), 0.3, 1e-4) << "sessions of one robot differ all the same";
+  // half of 900 and of 100 count
+  EXPECT_NEAR(s.freedom(0), 30 + 50, 1e-3);
+  EXPECT_NEAR(s.centre(0), std::sqrt((30 + 450) / 80.0), 1e-4);
+  EXPECT_EQ(s.centre(1), 1) << "nothing is known of this block";
+  EXPECT_EQ(s.freedom(1), 30);
+  // of two sessions, one contrast: precisions 1/(1 - 0.09) and 1/0.09; a further session against both varies less
+  s.own->count = 2;
+  const double precision = 1 / 0.91 + 1 / 0.09;
+  EXPECT_NEAR(s.log_scale(), (std::log(4) + 0.5 * std::log(0.75)) / (0.09 * precision), 1e-12);
+  EXPECT_NEAR(s.sd_of_scale(), std::sqrt(0.09 + 1 / precision), 1e-12);
+}
+
 TEST(ModelDiscrepancy, IsWrittenAsItIsRead) {
   const ModelDiscrepancy d = read_model_discrepancy();
   const std::string text = discrepancy_text(d, "somebody");

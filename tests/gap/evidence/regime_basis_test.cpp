@@ -80,6 +80,28 @@ TEST(RegimeBasis, HasFunctionsOfTheTestsAgain) {
   EXPECT_FALSE(basis_of(as_flights(made, 4)).of_tests(8)) << "nothing to compare with";
 }
 
+// A reference flight, put in the place of the tests, has each function a second time, and no offset.
+TEST(RegimeBasis, PutsReferencesInThePlaceOfTests) {
+  const auto made = synthetic_flights(4, synthetic_law);
+  const RegimeBasis basis = basis_of(as_flights(made, 2));
+  const Eigen::MatrixXd there = basis.values(1) * basis.without_offsets(true),
+                        stays = basis.values(1) * basis.without_offsets(false);
+  int again = 0;
+  while (!basis.of_tests(again)) ++again;
+  for (int i = 0; !basis.of_tests(i); ++i) {
+    if (basis.kind(i) == BasisFunction::flight) {
+      EXPECT_EQ(there.col(i).norm() + stays.col(i).norm(), 0) << basis.name(i);
+      continue;
+    }
+    EXPECT_EQ(there.col(i), basis.values(1).col(i)) << basis.name(i);
+    EXPECT_EQ(there.col(again), basis.values(1).col(i)) << basis.name(i);
+    EXPECT_EQ(stays.col(i), basis.values(1).col(i)) << basis.name(i);
+    EXPECT_EQ(stays.col(again), 0 * stays.col(i)) << basis.name(i);
+    ++again;
+  }
+  EXPECT_EQ(again, basis.size());
+}
+
 TEST(RegimeBasis, SaysWhatReferencesDoNotVisit) {
   const auto made = synthetic_flights(4, synthetic_law);
   EXPECT_TRUE(basis_of(as_flights(made, 2)).covers_all());

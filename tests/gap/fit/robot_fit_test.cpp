@@ -196,6 +196,42 @@ TEST(Contrast, TellsWhatAppearedFromWhatWasAlwaysOff) {
   EXPECT_LT(gain(0), 1);
 }
 
+// Everything changes a little from session to session: of one robot by 0.2 % of the signal, of another by ten times as
+// much. In the tests the vertical force changes with the velocity by 3 %: much for the one, and little for the other.
+TEST(Contrast, MeasuresAChangeByTheRobotsOwnSessions) {
+  const sim::Randomisation priors = synthetic_priors();
+  const auto look = [&](double scatter) {
+    auto made = synthetic_flights(5, synthetic_law);
+    std::mt19937_64 random(7);
+    std::normal_distribution<double> normal(0, scatter * SyntheticFlight::kSignal);
+    for (std::size_t f = 0; f < 5; ++f) {
+      made[f]->fly(Hypothesis(priors, {}).vehicle(Hypothesis(priors, {}).start()));
+      if (f == 4) break;  // of the session of flight 3
+      for (const int channel : {kSpecificForceX, kSpecificForceZ, kAngularAccelerationY})
+        for (const int coefficient : {0, 1})
+          for (const Eigen::VectorXd& v : {made[f]->velocity, made[f]->amplitude})
+            made[f]->add_measured(channel, coefficient, normal(random) * v);
+    }
+    for (std::size_t f = 3; f < 5; ++f)
+      made[f]->add_measured(kSpecificForceZ, 0, 0.03 * SyntheticFlight::kSignal * made[f]->velocity);
+    const Flights flights = as_flights(made, 3), references{flights.references, {}};
+    ModelDiscrepancy discrepancy = read_model_discrepancy();
+    discrepancy.session = read_session_variation();
+    const RobotFit robot(question_of(flights),
+                         RobotFit::of_references(question_of(references), references, priors, discrepancy, {}, 2),
+                         flights);
+    const SessionVariation& session = robot.evidence().discrepancy().session;
+    EXPECT_EQ(session.own.value().count, 3);
+    const ScaledEvidence held = robot.weigh(robot.no_effects(), robot.parameters(), robot.fitter().scales()),
+                         free = robot.weigh(robot.no_effects(), robot.parameters(), robot.fitter().scales(), 0);
+    return std::pair(session.log_scale(), free.posterior.log_evidence - held.posterior.log_evidence);
+  };
+  const auto calm = look(0.002), restless = look(0.02);
+  EXPECT_GT(restless.first, calm.first + 1.5) << "ten times, less what the prior of all robots holds back";
+  EXPECT_GT(calm.second, 10);
+  EXPECT_LT(restless.second, 0.5 * calm.second);
+}
+
 // Something acts along the velocity in the tests alone. Where references never moved, it may have acted before.
 TEST(Contrast, CallsUnknownOnlyWhatReferencesWouldHaveShown) {
   const sim::Randomisation priors = synthetic_priors();

@@ -1,0 +1,75 @@
+#include "gap/fit/own_sessions.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace flappy::gap {
+namespace {
+
+using Eigen::Index;
+
+/// Flights of each session of the references, [session][flight].
+std::vector<std::vector<char>> sessions_of(const Flights& flights) {
+  std::vector<std::vector<char>> sessions;
+  std::map<std::string, std::size_t> known;
+  for (std::size_t f = 0; f < flights.references.size(); ++f) {
+    const std::string name = flights[f]->session();
+    std::size_t at = sessions.size();
+    if (!name.empty()) at = known.try_emplace(name, at).first->second;
+    if (at == sessions.size()) sessions.emplace_back(flights.size(), 0);
+    sessions[at][f] = 1;
+  }
+  return sessions;
+}
+
+/// The columns of a contrast for one among references: those of changes between sessions act in the tests alone, all
+/// others in all flights.
+std::vector<BasisCoefficients> columns_among_references(const Fitter& fitter, const Regressors& regressors) {
+  std::vector<BasisCoefficients> columns;
+  for (std::size_t k = 0; k < regressors.columns.size(); ++k) {
+    const int effect = regressors.effects[k];
+    const bool between = effect >= 0 && fitter.effects()[static_cast<std::size_t>(effect)].starts_with(kSessionOf);
+    columns.push_back(*regressors.columns[k]);
+    for (int i = 0; i < fitter.evidence().basis().size(); ++i)
+      if (fitter.evidence().basis().of_tests(i) != between) columns.back().col(i).setZero();
+  }
+  return columns;
+}
+
+}  // namespace
+
+std::optional<OwnSessions> own_sessions(const Fitter& fitter, const Fit& parameters) {
+  const std::vector<std::vector<char>> sessions = sessions_of(fitter.flights());
+  if (sessions.size() < 2) return std::nullopt;
+  const Evidence& evidence = fitter.evidence();
+  Regressors regressors = fitter.unscaled_regressors(parameters);
+  const std::vector<BasisCoefficients> columns = columns_among_references(fitter, regressors);
+  for (std::size_t k = 0; k < columns.size(); ++k) regressors.columns[k] = &columns[k];
+  std::vector<char> use(fitter.flights().size(), 0);
+  std::fill_n(use.begin(), fitter.flights().references.size(), 1);
+
+  OwnSessions own{static_cast<double>(sessions.size()), 0, std::vector<double>(kBlocks, 0),
+                  std::vector<double>(kBlocks, 0)};
+  Scales start;
+  for (const std::vector<char>& tests : sessions) {
+    SufficientStatistics statistics = parameters.statistics;
+    const Evidence among = evidence.with_tests(tests, statistics);
+    const ScaledEvidence w = among.weigh(statistics, regressors, use, {}, start);
+    start = w.scales;
+    own.mean_log_scale += std::log(w.scales.session) / own.count;
+    for (int g = 0; g < kGroups; ++g)
+      for (int i = 0; i < evidence.basis().size(); ++i) {
+        if (!evidence.basis().of_tests(i) || w.squares(g, i) == 0) continue;  // no rows
+        const auto b = static_cast<std::size_t>(evidence.block_of(g, i));
+        const double variance = std::pow(w.scales.blocks[b], 2);
+        const double square = std::pow(w.delta(g, i), 2) * variance;
+        own.squares[b] += square / std::pow(w.scales.session, 2);
+        // how much of the prior variance the flights take away (MacKay, Neural Computation 4, 1992)
+        own.known[b] += 1 - std::min(1.0, (w.squares(g, i) - square) / variance);
+      }
+  }
+  return own;
+}
+
+}  // namespace flappy::gap
