@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "gap/answer/verdict.hpp"
+#include "gap/next/expected_nats.hpp"
 #include "gap/question/question.hpp"
 #include "gap/replay/reset_prediction.hpp"
 #include "io/config.hpp"
@@ -33,14 +33,7 @@ std::vector<Rival> rivals_of(const Question& question, const Inference& d, const
   return rivals;
 }
 
-/// Prediction of a simulated flight by a rival.
-struct Expected {
-  SufficientStatistics residual;
-  std::vector<BasisCoefficients> uncertain;  ///< [independent unknown] change for one standard deviation
-  BasisCoefficients law_sd;                  ///< standard deviation of the deviations of the laws of its effects
-};
-
-/// None if the simulation diverges. `first`: linearisation of the first rival with parameters; its columns serve all.
+/// Prediction of a simulated flight by a rival; none if the simulation diverges. `first`: linearisation of the first rival with parameters; its columns serve all.
 std::optional<Expected> expect(const Question& question, const Rival& rival, const Fitter& fitter,
                                std::optional<Fit>& first) {
   const bool with_parameters = rival.directions.reach.size() > 0;
@@ -63,28 +56,6 @@ std::optional<Expected> expect(const Question& question, const Rival& rival, con
     e.uncertain.emplace_back(std::sqrt(eigen.eigenvalues()[i]) * sum);
   }
   return e;
-}
-
-/// Expected evidence for a over b, if a is true.
-double nats(const Evidence& evidence, const Expected& a, const Expected& b) {
-  SufficientStatistics difference = b.residual;
-  for (std::size_t f = 0; f < difference.sums.size(); ++f)
-    for (std::size_t g = 0; g < difference.sums[f].size(); ++g) difference.sums[f][g] -= a.residual.sums[f][g];
-  std::vector<const BasisCoefficients*> columns;
-  std::vector<int> chosen;
-  for (const BasisCoefficients& column : b.uncertain) {
-    chosen.push_back(static_cast<int>(columns.size()));
-    columns.push_back(&column);
-  }
-  const BasisCoefficients sd =
-      (evidence.discrepancy_sd({}).array().square() + a.law_sd.array().square() + b.law_sd.array().square()).sqrt();
-  const std::vector<char> all(difference.sums.size(), 1);
-  Reduced reduced = evidence.reduce(difference, columns, all, sd);
-  const VectorXd prior_mean = VectorXd::Zero(static_cast<Index>(columns.size()));
-  const double with = Evidence::posterior(reduced, chosen, prior_mean).log_evidence;
-  reduced.sums.rightCols(1).setZero();
-  reduced.sums.bottomRows(1).setZero();
-  return Evidence::posterior(reduced, chosen, prior_mean).log_evidence - with;
 }
 
 /// Predictions of rivals left open: the residual of the most probable rival plus the change by their magnitudes. They
@@ -169,8 +140,8 @@ std::vector<Course> courses_of(const std::vector<std::vector<double>>& first,
   return courses;
 }
 
-std::optional<NextExperiment> expected_information(const Question& question, const Manoeuvre& m,
-                                                   const std::vector<Rival>& rivals, const NextOptions& options) {
+std::optional<NextExperiment> weighed(const Question& question, const Manoeuvre& m, const std::vector<Rival>& rivals,
+                                      const NextOptions& options) {
   const auto fly = [&](const Rival& r) {
     return std::move(simulate(m.config, r.vehicle().vehicle, 1, m.config.settle_s)[0]);
   };
@@ -191,25 +162,23 @@ std::optional<NextExperiment> expected_information(const Question& question, con
     if (i < 2 || !rivals[i].open) expected[i] = expect(question, rivals[i], fitter, first);
   if (!expected[0] || !expected[1]) return {};
   add_open(rivals, flights, evidence, expected);
+  const auto nats = [&](std::size_t a, std::size_t b) { return expected_nats(evidence, *expected[a], *expected[b]); };
+  std::vector<std::size_t> flyable;
   double all = 0;
   for (std::size_t i = 0; i < rivals.size(); ++i)
-    if (expected[i]) all += rivals[i].probability;
-  const auto information = [&](std::size_t a, double brought) {
-    const double p = rivals[a].probability / all;
-    return -p * std::log(p + (1 - p) * tempered(std::max(0.0, brought), options.rule));
-  };
+    if (expected[i]) flyable.push_back(i), all += rivals[i].probability;
+  std::vector<double> probability, over_strongest;
   NextExperiment result{m.name, in_words(m.config.changes), m.cost, {}, 0, 0, kCourseStep_s, {}};
   std::size_t other = 1;
   double most = -1;
-  for (std::size_t a = 1; a < rivals.size(); ++a) {
-    if (!expected[a]) continue;
-    const double own = information(a, nats(evidence, *expected[a], *expected[0]));
-    result.information += own;
-    if (own > most) most = own, other = a;
+  for (const std::size_t a : flyable) {
+    probability.push_back(rivals[a].probability / all);
+    over_strongest.push_back(a == 0 ? nats(0, 1) : nats(a, 0));
+    const double own = expected_information({probability.back()}, {over_strongest.back()}, options.rule);
+    if (a > 0 && own > most) most = own, other = a;
   }
-  result.information += information(0, nats(evidence, *expected[0], *expected[1]));
-  result.expected_nats =
-      0.5 * (nats(evidence, *expected[0], *expected[other]) + nats(evidence, *expected[other], *expected[0]));
+  result.information = expected_information(probability, over_strongest, options.rule);
+  result.expected_nats = 0.5 * (nats(0, other) + nats(other, 0));
   result.separates = {rivals[0].name, rivals[other].name};
   if (other >= flown.size()) flown.push_back(fly(rivals[other]));
   if (const auto& log = flown[std::min(other, flown.size() - 1)].log)
@@ -261,7 +230,7 @@ std::vector<NextExperiment> rank_experiments(const Inference& inference, const s
   if (rivals.size() < 2) return {};
   std::vector<std::optional<NextExperiment>> found(manoeuvres.size());
   io::parallel_for(manoeuvres.size(), options.threads,
-                   [&](std::size_t i) { found[i] = expected_information(question, manoeuvres[i], rivals, options); });
+                   [&](std::size_t i) { found[i] = weighed(question, manoeuvres[i], rivals, options); });
   std::vector<NextExperiment> list;
   for (std::optional<NextExperiment>& e : found)
     if (e) list.push_back(std::move(*e));

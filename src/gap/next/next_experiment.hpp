@@ -1,17 +1,13 @@
 // The next flight: the manoeuvre that best tells apart the rivals, the hypotheses that are still probable.
 //
-// The most probable vehicle flies each manoeuvre in our simulator; each rival predicts the log. With Delta the
-// difference of the predictions of rivals A and B as fitted so far, the expected evidence for A over B, if A is true,
-// is
+// The most probable vehicle flies each manoeuvre in our simulator; each rival predicts the log as fitted so far. What the
+// flight would bring follows from how their predictions differ (expected_nats.hpp):
 //   nats(A, B) = 1/2 Delta^T K^-1 Delta      K: covariance of noise, model discrepancy (evidence.hpp), deviations of
 //                                            the laws of their effects, and what is still uncertain of B
 // So B may adapt to the new flight as far as the flights so far allow. The correlation of its errors in old and new
-// flights is neglected: a lower bound. For an effect left open, the magnitude is the root mean square of its posterior.
-// With N_A the nats of A over the most probable rival (for that one: over the next) and D(N) the tempered factor on a
-// rival N nats behind (verdict.hpp), the probability p of a true A becomes p / (p + (1 - p) D(N_A)). The expected
-// information,
-//   I = - sum over A of p_A log(p_A + (1 - p_A) D(N_A)),
-// is at most the entropy now: separating many rivals a little beats separating one well.
+// flights is neglected, which makes the nats small. For an effect left open, the magnitude is the root mean square of
+// its posterior. The strongest rival is the most probable one (for that one: the next). The manoeuvre of the largest
+// expected information is proposed.
 //
 // In a contrast the new flight is a further test flight. All rivals have the parameters of the reference, so they
 // differ by their effects alone. The references stay among the flights: in the regimes that they visit, the model

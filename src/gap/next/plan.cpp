@@ -5,7 +5,7 @@
 
 #include "flappy/vehicle_file.hpp"
 #include "flightlog/check/data_faults.hpp"
-#include "gap/answer/verdict.hpp"
+#include "gap/next/expected_nats.hpp"
 #include "gap/next/next_experiment.hpp"
 #include "gap/next/separation.hpp"
 #include "gap/question/question.hpp"
@@ -211,7 +211,7 @@ class Planner {
       }
       for (std::size_t r = 0; r < plan.rivals.size(); ++r) {
         p.nats.push_back(s.nats(static_cast<Index>(i), static_cast<Index>(r)));
-        if (plan.rivals[r] != p.effect && tempered(std::max(0.0, p.nats.back()), rule) > (1 - kSure) / kSure)
+        if (plan.rivals[r] != p.effect && kept_odds(p.nats.back(), rule) > (1 - kSure) / kSure)
           p.alike.push_back(plan.rivals[r]);
       }
       plan.effects.push_back(std::move(p));

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "gap/answer/verdict.hpp"
+#include "gap/next/expected_nats.hpp"
 #include "io/parallel.hpp"
 #include "model/effects/registry.hpp"
 
@@ -88,10 +89,11 @@ class Separator {
     const auto n = static_cast<Index>(rivals_.size());
     for (std::size_t t = 0; t < gains.size(); ++t) {
       if (!gains[t]) continue;
-      const double own = (*gains[t])[asked_[t].rival];
+      VectorXd over_parameters(n + 1);
+      over_parameters << *gains[t], 0;
       s.effects.emplace_back(asked_[t].effect->info.id);
       s.nats.conservativeResize(s.nats.rows() + 1, n + 1);
-      s.nats.bottomRows(1) << (own - gains[t]->array()).matrix().transpose(), own;
+      s.nats.bottomRows(1) = expected_nats(over_parameters, asked_[t].rival).transpose();
       s.probability.push_back(probability_of(asked_[t].rival, rivals_, *gains[t], rule_));
       s.sure_from.push_back(from[t]);
     }

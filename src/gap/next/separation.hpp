@@ -2,7 +2,7 @@
 // the magnitudes of its effect, parameters, errors of sensors, model discrepancy and noise integrated out
 // (gap/evidence/evidence.hpp), gains over the parameters alone
 //   G_R(c) = log p(c | R) - log p(c | parameters)
-// as screening finds it (gap/fit/screening.hpp). The expected evidence for T over R is
+// as screening finds it (gap/fit/screening.hpp), and expected_nats.hpp makes of it the expected evidence for T over R,
 //   nats(T, R) = G_T(c) - G_R(c).
 // The discrepancy includes how far the robot's law of T deviates from the catalogue's. What noise adds on average, at
 // most half a nat for each magnitude, is left out.
