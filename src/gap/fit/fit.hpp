@@ -1,5 +1,19 @@
 // Finds the most probable unknowns of a hypothesis by Gauss-Newton on whole flights. Derivatives are differences
 // between vehicles that are simulated together, as lanes of a batch.
+//
+// Coordinates are those of a hypothesis (hypothesis.hpp), in prior standard deviations: [0, shared()) are the parameters
+// and the lag of the sensors, then come the unknowns of its effects. Evidence is in nats.
+//
+//   function     parameters  effects    who calls it, and when
+//   linearise    stay        stay       all fits, for columns at a point; the next experiment, for what rivals predict
+//   fit          move        move       RobotFit, for the robot's parameters; Alone, once more for the corrected vehicle
+//   refit        move        move       RobotFit, once noise, scales or nuisance regressors are known better
+//   fit_linear   linear      linear     EffectFits, for effects that screening found too little of to simulate
+//   fit_effects  linear      move       Question::fit_set of Alone and Contrast, for sets of effects; learn_discrepancy
+//   fit_given    move        move       Question::refit_jointly of Alone, for the best effects; every set of BeatAveraged
+//   joint_fit    linear      linear     after one of these: flights held out, the corrected vehicle, changes of sessions
+//
+// "linear": it gets a posterior by the columns, and nothing is simulated there.
 #pragma once
 
 #include <map>
@@ -11,7 +25,7 @@
 
 namespace flappy::gap {
 
-/// Orthonormal directions through the coordinates of a hypothesis.
+/// Orthonormal directions through the coordinates of a hypothesis, in prior standard deviations.
 struct Directions {
   Eigen::MatrixXd axes;   ///< [coordinate][direction]
   Eigen::VectorXd reach;  ///< [direction] half the step of the difference
@@ -19,16 +33,16 @@ struct Directions {
 
 /// A hypothesis linearised at given coordinates, and its posterior there.
 struct Fit {
-  Eigen::VectorXd at;
+  Eigen::VectorXd at;  ///< [coordinate]
   Directions directions;
-  Residuals residual;               ///< empty: not simulated, or the simulation diverged
+  Residuals residual;               ///< [flight] measured less predicted at `at`; empty: not simulated, or it diverged
   SufficientStatistics statistics;  ///< statistics of the residual, averaged over points around `at`
-  /// [direction] change of the prediction per unit along it; empty if the simulation diverges there.
+  /// [direction][group][basis] change of the prediction per unit along it; empty if the simulation diverges there.
   std::vector<BasisCoefficients> columns;
   double law_factor = 1;  ///< by how much the laws of its effects may deviate from the catalogue's (Fitter::law_sd)
-  Posterior posterior;    ///< along the directions, relative to `at`
+  Posterior posterior;    ///< [direction], relative to `at`; its log evidence is with the fitter's scales, in nats
   bool flown() const { return !residual.empty(); }
-  /// Posterior mean and covariance of the coordinates.
+  /// Posterior mean, [coordinate], and covariance of the coordinates.
   Eigen::VectorXd mean() const;
   Eigen::MatrixXd covariance() const;
 };
@@ -50,7 +64,7 @@ struct Background {
 /// Fits hypotheses, given evidence, nuisance regressors and scales. Immutable: with_... return a changed copy.
 class Fitter {
  public:
-  /// Columns of magnitudes by [effect, name].
+  /// Columns of magnitudes, change per prior standard deviation, by [effect, name].
   using LinearMagnitudes = std::map<std::pair<std::string, std::string>, BasisCoefficients>;
 
   /// Without nuisance regressors; scales are 1. Keeps references to `rules` and `flights`.
@@ -99,16 +113,17 @@ class Fitter {
 
   /// Posterior along all directions of a fit, from some flights alone. `use`: [flight] whether it counts.
   Posterior posterior(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
-  /// The most probable coordinates from some flights alone, and the part of the residual that nuisances then explain.
+  /// After a fit, by its columns: the most probable coordinates from some flights alone, and the part of the residual
+  /// that nuisances then explain. Of all flights for the corrected vehicle and, in a contrast, for what changed.
   struct JointFit {
-    Eigen::VectorXd at;
-    BasisCoefficients nuisances;
+    Eigen::VectorXd at;               ///< [coordinate] within the accepted ranges
+    BasisCoefficients nuisances;      ///< [group][basis]
     std::vector<NuisanceMean> means;  ///< left out: regressors that the flights have no information on
   };
   JointFit joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
-  /// The part of a fit's residual that everything explains by linear columns, learnt from some flights alone: in a
+  /// [group][basis] The part of a fit's residual that everything explains by linear columns, learnt from some flights alone: in a
   /// contrast, changes of the parameters, and what the model gets wrong in both sessions or sessions differ by. Effects
-  /// follow the laws of the catalogue.
+  /// follow the laws of the catalogue. Contrast predicts flights held out with it.
   BasisCoefficients explained(const Fit& fit, const std::vector<char>& use) const;
   /// Standard deviation, [group][basis], of the deviations of effects from the catalogue's laws.
   BasisCoefficients law_sd(const Hypothesis& hypothesis, const Fit& fit) const {
@@ -124,21 +139,27 @@ class Fitter {
   /// That of the model, with the fitter's scales, and of the laws of the effects.
   BasisCoefficients discrepancy_sd(const Hypothesis& hypothesis, const Fit& fit) const;
 
-  /// A fit without a posterior. `known`: columns of the first directions, which are not simulated again.
+  /// A fit without a posterior: simulates `at`, and both sides of each direction. No directions: only the residual.
+  /// `known`: columns of the first directions, which are not simulated again. Not flown() if `at` diverges.
   Fit linearise(const Hypothesis& hypothesis, const Eigen::VectorXd& at, Directions directions,
                 const std::vector<BasisCoefficients>& known = {}) const;
+  /// One direction for each coordinate, with the reach of first differences.
   static Directions axes(const Hypothesis& hypothesis);
-  /// At most `max_iterations` iterations from `start` on. Not flown() if the simulation diverges at the start.
+  /// Where nothing is known yet. At most `max_iterations` iterations from `start` on, [coordinate]; 0 or 1: no step,
+  /// only a posterior there. Not flown() if the simulation diverges at the start.
   Fit fit(const Hypothesis& hypothesis, Eigen::VectorXd start, int max_iterations) const;
-  /// As fit(), with the directions and columns of another fit for the parameters.
+  /// As fit(), with the directions and columns of the parameters' own fit, `parameters`, of a hypothesis without effects:
+  /// so only the effects' columns are simulated, and fits of all effects are compared with the same others.
   Fit fit_given(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters,
                 int max_iterations) const;
-  /// Fits the effects alone, so that all effects are compared with the same columns of the parameters.
+  /// Moves the effects alone, a few steps; the parameters stay at `parameters`, and answer by its columns in the
+  /// posterior. The cheapest fit by simulation: every set of effects gets one.
   Fit fit_effects(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters) const;
-  /// Continues another fit, along its directions.
+  /// Continues another fit, from its point and residual on, with the evidence and nuisances of now. New columns go
+  /// along the principal axes of the posterior so far.
   Fit refit(const Hypothesis& hypothesis, const Fit& before, int max_iterations) const;
-  /// A linear fit without a residual, around the magnitudes of the vehicle file. `effects`: columns of the unknowns of
-  /// the effects; an unknown with an empty column is not fitted.
+  /// Without a simulation, so without a residual: a posterior around the magnitudes of the vehicle file. `effects`:
+  /// [unknown of the effects] its column, of screening; an unknown with an empty column is not fitted.
   Fit fit_linear(const Hypothesis& hypothesis, const Fit& parameters,
                  const std::vector<BasisCoefficients>& effects) const;
 
