@@ -1,3 +1,5 @@
+// flappy-gap diagnose: a diagnosis (diagnose.hpp) with its progress line, its files and its summary. The program, which
+// jobs of the server run, and the Python module call it; the blind benchmark calls diagnose() itself.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -8,8 +10,8 @@ namespace flappy::gap {
 
 struct DiagnoseCommand {
   DiagnosisSettings settings;  ///< a withheld effect withholds its whole group
-  std::string out;             ///< folder for all files; empty: no files are written
-  bool quiet = false;          ///< prints nothing
+  std::string out;             ///< folder for diagnosis.json and vehicle_corrected.toml; empty: no files are written
+  bool quiet = false;          ///< prints no summary
 };
 
 /// Diagnoses, writes the files and returns the content of diagnosis.json. After Ctrl-C it is incomplete, or lacks the

@@ -81,7 +81,7 @@ struct Regressors {
   void add(const BasisCoefficients& column, double prior_mean, int effect = -1, ScalePrior prior = {});
 };
 
-/// Sums over the whitened rows of a group, basis x residual: [flight][group].
+/// Sums over the whitened rows of a group, basis x residual: [flight][group], each [basis].
 struct SufficientStatistics {
   std::vector<std::vector<Eigen::VectorXd>> sums;
 };
@@ -92,7 +92,8 @@ struct Reduced {
   double log_scale = 0;  ///< contribution of delta to the log evidence: minus half the log determinant of its precision
 };
 
-// Rows, groups and blocks. A row is one number of one flight; delta has a coefficient for each group and function:
+// Rows, groups and blocks. A row is one number of one flight, Rows[beat][channel][coefficient]; its group is the column
+// that it stands in; delta has a coefficient for each group and function:
 //
 //               channel         angular_acceleration_x  ..._y           ...   rotate_z
 //               coefficient     mean cos1 sin1 ... sin4  mean cos1 ...         mean ... sin4
@@ -102,11 +103,13 @@ struct Reduced {
 //               ...             |    |    |        |
 //                               group 0, 1, 2, ... 8     9, 10, ...            ... kGroups - 1
 //
-//   delta                       group: mean   cos1  sin1   cos2  sin2 ...
-//     function 1        always       [ a ]    [ b     b ]  [ c     c ]        a block is a box: one channel, one harmonic,
-//     function flap     inputs       [ d ]    [ e     e ]  [ f     f ]        one class of functions. Its coefficients
-//     function stroke   inputs       [ d ]    [ e     e ]  [ f     f ]        share a scale. In a contrast each class
-//     function velocity velocity     [ g ]    [ h     h ]  [ i     i ]        comes again, for what differs in the tests.
+//   delta, [group][basis]:      one channel
+//     function     class        mean     cos1  sin1   cos2  sin2  ...
+//     1            always       [ a ]    [ b     b ]  [ c     c ]     a block is a letter: one channel, one harmonic, one
+//     amplitude    inputs       [ d ]    [ e     e ]  [ f     f ]     class of functions. Its coefficients share a scale.
+//     bias         inputs       [ d ]    [ e     e ]  [ f     f ]     In a contrast each class comes again, for what
+//     velocity_x   velocity     [ g ]    [ h     h ]  [ i     i ]     differs in the tests: kClasses.
+//     height       place        [ j ]    [ k     k ]  [ l     l ]
 //
 /// Classes of functions whose coefficients share a scale: Regimes, and again for those of the test flights.
 inline constexpr int kRegimes = static_cast<int>(Regimes::count), kClasses = 2 * kRegimes;

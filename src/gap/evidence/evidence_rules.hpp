@@ -1,4 +1,5 @@
-// What a question changes in the statistics of residuals. The questions are in gap/question/.
+// What a question changes in the statistics of residuals. The questions are in gap/question/: FitRules derives from this
+// class (gap/fit/fit_rules.hpp), Question from that. Evidence and RegimeBasis call it.
 #pragma once
 
 #include <functional>
@@ -15,13 +16,15 @@ struct Scales;
 class EvidenceRules {
  public:
   virtual ~EvidenceRules() = default;
-  /// Flights that have an offset of their own in the regime basis.
+  /// Indices of the flights that have an offset of their own in the regime basis.
   virtual std::vector<std::size_t> offsets(const Flights& flights) const = 0;
-  /// Flights for which all functions but offsets follow a second time, as what differs in them; none: no flights.
+  /// Indices of the flights for which all functions but offsets follow a second time, as what differs in them: the tests
+  /// of a contrast; else none.
   virtual std::vector<std::size_t> apart(const Flights& flights) const = 0;
   /// Whether an excess of a block over its prior is a sign of an unknown cause.
   virtual bool may_be_free(std::size_t block, const RegimeBasis& basis, const ModelDiscrepancy& discrepancy) const = 0;
-  /// Scales from which expectation-maximisation starts. `log_evidence`: of scales.
+  /// Scales from which expectation-maximisation starts. `given`: those that it would start from; `log_evidence`: of any
+  /// scales, in nats.
   virtual Scales first_scales(const Scales& given, const std::function<double(const Scales&)>& log_evidence) const = 0;
   /// How often an iteration maximises blocks and the centres of their scales in turn, at most.
   virtual int max_passes() const = 0;

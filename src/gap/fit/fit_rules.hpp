@@ -1,4 +1,4 @@
-// What a question changes in fits of vehicles. The questions are in gap/question/.
+// What a question changes in fits of vehicles. The questions are in gap/question/; Fitter and RobotFit call this.
 #pragma once
 
 #include <Eigen/Dense>
@@ -17,25 +17,27 @@ struct Fit;
 class Fitter;
 class RobotFit;
 
-/// Prior of the law factor: standard deviation of its log, and its largest value.
+/// Prior of the law factor (Fit::law_factor): standard deviation of its log, and its largest value.
 struct LawPrior {
   double spread, most;
 };
 
 class FitRules : public EvidenceRules {
  public:
-  /// Least gain of evidence for which a fit takes another step.
+  /// Smallest gain of evidence, in nats, for which a fit takes another step.
   virtual double min_step_nats() const = 0;
   /// Whether the law of an effect may deviate from the catalogue's in what this magnitude changes.
   virtual bool law_may_deviate(const Unknown& magnitude) const = 0;
   /// Standard deviation, [group][basis], of the deviations of an effect's law. `change`: what the effect adds.
   virtual BasisCoefficients law_sd(const Evidence& evidence, const std::string& effect, const BasisCoefficients& change,
                                    double law_factor) const = 0;
+  /// Prior by which a law factor above 1 is weighed.
   virtual LawPrior law_prior(const ModelDiscrepancy& discrepancy) const = 0;
   /// Standard deviation, [group][basis], of the discrepancy in a fit of the effects alone.
   virtual BasisCoefficients effects_discrepancy_sd(const Fitter& fitter, const Hypothesis& hypothesis,
                                                    const Fit& fit) const = 0;
-  /// Where a fit of the effects alone goes next. `there`: where its linear model goes; `sd`: effects_discrepancy_sd.
+  /// Coordinates to which a fit of the effects alone goes next. `there`: where its linear model goes; `sd`:
+  /// effects_discrepancy_sd.
   virtual Eigen::VectorXd next_effects(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit,
                                        const Eigen::VectorXd& there, const BasisCoefficients& sd) const = 0;
   /// Priors of background magnitudes, about which magnitudes and shapes are also simulated; null: about none.

@@ -44,7 +44,8 @@ class Hypothesis {
   const std::vector<std::string>& effects() const { return effects_; }
   const std::vector<Unknown>& unknowns() const { return unknowns_; }
   Eigen::Index size() const { return static_cast<Eigen::Index>(unknowns_.size()); }
-  /// Unknowns: the vehicle's parameters, the same for every hypothesis; the lag of the sensors; those of the effects.
+  /// Unknowns: the vehicle's parameters, the same for every hypothesis; the lag of the sensors (of a beat-averaged vehicle
+  /// the delay of the command); those of the effects, [shared(), size()).
   Eigen::Index parameters() const { return static_cast<Eigen::Index>(uncertain_->majors()); }
   Eigen::Index lag() const { return parameters(); }
   Eigen::Index shared() const { return parameters() + 1; }
@@ -53,10 +54,11 @@ class Hypothesis {
   /// Coordinates of a vehicle. Effects that it lacks have magnitudes of 0, and shape parameters in mid-prior.
   Eigen::VectorXd start(const model::Vehicle& vehicle) const;
   Eigen::VectorXd start() const { return start(uncertain_->nominal()); }
-  /// The nearest coordinates within the accepted ranges.
+  /// The nearest coordinates within the accepted ranges; of a parameter, within a few prior standard deviations.
   Eigen::VectorXd bounded(Eigen::VectorXd coordinates) const;
 
-  /// `minor`: a minor draw, and by how many standard deviations it is moved.
+  /// The vehicle at these coordinates, as replay takes it. `minor`: index of a minor draw, and by how many standard
+  /// deviations it is moved.
   VehicleHypothesis vehicle(const Eigen::VectorXd& coordinates,
                             std::optional<std::pair<std::size_t, double>> minor = {}) const;
 

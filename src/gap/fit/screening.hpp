@@ -1,4 +1,6 @@
-// Screening: the evidence that each effect of the catalogue would gain jointly with a fit, by linear models.
+// Screening: the evidence that each effect of the catalogue would gain jointly with a fit, by linear models. It finds which
+// effects are worth a fit by simulation (answer/effect_fits.cpp), and what a plan expects (next/separation.cpp). Nothing
+// is simulated but magnitude_steps(), once for each robot (RobotFit).
 #pragma once
 
 #include "gap/fit/fit.hpp"
@@ -26,8 +28,8 @@ inline constexpr double kMagnitudeReach = 0.4;
 /// Effects whose change is at most this are not seen. Choice: less is rounding.
 inline constexpr double kNoChange = 1e-9;
 
-/// Steps for each effect but `withheld`, with shape parameters in mid-prior. `background`: reach of near steps; null: no
-/// near and no shaped steps.
+/// Steps for each effect but `withheld`, with shape parameters in mid-prior. `at`: [coordinate] parameters of the robot,
+/// [0, shared()). `background`: reach of near steps; null: no near and no shaped steps.
 std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, const Eigen::VectorXd& at,
                                            const std::vector<std::string>& withheld,
                                            const ModelDiscrepancy* background = nullptr);
@@ -45,10 +47,11 @@ struct MagnitudeColumn : Magnitude {
   std::vector<Large> large;
 };
 
+/// An effect with its magnitudes at their most probable values, shape parameters in mid-prior.
 struct ScreenedEffect {
   std::string effect;
-  double gain = 0;              ///< gain of evidence, nats
-  Eigen::VectorXd coordinates;  ///< most probable coordinates of its unknowns
+  double gain = 0;  ///< log evidence with the effect less that of the fit alone, nats; no penalty for chance
+  Eigen::VectorXd coordinates;  ///< [unknown of the effect]
 };
 
 /// Screens each effect that has columns; the largest gain first. The columns of one effect have to be consecutive.

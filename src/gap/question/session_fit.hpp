@@ -7,16 +7,17 @@
 
 namespace flappy::gap {
 
+/// The effect that may act by one of its magnitudes alone: each is of one actuator.
 inline constexpr const char* kActuatorLoss = "actuator_loss";
 
-/// Test flights as one session.
+/// Test flights as one session. Quantities are those of gap/session/quantities.hpp.
 class TestSession {
  public:
   /// Keeps references. `robot`: that of the references.
   TestSession(const FlightList& tests, const std::vector<FlightQuantities>& quantities, const SessionDensity& density,
               const SessionPrior& prior, const VehicleHypothesis& robot);
   const SessionDensity& density() const { return density_; }
-  /// [quantity] Variance that is added to the noise of the inputs if a damaged actuator shakes.
+  /// [quantity] Variance that is added to the noise of the inputs if a damaged actuator shakes; 0 of other quantities.
   const Eigen::VectorXd& noise_variance() const { return noise_variance_; }
   /// [vehicle][quantity] What vehicles would have shown less what the robot of the references would.
   std::vector<Eigen::VectorXd> shifts(const std::vector<VehicleHypothesis>& vehicles) const;
@@ -31,18 +32,19 @@ class TestSession {
 };
 
 struct EffectFit {
-  Eigen::VectorXd at;                                           ///< all coordinates of the hypothesis
-  Eigen::MatrixXd covariance;                                   ///< of all coordinates
+  Eigen::VectorXd at;          ///< all coordinates of the hypothesis
+  Eigen::MatrixXd covariance;  ///< of all coordinates; 0 for those that were not fitted
   double explained = -std::numeric_limits<double>::infinity();  ///< log evidence
   std::vector<Eigen::Index> free;                               ///< coordinates that were fitted
 };
 
-/// The evidence of all ways in which the effects of `h` may act, which are equally probable, and the most probable one.
+/// The mean evidence of all ways in which the effects of `h` may act, which are equally probable, and the fit of the most
+/// probable one.
 /// `robot`: coordinates of the references' parameters. `first`: a fit of the effects before the last; null: there are
 /// none. An actuator that lost a part of its thrust may shake, or not.
 EffectFit fit_each_way(const TestSession& tests, const Hypothesis& h, const Eigen::VectorXd& robot,
                        const EffectFit* first);
-/// Whether an effect of the size that its prior allows changes what the flights show.
+/// Whether a magnitude of one prior standard deviation changes a quantity by a tenth of what sessions differ by, or more.
 bool shows(const TestSession& tests, const Hypothesis& h, const Eigen::VectorXd& robot);
 /// Logarithm of the sum of exponentials.
 double log_sum(const std::vector<double>& values);

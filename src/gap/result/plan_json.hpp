@@ -12,7 +12,8 @@ inline constexpr const char* kPlanFile = "plan.json";
 inline constexpr const char* kMatrixFile = "matrix.csv";
 
 nlohmann::ordered_json to_json(const Plan& plan);
-/// A row for each effect, a column for each rival, nats.
+/// A row for each effect, a column for each rival: expected nats, with one digit. The cell of an effect over itself is
+/// empty.
 std::string matrix_csv(const Plan& plan);
 
 }  // namespace flappy::gap

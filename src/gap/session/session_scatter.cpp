@@ -37,7 +37,6 @@ SessionPrior read_session_prior(const std::filesystem::path& path) {
   return p;
 }
 
-/// Prior probability of `b` besides `a`. `effects`: number of effects that may be.
 double SessionPrior::further(const std::string& a, const std::string& b, std::size_t effects) const {
   const auto at = together.find(std::min(a, b) + "_" + std::max(a, b));
   return at != together.end() ? at->second : further_effect / static_cast<double>(effects);

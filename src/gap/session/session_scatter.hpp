@@ -16,14 +16,18 @@ namespace flappy::gap {
 /// What is believed before the robot's own sessions are seen: configs/gap/beat_averaged/session_scatter.toml.
 struct SessionPrior {
   struct Block {
-    double scatter, unknown, leak;
+    double scatter;  ///< s_0, in units of the quantity, before the noise of its flights
+    double unknown;  ///< standard deviation of what a cause does that is not in the catalogue
+    double leak;     ///< probability that a quantity changes by as much where another one does
   };
   std::map<std::string, Block> blocks;  ///< by SessionQuantity::block
   double freedom = 0;                   ///< for how many sessions of the robot it counts
   double most_freedom = 0;              ///< of the robot's own sessions and the prior together
-  double share_of_noise = 0;            ///< by which flights differ besides
+  double share_of_noise = 0;            ///< share of a flight's noise that s_0 has besides
+  /// Prior probabilities of what may have happened, of sum 1; and of a second effect, all of them together.
   double unchanged = 0, effect = 0, unknown = 0, further_effect = 0;
   std::map<std::string, double> together;  ///< in place of further_effect, by two effects in the order of their names
+  /// Prior probability of `b` besides `a`. `effects`: number of effects that may be.
   double further(const std::string& a, const std::string& b, std::size_t effects) const;
   const Block& of(const SessionQuantity& quantity) const { return blocks.at(quantity.block); }
 };
@@ -35,12 +39,13 @@ struct SessionValues {
   Eigen::MatrixXd values, variances;  ///< [session][quantity]
 };
 
-/// [flight][quantity] Share of each flight in the values of all together.
+/// [flight][quantity] Share of each flight in the values of all together; they add up to 1.
 Eigen::MatrixXd flight_shares(const std::vector<FlightQuantities>& flights, const SessionPrior& prior);
 /// `of`: [flight] number of its session, from 0 on.
 SessionValues session_values(const std::vector<FlightQuantities>& flights, const std::vector<int>& of,
                              const SessionPrior& prior);
 
+/// m and s^2 of the equations above.
 class SessionScatter {
  public:
   SessionScatter(const std::vector<SessionQuantity>& quantities, const SessionValues& references,
@@ -60,7 +65,7 @@ class SessionScatter {
   double freedom_;
 };
 
-/// Log density of quantities of a further session.
+/// Log density of quantities of a further session: a sum over blocks, each of them Student's t.
 class SessionDensity {
  public:
   /// `values`, `variances`: of the session.
