@@ -1,7 +1,7 @@
 // The whole of a diagnosis, from flights to the probabilities of all hypotheses. In this order: the robot's parameters
-// (RobotFit); evidence without effects; screening of the catalogue; single effects, then sets and remainders (EffectFits);
-// flights held out; verdict (verdict.hpp); corrected vehicle. What each step does differently in a contrast or of a
-// beat-averaged vehicle is the Question's (gap/question/).
+// (RobotFit); evidence without effects; screening of the catalogue; single effects, then sets and remainders
+// (EffectFits); flights held out; verdict (verdict.hpp); corrected vehicle. What each step does differently in a
+// contrast or of a beat-averaged vehicle is the Question's (gap/question/).
 #pragma once
 
 #include "gap/question/inferred.hpp"
@@ -9,8 +9,8 @@
 namespace flappy::gap {
 
 /// Diagnoses the flights of one robot. After a stop it decides among the hypotheses fitted by then.
-/// `uncertain`: the vehicle file with the priors of its parameters. `reference`: the fit of its references; null: there are
-/// none.
+/// `uncertain`: the vehicle file with the priors of its parameters. `reference`: the fit of its references; null: there
+/// are none.
 Inference infer(const Flights& flights, const sim::Randomisation& uncertain, InferenceOptions options,
                 const ReferenceFit* reference = nullptr);
 

@@ -105,10 +105,10 @@ struct Reduced {
 //
 //   delta, [group][basis]:      one channel
 //     function     class        mean     cos1  sin1   cos2  sin2  ...
-//     1            always       [ a ]    [ b     b ]  [ c     c ]     a block is a letter: one channel, one harmonic, one
-//     amplitude    inputs       [ d ]    [ e     e ]  [ f     f ]     class of functions. Its coefficients share a scale.
-//     bias         inputs       [ d ]    [ e     e ]  [ f     f ]     In a contrast each class comes again, for what
-//     velocity_x   velocity     [ g ]    [ h     h ]  [ i     i ]     differs in the tests: kClasses.
+//     1            always       [ a ]    [ b     b ]  [ c     c ]     a block is a letter: one channel, one harmonic,
+//     amplitude    inputs       [ d ]    [ e     e ]  [ f     f ]     one class of functions. Its coefficients share a
+//     bias         inputs       [ d ]    [ e     e ]  [ f     f ]     scale. In a contrast each class comes again, for
+//     velocity_x   velocity     [ g ]    [ h     h ]  [ i     i ]     what differs in the tests: kClasses.
 //     height       place        [ j ]    [ k     k ]  [ l     l ]
 //
 /// Classes of functions whose coefficients share a scale: Regimes, and again for those of the test flights.

@@ -1,5 +1,5 @@
-// What a question changes in the statistics of residuals. The questions are in gap/question/: FitRules derives from this
-// class (gap/fit/fit_rules.hpp), Question from that. Evidence and RegimeBasis call it.
+// What a question changes in the statistics of residuals. The questions are in gap/question/: FitRules derives from
+// this class (gap/fit/fit_rules.hpp), Question from that. Evidence and RegimeBasis call it.
 #pragma once
 
 #include <functional>
@@ -18,8 +18,8 @@ class EvidenceRules {
   virtual ~EvidenceRules() = default;
   /// Indices of the flights that have an offset of their own in the regime basis.
   virtual std::vector<std::size_t> offsets(const Flights& flights) const = 0;
-  /// Indices of the flights for which all functions but offsets follow a second time, as what differs in them: the tests
-  /// of a contrast; else none.
+  /// Indices of the flights for which all functions but offsets follow a second time, as what differs in them: the
+  /// tests of a contrast; else none.
   virtual std::vector<std::size_t> apart(const Flights& flights) const = 0;
   /// Whether an excess of a block over its prior is a sign of an unknown cause.
   virtual bool may_be_free(std::size_t block, const RegimeBasis& basis, const ModelDiscrepancy& discrepancy) const = 0;

@@ -1,17 +1,17 @@
 // Finds the most probable unknowns of a hypothesis by Gauss-Newton on whole flights. Derivatives are differences
 // between vehicles that are simulated together, as lanes of a batch.
 //
-// Coordinates are those of a hypothesis (hypothesis.hpp), in prior standard deviations: [0, shared()) are the parameters
-// and the lag of the sensors, then come the unknowns of its effects. Evidence is in nats.
+// Coordinates are those of a hypothesis (hypothesis.hpp), in prior standard deviations: [0, shared()) are the
+// parameters and the lag of the sensors, then come the unknowns of its effects. Evidence is in nats.
 //
 //   function     parameters  effects    who calls it, and when
 //   linearise    stay        stay       all fits, for columns at a point; the next experiment, for what rivals predict
-//   fit          move        move       RobotFit, for the robot's parameters; Alone, once more for the corrected vehicle
+//   fit          move        move       RobotFit, for the robot's parameters; Alone, again for the corrected vehicle
 //   refit        move        move       RobotFit, once noise, scales or nuisance regressors are known better
 //   fit_linear   linear      linear     EffectFits, for effects that screening found too little of to simulate
 //   fit_effects  linear      move       Question::fit_set of Alone and Contrast, for sets of effects; learn_discrepancy
-//   fit_given    move        move       Question::refit_jointly of Alone, for the best effects; every set of BeatAveraged
-//   joint_fit    linear      linear     after one of these: flights held out, the corrected vehicle, changes of sessions
+//   fit_given    move        move       Question::refit_jointly of Alone, for the best effects; fit_set of BeatAveraged
+//   joint_fit    linear      linear     after one of these: flights held out, corrected vehicle, changes of sessions
 //
 // "linear": it gets a posterior by the columns, and nothing is simulated there.
 #pragma once
@@ -121,9 +121,9 @@ class Fitter {
     std::vector<NuisanceMean> means;  ///< left out: regressors that the flights have no information on
   };
   JointFit joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
-  /// [group][basis] The part of a fit's residual that everything explains by linear columns, learnt from some flights alone: in a
-  /// contrast, changes of the parameters, and what the model gets wrong in both sessions or sessions differ by. Effects
-  /// follow the laws of the catalogue. Contrast predicts flights held out with it.
+  /// [group][basis] The part of a fit's residual that everything explains by linear columns, learnt from some flights
+  /// alone: in a contrast, changes of the parameters, and what the model gets wrong in both sessions or sessions differ
+  /// by. Effects follow the laws of the catalogue. Contrast predicts flights held out with it.
   BasisCoefficients explained(const Fit& fit, const std::vector<char>& use) const;
   /// Standard deviation, [group][basis], of the deviations of effects from the catalogue's laws.
   BasisCoefficients law_sd(const Hypothesis& hypothesis, const Fit& fit) const {
@@ -148,8 +148,8 @@ class Fitter {
   /// Where nothing is known yet. At most `max_iterations` iterations from `start` on, [coordinate]; 0 or 1: no step,
   /// only a posterior there. Not flown() if the simulation diverges at the start.
   Fit fit(const Hypothesis& hypothesis, Eigen::VectorXd start, int max_iterations) const;
-  /// As fit(), with the directions and columns of the parameters' own fit, `parameters`, of a hypothesis without effects:
-  /// so only the effects' columns are simulated, and fits of all effects are compared with the same others.
+  /// As fit(), with the directions and columns of the parameters' own fit, `parameters`, of a hypothesis without
+  /// effects: so only the effects' columns are simulated, and fits of all effects are compared with the same others.
   Fit fit_given(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters,
                 int max_iterations) const;
   /// Moves the effects alone, a few steps; the parameters stay at `parameters`, and answer by its columns in the

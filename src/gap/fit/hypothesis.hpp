@@ -44,8 +44,8 @@ class Hypothesis {
   const std::vector<std::string>& effects() const { return effects_; }
   const std::vector<Unknown>& unknowns() const { return unknowns_; }
   Eigen::Index size() const { return static_cast<Eigen::Index>(unknowns_.size()); }
-  /// Unknowns: the vehicle's parameters, the same for every hypothesis; the lag of the sensors (of a beat-averaged vehicle
-  /// the delay of the command); those of the effects, [shared(), size()).
+  /// Unknowns: the vehicle's parameters, the same for every hypothesis; the lag of the sensors (of a beat-averaged
+  /// vehicle the delay of the command); those of the effects, [shared(), size()).
   Eigen::Index parameters() const { return static_cast<Eigen::Index>(uncertain_->majors()); }
   Eigen::Index lag() const { return parameters(); }
   Eigen::Index shared() const { return parameters() + 1; }

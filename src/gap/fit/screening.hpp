@@ -1,6 +1,6 @@
-// Screening: the evidence that each effect of the catalogue would gain jointly with a fit, by linear models. It finds which
-// effects are worth a fit by simulation (answer/effect_fits.cpp), and what a plan expects (next/separation.cpp). Nothing
-// is simulated but magnitude_steps(), once for each robot (RobotFit).
+// Screening: the evidence that each effect of the catalogue would gain jointly with a fit, by linear models. It finds
+// which effects are worth a fit by simulation (answer/effect_fits.cpp), and what a plan expects (next/separation.cpp).
+// Only the vehicles of magnitude_steps() are simulated, once for each robot (RobotFit).
 #pragma once
 
 #include "gap/fit/fit.hpp"
@@ -28,8 +28,8 @@ inline constexpr double kMagnitudeReach = 0.4;
 /// Effects whose change is at most this are not seen. Choice: less is rounding.
 inline constexpr double kNoChange = 1e-9;
 
-/// Steps for each effect but `withheld`, with shape parameters in mid-prior. `at`: [coordinate] parameters of the robot,
-/// [0, shared()). `background`: reach of near steps; null: no near and no shaped steps.
+/// Steps for each effect but `withheld`, with shape parameters in mid-prior. `at`: [coordinate] parameters of the
+/// robot, [0, shared()). `background`: reach of near steps; null: no near and no shaped steps.
 std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, const Eigen::VectorXd& at,
                                            const std::vector<std::string>& withheld,
                                            const ModelDiscrepancy* background = nullptr);

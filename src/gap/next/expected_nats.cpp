@@ -30,7 +30,7 @@ double expected_nats(const Evidence& evidence, const Expected& a, const Expected
     return Evidence::posterior(reduced, chosen, VectorXd::Zero(static_cast<Index>(columns.size()))).log_evidence;
   };
   const double of_b = log_evidence();
-  reduced.sums.rightCols(1).setZero();  // of what a predicts, a leaves nothing; its spread counts as b's
+  reduced.sums.rightCols(1).setZero();  // of what a predicts, a leaves nothing; its covariance counts as b's
   reduced.sums.bottomRows(1).setZero();
   return expected_nats(Eigen::Vector2d(log_evidence(), of_b), 0)[1];
 }

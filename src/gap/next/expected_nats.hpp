@@ -2,16 +2,17 @@
 // together. With c the rows that A predicts,
 //   nats(A, B) = log p(c | A) - log p(c | B)
 // where p integrates out what a hypothesis leaves uncertain, model discrepancy and noise (gap/evidence/evidence.hpp).
-// That is the Kullback-Leibler divergence of B's prediction from A's, but for what noise and spread of A add.
+// That is the Kullback-Leibler divergence of B's prediction from A's, but for what noise and the covariance of A add.
 //
-// Before any flight (separation.hpp) a hypothesis has its prior, and screening finds log p. After some (next_experiment.hpp)
-// it is a normal prediction: with Delta the difference of the predictions and K_H the covariance under H, the divergence is
+// Before any flight (separation.hpp) a hypothesis has its prior, and screening finds log p. After some
+// (next_experiment.hpp) it is a normal prediction: with Delta the difference of the predictions and K_H the covariance
+// under H, the divergence is
 //   1/2 Delta^T K_B^-1 Delta + 1/2 (tr M - n - log det M)      M = K_B^-1 K_A, n rows
-// The second part comes from how unlike the spreads are. It is never negative; nats leaves it out: a lower bound.
+// The second part comes from how the covariances differ. It is never negative; nats leaves it out: a lower bound.
 //
-// What is expected of a flight then: a rival N nats behind keeps the share D(N) of its odds, D = tempered (verdict.hpp), so
-// a true A of probability p_A becomes p_A / (p_A + (1 - p_A) D(N_A)), with N_A its nats over its strongest rival. The
-// expected information is the mean logarithm of that gain,
+// What is expected of a flight then: a rival N nats behind keeps the share D(N) of its odds, D = tempered
+// (verdict.hpp), so a true A of probability p_A becomes p_A / (p_A + (1 - p_A) D(N_A)), with N_A its nats over its
+// strongest rival. The expected information is the mean logarithm of that gain,
 //   I = - sum over A of p_A log(p_A + (1 - p_A) D(N_A))
 // It is at most the entropy now: separating many rivals a little beats separating one well.
 #pragma once

@@ -33,7 +33,8 @@ std::vector<Rival> rivals_of(const Question& question, const Inference& d, const
   return rivals;
 }
 
-/// Prediction of a simulated flight by a rival; none if the simulation diverges. `first`: linearisation of the first rival with parameters; its columns serve all.
+/// Prediction of a simulated flight by a rival; none if the simulation diverges. `first`: linearisation of the first
+/// rival with parameters; its columns serve all.
 std::optional<Expected> expect(const Question& question, const Rival& rival, const Fitter& fitter,
                                std::optional<Fit>& first) {
   const bool with_parameters = rival.directions.reach.size() > 0;

@@ -1,7 +1,7 @@
 // The next flight: the manoeuvre that best tells apart the rivals, the hypotheses that are still probable.
 //
-// The most probable vehicle flies each manoeuvre in our simulator; each rival predicts the log as fitted so far. What the
-// flight would bring follows from how their predictions differ (expected_nats.hpp):
+// The most probable vehicle flies each manoeuvre in our simulator; each rival predicts the log as fitted so far. What
+// the flight would bring follows from how their predictions differ (expected_nats.hpp):
 //   nats(A, B) = 1/2 Delta^T K^-1 Delta      K: covariance of noise, model discrepancy (evidence.hpp), deviations of
 //                                            the laws of their effects, and what is still uncertain of B
 // So B may adapt to the new flight as far as the flights so far allow. The correlation of its errors in old and new

@@ -38,13 +38,14 @@ struct EffectFit {
   std::vector<Eigen::Index> free;                               ///< coordinates that were fitted
 };
 
-/// The mean evidence of all ways in which the effects of `h` may act, which are equally probable, and the fit of the most
-/// probable one.
+/// The mean evidence of all ways in which the effects of `h` may act, which are equally probable, and the fit of the
+/// most probable one.
 /// `robot`: coordinates of the references' parameters. `first`: a fit of the effects before the last; null: there are
 /// none. An actuator that lost a part of its thrust may shake, or not.
 EffectFit fit_each_way(const TestSession& tests, const Hypothesis& h, const Eigen::VectorXd& robot,
                        const EffectFit* first);
-/// Whether a magnitude of one prior standard deviation changes a quantity by a tenth of what sessions differ by, or more.
+/// Whether a magnitude of one prior standard deviation changes a quantity by a tenth of what sessions differ by, or
+/// more.
 bool shows(const TestSession& tests, const Hypothesis& h, const Eigen::VectorXd& robot);
 /// Logarithm of the sum of exponentials.
 double log_sum(const std::vector<double>& values);
