@@ -157,14 +157,14 @@ struct CheckedLogs {
   std::vector<std::string> folders;
   std::vector<flightlog::FlightLog> logs;
   std::vector<flightlog::FlightHeader> headers;
-  std::vector<flightlog::DataFault> faults;  ///< of all flights of the set, if each has some
+  std::vector<flightlog::DataFault> faults;  ///< of all flights of the set, if more than half have some
   std::vector<std::string> left_out;         ///< why each doubtful flight is left out, one line each
 };
 
-/// Leaves out flights with faults, as long as others remain.
+/// Leaves out flights with faults, as long as half of them remain.
 void leave_out_faulty(CheckedLogs& set, std::vector<std::vector<flightlog::DataFault>> faults) {
   const auto sound = static_cast<std::size_t>(std::ranges::count_if(faults, [](const auto& f) { return f.empty(); }));
-  if (sound == 0) {
+  if (2 * sound < faults.size() || sound == 0) {  // what most flights have is no accident of one
     for (auto& f : faults) std::ranges::move(f, std::back_inserter(set.faults));
     return;
   }
