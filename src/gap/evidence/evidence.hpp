@@ -128,7 +128,7 @@ struct Scales {
   /// The scales of the test flights at the centres of their priors.
   void centre_tests(const SessionVariation& sessions);
   /// Prior scale of a background magnitude.
-  double prior_scale(ScalePrior prior) const { return prior.follows_robot ? robot : 1; }
+  double prior_scale(ScalePrior prior) const { return prior.follows_robot ? robot : prior.centre; }
   double block(std::size_t b) const { return blocks.empty() ? 1 : blocks[b]; }
   /// Centre of the scales of blocks.
   double centre(std::size_t b) const { return block_of_tests(b) ? session : robot; }

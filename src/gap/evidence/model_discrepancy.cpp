@@ -64,7 +64,7 @@ double ModelDiscrepancy::background_sd(const std::string& effect) const {
 }
 
 ScalePrior ModelDiscrepancy::scale_prior(const std::string& effect) const {
-  if (effect.starts_with(kSessionOf)) return {session.effect_freedom, false};
+  if (effect.starts_with(kSessionOf)) return session.of_magnitude(effect);
   if (effect.starts_with(kModelOf)) return scale_prior(effect.substr(std::string(kModelOf).size()));
   if (beat_averaged) return {spread.effect_freedom, true};
   const bool of_model = std::ranges::count(of_models, effect_of(effect)) > 0;

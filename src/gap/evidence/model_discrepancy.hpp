@@ -16,12 +16,6 @@ namespace flappy::gap {
 enum class Regimes { always, inputs, velocity, place, count };
 Regimes regimes_of(BasisFunction function);
 
-/// Inverse gamma for the square of a scale, centred on 1 or, if it follows the robot, on the robot's scale.
-struct ScalePrior {
-  double freedom = 0;  ///< degrees of freedom
-  bool follows_robot = false;
-};
-
 struct ModelDiscrepancy {
   /// Priors of how far models of one robot are off: log robot ~ N(0, robot_sd^2); (block / robot)^2 ~ inverse gamma for
   /// each class of regimes in a channel and harmonic: heavy tails.

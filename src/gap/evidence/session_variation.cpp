@@ -66,6 +66,17 @@ double SessionVariation::centre(std::size_t block) const {
   return std::sqrt((block_freedom + own_share * (1 - 1 / own->count) * own->squares[block]) / freedom(block));
 }
 
+ScalePrior SessionVariation::of_magnitude(const std::string& name) const {
+  ScalePrior prior{effect_freedom};
+  if (!own) return prior;
+  const auto at = own->magnitudes.find(name);
+  if (at == own->magnitudes.end()) return prior;
+  const double share = 1 - 1 / own->count;
+  prior.freedom += share * at->second.second;
+  prior.centre = std::sqrt((effect_freedom + share * at->second.first) / prior.freedom);
+  return prior;
+}
+
 double SessionVariation::parameter_sd(const std::string& name) const {
   const auto at =
       std::ranges::find_if(parameters, [&](const auto& p) { return name.find(p.first) != std::string::npos; });

@@ -17,12 +17,22 @@
 
 namespace flappy::gap {
 
+/// Inverse gamma for the square of a scale, centred on `centre` or, if it follows the robot, on the robot's scale.
+struct ScalePrior {
+  double freedom = 0;  ///< degrees of freedom
+  bool follows_robot = false;
+  double centre = 1;
+};
+
 /// What contrasts of each reference session of the robot with the others say (gap/fit/own_sessions.hpp).
 struct OwnSessions {
   double count = 0;             ///< K, number of sessions
   double mean_log_scale = 0;    ///< of the scales f_k
   std::vector<double> squares;  ///< [block] sum of delta^2 / f_k^2, in units of the prior
   std::vector<double> known;    ///< [block] number of coefficients that the flights determine
+  /// Of the magnitudes of what changes, by the name of its background (Fitter::effects()): the same two sums, of squares
+  /// in units of the prior.
+  std::map<std::string, std::pair<double, double>> magnitudes;
   /// Of the log scale: tests are compared with all K sessions, and each of these with K - 1 others.
   double from_fewer() const { return 0.5 * std::log(1 - 1 / (count * count)); }
 };
@@ -59,6 +69,9 @@ struct SessionVariation {
   ///   freedom = block_freedom + w known,    centre^2 = (block_freedom + w squares) / freedom,    w = own_share (K - 1)/K
   double freedom(std::size_t block) const;
   double centre(std::size_t block) const;
+  /// Of the scale of a change of magnitude, by the name of its background: the same, with effect_freedom and a w of
+  /// (K - 1)/K.
+  ScalePrior of_magnitude(const std::string& name) const;
   /// 0: a parameter that does not change between sessions.
   double parameter_sd(const std::string& name) const;
   double background_sd(const std::string& effect) const;

@@ -23,16 +23,20 @@ std::vector<std::vector<char>> sessions_of(const Flights& flights) {
   return sessions;
 }
 
+/// `effect`: index in Fitter::effects(); -1: none.
+bool between_sessions(const Fitter& fitter, int effect) {
+  return effect >= 0 && fitter.effects()[static_cast<std::size_t>(effect)].starts_with(kSessionOf);
+}
+
 /// The columns of a contrast for one among references: those of changes between sessions act in the tests alone, all
 /// others in all flights.
 std::vector<BasisCoefficients> columns_among_references(const Fitter& fitter, const Regressors& regressors) {
   std::vector<BasisCoefficients> columns;
   for (std::size_t k = 0; k < regressors.columns.size(); ++k) {
-    const int effect = regressors.effects[k];
-    const bool between = effect >= 0 && fitter.effects()[static_cast<std::size_t>(effect)].starts_with(kSessionOf);
     columns.push_back(*regressors.columns[k]);
     for (int i = 0; i < fitter.evidence().basis().size(); ++i)
-      if (fitter.evidence().basis().of_tests(i) != between) columns.back().col(i).setZero();
+      if (fitter.evidence().basis().of_tests(i) != between_sessions(fitter, regressors.effects[k]))
+        columns.back().col(i).setZero();
   }
   return columns;
 }
@@ -58,6 +62,14 @@ std::optional<OwnSessions> own_sessions(const Fitter& fitter, const Fit& paramet
     const ScaledEvidence w = among.weigh(statistics, regressors, use, {}, start);
     start = w.scales;
     own.mean_log_scale += std::log(w.scales.session) / own.count;
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      if (!between_sessions(fitter, regressors.effects[k])) continue;
+      const auto e = static_cast<std::size_t>(regressors.effects[k]);
+      const auto i = static_cast<Index>(k);
+      auto& [squares, known] = own.magnitudes[fitter.effects()[e]];
+      squares += std::pow(w.scales.effects[e] * w.posterior.mean[i], 2);
+      known += 1 - std::min(1.0, w.posterior.covariance(i, i));
+    }
     for (int g = 0; g < kGroups; ++g)
       for (int i = 0; i < evidence.basis().size(); ++i) {
         if (!evidence.basis().of_tests(i) || w.squares(g, i) == 0) continue;  // no rows

@@ -98,13 +98,15 @@ RobotFit::RobotFit(const FitRules& rules, const RobotFit& reference, const Fligh
   ModelDiscrepancy discrepancy = evidence().discrepancy();
   discrepancy.session.own = own_sessions(fitter_, parameters_);
   take_evidence(evidence().with_discrepancy(std::move(discrepancy)));
+  set_nuisances();
   Scales scales;
   scales.centre_tests(evidence().discrepancy().session);
   scales = find_scales(no_effects_, parameters_, scales);
   // what an effect explains is no difference between sessions
   scales.centre_tests(evidence().discrepancy().session);
   for (std::size_t e = 0; e < scales.effects.size(); ++e)
-    if (fitter_.effects()[e].starts_with(kSessionOf)) scales.effects[e] = 1;
+    if (fitter_.effects()[e].starts_with(kSessionOf))
+      scales.effects[e] = scales.prior_scale(evidence().discrepancy().scale_prior(fitter_.effects()[e]));
   fitter_ = fitter_.with_scales(scales);
 }
 

@@ -246,44 +246,78 @@ double scale_sd(const Robots& pairs, const ModelDiscrepancy& now) {
   return std::sqrt(sum / (kShrink + static_cast<double>(pairs.size())));
 }
 
-/// Sets what counts of the robots' own sessions: the mean and scatter of what the scales of tests are over those that
-/// references foretell, and the share that makes the tests most probable.
-void learn_own(const Robots& pairs, const ModelDiscrepancy& now, SessionVariation& to) {
-  // Shares that are tried. Choice.
-  constexpr double kShares[] = {0, 0.02, 0.05, 0.1, 0.2, 0.5, 1};
-  const auto weigh = [](const RobotFit& pair, const ModelDiscrepancy& d) {
-    const Fitter fitter = pair.fitter_given(d);
-    Scales start;
-    start.centre_tests(d.session);
-    return fitter.evidence().weigh(pair.parameters().statistics, fitter.unscaled_regressors(pair.parameters()),
-                                   fitter.all_flights(), {}, start);
-  };
-  std::vector<std::pair<const RobotFit*, OwnSessions>> of_several;
-  std::vector<double> over, weights;
-  for (const auto& pair : pairs)
-    if (std::optional<OwnSessions> own = own_sessions(pair->fitter_given(now), pair->parameters())) {
-      over.push_back(std::log(weigh(*pair, now).scales.session) - own->mean_log_scale - own->from_fewer());
-      weights.push_back(1 - 1 / own->count);
-      of_several.emplace_back(pair.get(), std::move(*own));
-    }
-  if (of_several.size() < kMinOwn) return;
-  const auto n = static_cast<double>(over.size());
-  to.own_offset = std::accumulate(over.begin(), over.end(), 0.0) / n;
-  double squares = 0;
-  for (std::size_t k = 0; k < over.size(); ++k) squares += weights[k] * std::pow(over[k] - to.own_offset, 2);
-  to.own_scale_sd = std::min(std::sqrt(squares / (n - 1)), kMaxOwn * to.scale_sd);
-  double most = -std::numeric_limits<double>::infinity();
-  for (const double share : kShares) {
-    ModelDiscrepancy d = now;
-    d.session.own_scale_sd = to.own_scale_sd, d.session.own_offset = to.own_offset, d.session.own_share = share;
-    double sum = 0;
-    for (const auto& [pair, own] : of_several) {
-      d.session.own = own;
-      sum += weigh(*pair, d).posterior.log_evidence;
-    }
-    io::log(io::LogLevel::info, io::format("own_share %.2f: %.2f nats", share, sum));
-    if (sum > most) most = sum, to.own_share = share;
+/// Log evidence of the test flights under harmless changes alone, and its scales.
+ScaledEvidence weigh_harmless(const RobotFit& pair, const ModelDiscrepancy& d) {
+  const Fitter fitter = pair.fitter_given(d);
+  Scales start;
+  start.centre_tests(d.session);
+  return fitter.evidence().weigh(pair.parameters().statistics, fitter.unscaled_regressors(pair.parameters()),
+                                 fitter.all_flights(), {}, start);
+}
+
+/// Nats by which the evidence at the most probable scales of the magnitudes of changes exceeds that with these scales
+/// integrated out: n coefficients of one scale then follow Student's t of n dimensions (Gelman et al., Bayesian Data
+/// Analysis, 3rd ed., appendix A). A difference that depends on the freedom alone, but for n, what the flights determine.
+double by_maximising_nats(const RobotFit& pair, const ModelDiscrepancy& d, const ScaledEvidence& w) {
+  const Fitter fitter = pair.fitter_given(d);
+  const Regressors r = fitter.unscaled_regressors(pair.parameters());
+  std::map<std::string, double> known;
+  for (std::size_t k = 0; k < r.effects.size(); ++k)
+    if (r.effects[k] >= 0)
+      known[fitter.effects()[static_cast<std::size_t>(r.effects[k])]] +=
+          1 - std::min(1.0, w.posterior.covariance(static_cast<Index>(k), static_cast<Index>(k)));
+  double sum = 0;
+  for (const auto& [name, n] : known) {
+    if (!name.starts_with(kSessionOf)) continue;
+    const double nu = d.scale_prior(name).freedom;
+    sum += -(n + nu) / 2 * std::log(nu / (n + nu)) - n / 2 - std::lgamma((nu + n) / 2) + std::lgamma(nu / 2) +
+           n / 2 * std::log(nu / 2);
   }
+  return sum;
+}
+
+/// Sets `to` to the value of `tries` that makes the test flights of all robots most probable. `now`: of which `to` is a
+/// part; `own`: [robot].
+void choose(const Robots& pairs, const std::vector<std::optional<OwnSessions>>& own, ModelDiscrepancy& now, double& to,
+            std::initializer_list<double> tries, const char* what) {
+  double best = to, most = -std::numeric_limits<double>::infinity();
+  for (const double value : tries) {
+    to = value;
+    double sum = 0;
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      now.session.own = own[k];
+      const ScaledEvidence w = weigh_harmless(*pairs[k], now);
+      sum += w.posterior.log_evidence - by_maximising_nats(*pairs[k], now, w);
+    }
+    io::log(io::LogLevel::warning, io::format("%s %.2f: %.2f nats", what, value, sum));
+    if (sum > most) most = sum, best = value;
+  }
+  to = best;
+  now.session.own.reset();
+}
+
+/// Sets what counts of the robots' own sessions: mean and scatter of what the scales of tests are over those that
+/// references foretell, the share that makes the tests most probable, and the freedom of magnitudes.
+void learn_own(const Robots& pairs, ModelDiscrepancy& now) {
+  SessionVariation& to = now.session;
+  std::vector<std::optional<OwnSessions>> own;
+  std::vector<double> over, weights;
+  for (const auto& pair : pairs) {
+    own.push_back(own_sessions(pair->fitter_given(now), pair->parameters()));
+    if (!own.back()) continue;
+    over.push_back(std::log(weigh_harmless(*pair, now).scales.session) - own.back()->mean_log_scale -
+                   own.back()->from_fewer());
+    weights.push_back(1 - 1 / own.back()->count);
+  }
+  if (over.size() >= kMinOwn) {
+    const auto n = static_cast<double>(over.size());
+    to.own_offset = std::accumulate(over.begin(), over.end(), 0.0) / n;
+    double squares = 0;
+    for (std::size_t k = 0; k < over.size(); ++k) squares += weights[k] * std::pow(over[k] - to.own_offset, 2);
+    to.own_scale_sd = std::min(std::sqrt(squares / (n - 1)), kMaxOwn * to.scale_sd);
+    choose(pairs, own, now, to.own_share, {0, 0.02, 0.05, 0.1, 0.2, 0.5}, "own_share");
+  }
+  choose(pairs, own, now, to.effect_freedom, {1, 2, 4, 8, 30}, "effect_freedom");
 }
 
 /// Law errors of known effects.
@@ -376,7 +410,7 @@ SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim
     take(shares, backgrounds, now.session.shares, now.session.background);
   }
   if (!harmless.empty()) now.session.scale_sd = scale_sd(harmless, now);
-  learn_own(harmless, ModelDiscrepancy(now), now.session);
+  if (!harmless.empty()) learn_own(harmless, now);
   harmless.clear();
   LawErrors errors;
   for (const SessionPair& p : pairs) {

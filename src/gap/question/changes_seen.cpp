@@ -27,9 +27,9 @@ constexpr Looked kLooked[] = {
     {kBattery, BasisFunction::constant, "", "battery", "V"},
     {kCurrentLeft, BasisFunction::constant, "", "left current", "A"},
     {kCurrentRight, BasisFunction::constant, "", "right current", "A"},
-    {kPathX, BasisFunction::constant, "", "acceleration along x of motion capture over the IMU's", "m/s^2"},
-    {kPathY, BasisFunction::constant, "", "acceleration along y of motion capture over the IMU's", "m/s^2"},
-    {kPathZ, BasisFunction::constant, "", "acceleration along z of motion capture over the IMU's", "m/s^2"},
+    {kPathX, BasisFunction::constant, "", "motion capture less IMU, along x", "m/s^2"},
+    {kPathY, BasisFunction::constant, "", "motion capture less IMU, along y", "m/s^2"},
+    {kPathZ, BasisFunction::constant, "", "motion capture less IMU, along z", "m/s^2"},
 };
 
 /// Prior of what is looked at and of what else changed, over what sessions differ by. Choice: so wide that it does not

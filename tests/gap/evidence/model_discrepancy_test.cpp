@@ -63,6 +63,12 @@ TEST(SessionVariation, TakesTheRobotsOwnSessionsForMoreTheMoreThereAre) {
   EXPECT_NEAR(s.centre(0), std::sqrt((30 + 450) / 80.0), 1e-4);
   EXPECT_EQ(s.centre(1), 1) << "nothing is known of this block";
   EXPECT_EQ(s.freedom(1), 30);
+  // a magnitude of which one coefficient was found three times as large as the prior
+  s.effect_freedom = 4;
+  s.own->magnitudes["session of wind"] = {9, 1};
+  EXPECT_NEAR(s.of_magnitude("session of wind").centre, std::sqrt(13 / 5.0), 1e-4);
+  EXPECT_NEAR(s.of_magnitude("session of wind").freedom, 5, 1e-4);
+  EXPECT_EQ(s.of_magnitude("session of tether").centre, 1) << "no session shows it";
   // of two sessions, one contrast: precisions 1/(1 - 0.09) and 1/0.09; a further session against both varies less
   s.own->count = 2;
   const double precision = 1 / 0.91 + 1 / 0.09;

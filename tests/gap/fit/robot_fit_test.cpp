@@ -232,6 +232,33 @@ TEST(Contrast, MeasuresAChangeByTheRobotsOwnSessions) {
   EXPECT_LT(restless.second, 0.5 * calm.second);
 }
 
+// The wind differs from session to session, of one robot by nothing, of another by as much as in the tests.
+TEST(Contrast, LearnsFromItsSessionsWhatChangesHarmlessly) {
+  const sim::Randomisation priors = synthetic_priors();
+  const Hypothesis wind(priors, {"wind"});
+  const auto gain = [&](const std::vector<double>& winds) {
+    auto made = synthetic_flights(winds.size(), synthetic_law);
+    for (std::size_t f = 0; f < winds.size(); ++f) {
+      Eigen::VectorXd at = wind.start();
+      at[2] = winds[f];
+      made[f]->fly(wind.vehicle(at));
+    }
+    const Flights flights = as_flights(made, winds.size() - 1), references{flights.references, {}};
+    ModelDiscrepancy discrepancy = read_model_discrepancy();
+    discrepancy.session = read_session_variation();
+    const RobotFit robot(question_of(flights),
+                         RobotFit::of_references(question_of(references), references, priors, discrepancy, {}, 2),
+                         flights);
+    const Fit fit = robot.fitter().fit_effects(wind, wind.start(), robot.parameters());
+    const Scales& scales = robot.fitter().scales();
+    return robot.weigh(wind, fit, scales).posterior.log_evidence -
+           robot.weigh(robot.no_effects(), robot.parameters(), scales).posterior.log_evidence;
+  };
+  const double still = gain({0, 0, 0, 0, 0, 0.1}), gusty = gain({0.1, -0.1, 0, 0.08, -0.1, 0.1});
+  EXPECT_GT(still, 2);
+  EXPECT_LT(gusty, still - 1);
+}
+
 // Something acts along the velocity in the tests alone. Where references never moved, it may have acted before.
 TEST(Contrast, CallsUnknownOnlyWhatReferencesWouldHaveShown) {
   const sim::Randomisation priors = synthetic_priors();
