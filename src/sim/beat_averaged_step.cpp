@@ -3,6 +3,7 @@
 // Positions drift for half a step; then rates change by the loads in the middle, which depend on them (midpoint rule);
 // then positions drift on with the new rates: of second order. Compiled once per instruction set (FLAPPY_ISA), with the
 // same bits.
+#include <limits>
 #include <utility>
 
 #include "sim/end_of_steps.hpp"
@@ -88,15 +89,23 @@ class BeatAveragedLanes {
         Effect::beat_averaged_hang(q, s, rest);
         weight_ = {where(fresh, rest.x_m, weight_.x_m), where(fresh, rest.y_m, weight_.y_m),
                    where(fresh, rest.velocity_x_m_s, weight_.velocity_x_m_s),
-                   where(fresh, rest.velocity_y_m_s, weight_.velocity_y_m_s)};
+                   where(fresh, rest.velocity_y_m_s, weight_.velocity_y_m_s),
+                   where(fresh, rest.tension_m_s2, weight_.tension_m_s2)};
       }
     });
   }
 
-  void swing(const Body<L>& x) {
+  /// `held`: what holds a robot takes all that pulls at it.
+  void swing(const Body<L>& x, const Acceleration<L>& a, typename L::Mask held) {
     for_effects([&]<class Effect>(const auto& q) {
-      if constexpr (requires { Effect::beat_averaged_hang(q, state_of(x), weight_); })
-        Effect::beat_averaged_swing(q, state_of(x), L(plan_.step_s), weight_);
+      if constexpr (requires { Effect::beat_averaged_hang(q, state_of(x), weight_); }) {
+        BeatAveragedState<L> s = state_of(x);
+        const Vec3<L> free = parameters_.inverse_mass_1_kg * a.load.force_N;
+        const Vec3<L> rests = transpose_times(s.attitude, Vec3<L>{L(0), L(0), s.gravity_m_s2});
+        s.force_m_s2 = {where(held, rests.x, free.x), where(held, rests.y, free.y), where(held, rests.z, free.z)};
+        s.mass_kg = where(held, L(std::numeric_limits<double>::infinity()), s.mass_kg);
+        Effect::beat_averaged_swing(q, s, L(plan_.step_s), weight_);
+      }
     });
   }
 
@@ -124,7 +133,7 @@ class BeatAveragedLanes {
 
   void store(typename L::Mask moves) const {
     where(moves, L(1), memory(0)).store(memory_at(0));
-    const L weight[] = {weight_.x_m, weight_.y_m, weight_.velocity_x_m_s, weight_.velocity_y_m_s};
+    const L weight[] = {weight_.x_m, weight_.y_m, weight_.velocity_x_m_s, weight_.velocity_y_m_s, weight_.tension_m_s2};
     for (std::size_t k = 0; k < kHanging; ++k) where(moves, weight[k], memory(1 + k)).store(memory_at(1 + k));
     for (std::size_t k = 0; k < rows_of_.actuator_count; ++k)
       where(moves, end_[k], memory(kActuatorRow + k)).store(memory_at(kActuatorRow + k));
@@ -151,7 +160,8 @@ class BeatAveragedLanes {
             stroke_plane_1_s_,
             {zero, zero, zero},
             zero,
-            weight_};
+            weight_,
+            {zero, zero, zero}};
   }
 
   const T (*rows(std::size_t row) const)[kLanes<T>] {
@@ -286,11 +296,11 @@ void step_mean_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& 
       middle.velocity_m_s = add_scaled(body.velocity_m_s, half, now.linear_m_s2);
       middle.rate_rad_s = add_scaled(body.rate_rad_s, half, now.angular_rad_s2);
       const Acceleration<L> a = lanes.accelerate(middle);
-      lanes.swing(middle);
+      const auto held = x.support > L(0);
+      lanes.swing(middle, a, held);
       body.velocity_m_s = add_scaled(body.velocity_m_s, step, a.linear_m_s2);
       body.rate_rad_s = add_scaled(body.rate_rad_s, step, a.angular_rad_s2);
       drift(body, half);
-      const auto held = x.support > L(0);
       if (!rarely(held)) continue;
       const Vec3<L> none{L(0), L(0), L(0)};
       body.com_m = where(held, before.com_m, body.com_m);

@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <fstream>
+#include <limits>
+#include <numbers>
 
 #include "flappy/vehicle_file.hpp"
 #include "model/effects/registry.hpp"
@@ -242,18 +244,63 @@ TEST(BeatAveragedEffects, FollowTheirEquations) {
   expect_near(seen_of("mocap_tilt", {0.01, 0.02}), {0.02 * 9.81, -0.01 * 9.81, 0});
 }
 
-// 20 g on a line of 0.5 m that is 0.1 m ahead of its hook: weight 0.1962 N, a fifth of it forwards.
+// 20 g on a line of 0.5 m under 0.1962 N that is 0.1 m ahead of its hook: a fifth of it forwards.
 TEST(BeatAveragedEffects, ASlungLoadPullsAtItsHook) {
   BeatAveragedState<double> s = state();
-  s.weight = {0.05 + 0.1, 0, 0, 0};
+  s.weight = {0.05 + 0.1, 0, 0, 0, 9.81};
   BeatAveragedLoads<double> load{};
   const std::vector<double> q = {0.02, 0.02 * 0.05, 0, 0.5, -0.01};
   find_effect(known_by_the_beat(), "slung_load")->averaged.load(q.data(), s, load);
+  const double down_N = 0.1962 * std::sqrt(1 - 0.2 * 0.2);
   EXPECT_NEAR(load.force_N.x, 0.03924, 1e-12);
-  EXPECT_NEAR(load.force_N.z, -0.1962, 1e-12);
+  EXPECT_NEAR(load.force_N.z, -down_N, 1e-12);
   EXPECT_NEAR(load.moment_Nm.x, 0, 1e-12);
-  EXPECT_NEAR(load.moment_Nm.y, -0.01 * 0.03924 + 0.05 * 0.1962, 1e-12);
+  EXPECT_NEAR(load.moment_Nm.y, -0.01 * 0.03924 + 0.05 * down_N, 1e-12);
   EXPECT_NEAR(load.moment_Nm.z, 0, 1e-12);
+}
+
+// Below a hook that stays a pendulum has the period 2 pi sqrt(l / g) / agm(1, cos(A / 2)) at the amplitude A (Carvalhaes, Suppes, Am. J. Phys. 76, 2008),
+// and at the lowest point a tension of m g (3 - 2 cos A). The damping of 0.05 takes 29 % from an amplitude in a period, so that A is the mean over a half
+// swing, to second order in its change; it makes a period longer by half of 0.05^2.
+TEST(BeatAveragedEffects, ASlungLoadSwingsByAnyAngle) {
+  constexpr double kLength_m = 0.4, kStep_s = 1e-4;
+  const CatalogueEffect* effect = find_effect(known_by_the_beat(), "slung_load");
+  const std::vector<double> q = {0.02, 0, 0, kLength_m, 0};
+  for (const double degrees : {1.0, 25.0, 50.0}) {
+    SCOPED_TRACE(degrees);
+    const double begin = degrees * std::numbers::pi / 180;
+    BeatAveragedState<double> s{};
+    s.attitude = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    s.gravity_m_s2 = 9.81;
+    s.force_m_s2 = {0, 0, 9.81};
+    s.mass_kg = std::numeric_limits<double>::infinity();
+    Hanging<double> w{kLength_m * std::sin(begin), 0, 0, 0, 9.81};
+    double t = 0, lowest_m_s2 = 0, before_m = w.x_m;
+    while (!(before_m > 0 && w.x_m <= 0)) {
+      before_m = w.x_m;
+      effect->averaged.swing(q.data(), s, kStep_s, w);
+      lowest_m_s2 = w.tension_m_s2;
+    }
+    while (w.velocity_x_m_s < 0) effect->averaged.swing(q.data(), s, kStep_s, w), t += kStep_s;
+    const double end = std::asin(-w.x_m / kLength_m);
+    for (; w.velocity_x_m_s > 0; t += kStep_s) effect->averaged.swing(q.data(), s, kStep_s, w);
+    const double last = std::asin(w.x_m / kLength_m);
+    EXPECT_LT(end, begin);
+    EXPECT_LT(last, end);
+    // from the lowest point to the other side, and back to this one: three quarters, of which the first is damped to `end`
+    const auto period_s = [](double amplitude) {
+      double a = 1, g = std::cos(amplitude / 2);
+      for (int i = 0; i < 6; ++i) {
+        const double mean = (a + g) / 2;
+        g = std::sqrt(a * g), a = mean;
+      }
+      return 2 * std::numbers::pi * std::sqrt(kLength_m / 9.81) / a;
+    };
+    const double expected_s = period_s(end) / 4 + period_s((end + last) / 2) / 2;
+    EXPECT_NEAR(t, expected_s, 0.01 * expected_s);
+    const double mean = (begin + end) / 2;
+    EXPECT_NEAR(lowest_m_s2, 9.81 * (3 - 2 * std::cos(mean)), 0.02 * 9.81 * (3 - 2 * std::cos(mean)));
+  }
 }
 
 // 50 g, 3 cm ahead of the middle of a robot of 100 g: the centre of mass is 1 cm ahead, and a reduced mass of 33.3 g at 3 cm turns with it.

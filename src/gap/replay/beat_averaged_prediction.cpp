@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "flightlog/readings.hpp"
@@ -285,10 +286,14 @@ Rows BeatAveragedPrediction::predict(const VehicleHypothesis& hypothesis) const 
   const Eigen::Matrix3d per_inertia = inertia.inverse();
   const flightlog::LogAmbient& ambient = log_.header.ambient;
 
-  const auto at_rest = [&](std::size_t k) {
+  const auto flown = [&](std::size_t k) {
     model::BeatAveragedState<double> s{};
     s.attitude = matrix(motion_.attitude[k]);
     s.position_m = vec(motion_.position_m[k]);
+    s.velocity_B_m_s = vec(motion_.velocity_B_m_s[k]);
+    s.rate_rad_s = vec(motion_.rate_rad_s[k]);
+    s.force_m_s2 = vec(motion_.force_m_s2[k]);
+    s.mass_kg = std::numeric_limits<double>::infinity();
     s.gravity_m_s2 = log_.header.gravity_m_s2;
     return s;
   };
@@ -296,10 +301,10 @@ Rows BeatAveragedPrediction::predict(const VehicleHypothesis& hypothesis) const 
   for (const Acting& a : acting) {
     if (a.effect->averaged.swing == nullptr) continue;
     weights.resize(motion_.size());
-    a.effect->averaged.hang(a.values.data(), at_rest(0), weights[0]);
+    a.effect->averaged.hang(a.values.data(), flown(0), weights[0]);
     for (std::size_t k = 1; k < weights.size(); ++k) {
       weights[k] = weights[k - 1];
-      a.effect->averaged.swing(a.values.data(), at_rest(k), motion_.step_s, weights[k]);
+      a.effect->averaged.swing(a.values.data(), flown(k), motion_.step_s, weights[k]);
     }
   }
 

@@ -22,10 +22,10 @@ struct BeatAveragedDrive {
   T battery_gain{0};  ///< flapping actuators are multiplied by 1 + gain (battery / nominal - 1)
 };
 
-/// A weight on a line: its horizontal place and velocity in W.
+/// A weight on a line: its horizontal place and velocity in W, and the line's tension over its mass.
 template <class T>
 struct Hanging {
-  T x_m, y_m, velocity_x_m_s, velocity_y_m_s;
+  T x_m, y_m, velocity_x_m_s, velocity_y_m_s, tension_m_s2;
 };
 
 template <class T>
@@ -41,6 +41,9 @@ struct BeatAveragedState {
   Vec3<T> wind_B_m_s;                ///< known from beat_averaged_load() on, like thrust_N
   T thrust_N;                        ///< force of the vehicle's expressions along z of B
   Hanging<T> weight;                 ///< known from beat_averaged_load() on
+  /// Specific force of the torso origin, in B, all loads included; known in beat_averaged_swing(), where mass_kg is
+  /// infinite if the robot flies as recorded, whatever pulls at it.
+  Vec3<T> force_m_s2;
 };
 
 /// Force and moment about the centre of mass, in B.
