@@ -69,18 +69,10 @@ struct Sessions {
   const std::vector<SessionQuantity>& quantities() const { return references.front().quantities(); }
 };
 
-/// Flights that name the same session are one; others are each their own.
-SessionScatter scatter_of(const FlightList& references, const Sessions& sessions, const SessionPrior& prior) {
-  std::vector<int> of;
-  std::map<std::string, int> named;
-  int next = 0;
-  for (const auto& flight : references) {
-    const std::string name = flight->session();
-    const auto [at, fresh] = named.try_emplace(name.empty() ? "/" + std::to_string(next) : name, next);
-    next += fresh;
-    of.push_back(at->second);
-  }
-  return {sessions.quantities(), session_values(sessions.references, of, prior), prior};
+SessionScatter scatter_of(const Flights& flights, const Sessions& sessions, const SessionPrior& prior) {
+  const std::vector<std::string> names = session_names(flights.references);
+  return {sessions.quantities(), session_values(sessions.references, session_numbers(names), prior),
+          session_times(names, session_names(flights.tests)), prior};
 }
 
 SessionDensity density_of(const Sessions& sessions, const SessionScatter& scatter, const SessionPrior& prior) {
@@ -303,7 +295,7 @@ std::optional<Inference> SessionContrast::by_sessions(const Flights& flights, co
   const VectorXd& at = reference.fit.parameters().at;
   const VehicleHypothesis robot = no_effects.vehicle(at);
   const Sessions sessions(flights, robot, options.threads);
-  const SessionScatter scatter = scatter_of(flights.references, sessions, options.sessions);
+  const SessionScatter scatter = scatter_of(flights, sessions, options.sessions);
   const SessionDensity density = density_of(sessions, scatter, options.sessions);
   const TestSession tests(flights.tests, sessions.tests, density, options.sessions, robot);
   const Weighing weighing(flights, uncertain, options, at, tests);

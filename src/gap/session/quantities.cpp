@@ -190,9 +190,6 @@ struct FlightQuantities::Regression {
   }
 };
 
-/// Variance of what a flight does not show. Choice: far more than that of anything seen.
-constexpr double kUnseen = 1e6;
-
 void FlightQuantities::keep(const SessionQuantity& quantity, double value, double variance) {
   quantities_.push_back(quantity);
   values_.conservativeResize(values_.size() + 1);

@@ -21,6 +21,9 @@ struct SessionQuantity {
 inline constexpr const char* kSessionBlocks[] = {"thrust", "battery", "height", "climb",  "speed", "delay",
                                                  "force",  "drag",    "swing",  "moment", "yaw",   "noise"};
 
+/// Variance of what a flight does not show. Choice: far more than that of anything seen.
+inline constexpr double kUnseen = 1e6;
+
 /// What all references together show of the force along z, which each flight is corrected for: coefficients of the
 /// regressors (quantities.cpp), and the means at which these are 0.
 struct CommonTrend {

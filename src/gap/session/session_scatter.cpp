@@ -30,8 +30,8 @@ SessionPrior read_session_prior(const std::filesystem::path& path) {
   for (const std::string& key : together.keys()) p.together[key] = together.number(key, io::positive(1));
   for (const char* name : kSessionBlocks) {
     const io::Table block = root.table(name);
-    p.blocks[name] = {block.number("scatter", io::positive()), block.number("unknown", io::positive()),
-                      block.number("leak", io::Range{0, 1})};
+    p.blocks[name] = {block.number("scatter", io::positive()), block.number("drift", io::non_negative()),
+                      block.number("unknown", io::positive()), block.number("leak", io::Range{0, 1})};
   }
   root.finish();
   return p;
@@ -72,28 +72,33 @@ SessionValues session_values(const std::vector<FlightQuantities>& flights, const
   return s;
 }
 
+double SessionPrior::variance(const SessionQuantity& quantity, double noise) const {
+  return std::pow(of(quantity).scatter, 2) + std::pow(share_of_noise, 2) * noise;
+}
+
 SessionScatter::SessionScatter(const std::vector<SessionQuantity>& quantities, const SessionValues& references,
-                               const SessionPrior& prior)
+                               const SessionTimes& times, const SessionPrior& prior)
     : quantities_(quantities) {
-  const Index n = references.values.rows(), size = references.values.cols();
-  mean_ = variance_ = variance_of_mean_ = VectorXd::Zero(size);
-  freedom_ = std::min(prior.freedom + static_cast<double>(n - 1), prior.most_freedom);
+  const Index size = references.values.cols();
+  const auto own = static_cast<double>(references.values.rows() - 1);
+  mean_ = variance_ = variance_of_next_ = VectorXd::Zero(size);
+  freedom_ = std::min(prior.freedom + own, prior.most_freedom);
   noise_ = references.variances.colwise().mean().transpose();
   for (Index q = 0; q < size; ++q) {
+    const SessionQuantity& quantity = quantities[static_cast<std::size_t>(q)];
+    const double before = prior.variance(quantity, noise_[q]);
+    const SessionWalk walk(times.references, times.tests, std::pow(prior.of(quantity).drift, 2) / before);
     const VectorXd x = references.values.col(q);
-    const double prior_variance = std::pow(prior.of(quantities[static_cast<std::size_t>(q)]).scatter, 2) +
-                                  std::pow(prior.share_of_noise, 2) * noise_[q];
-    mean_[q] = x.mean();
-    variance_[q] = (prior.freedom * prior_variance + (x.array() - mean_[q]).square().sum()) /
-                   (prior.freedom + static_cast<double>(n - 1));
-    variance_of_mean_[q] = variance_[q] / static_cast<double>(n);
+    mean_[q] = walk.mean_of_next(x);
+    variance_[q] = (prior.freedom * before + walk.sum_of_squares(x)) / (prior.freedom + own);
+    variance_of_next_[q] = variance_[q] * walk.factor_of_next();
   }
 }
 
 SessionDensity::SessionDensity(const SessionScatter& scatter, const VectorXd& values, const VectorXd& variances,
                                const SessionPrior& prior)
     : difference_(values - scatter.mean()),
-      variance_(scatter.variance() + scatter.variance_of_mean() + (variances - scatter.noise()).cwiseMax(0)),
+      variance_(scatter.variance_of_next() + (variances - scatter.noise()).cwiseMax(0)),
       noise_(variances + scatter.noise()),
       unknown_(difference_.size()),
       leak_(difference_.size()),

@@ -1,15 +1,17 @@
 // How much the quantities of a robot differ from session to session while nothing is done to it. The yardstick of a
 // contrast is the robot itself: of a quantity with session means x_1 ... x_n,
-//   x_i ~ N(m, s^2)    s^2, noise of the flights included, ~ scaled inverse chi-squared(nu, s_0^2)
-//   y   ~ t_n'(m, s^2 (1 + 1/n) + v)    what another session of the unchanged robot shows
+//   x ~ N(m, s^2 R)    a random walk and scatter (session_walk.hpp), r = drift^2 / s_0^2
+//   s^2, noise of the flights included, ~ scaled inverse chi-squared(nu, s_0^2)
+//   y ~ t_n'(m_t, s^2 c + v)    what another session of the unchanged robot shows at its time t
 //   n' = nu + n - 1, at most most_freedom; v: by how much the variance of y by noise exceeds the references', at least 0
-// s_0 and nu are those of other robots (configs/gap/beat_averaged/session_scatter.toml) (Gelman et al., Bayesian Data
-// Analysis, 3rd ed., ch. 3.2 and 5.4).
+// s_0, drift and nu are those of other robots (configs/gap/beat_averaged/session_scatter.toml), which learn_scatter.hpp
+// learns (Gelman et al., Bayesian Data Analysis, 3rd ed., ch. 3.2 and 5.4).
 #pragma once
 
 #include <map>
 
 #include "gap/session/quantities.hpp"
+#include "gap/session/session_walk.hpp"
 
 namespace flappy::gap {
 
@@ -17,6 +19,7 @@ namespace flappy::gap {
 struct SessionPrior {
   struct Block {
     double scatter;  ///< s_0, in units of the quantity, before the noise of its flights
+    double drift;    ///< standard deviation by which the robot walks from one session to the next
     double unknown;  ///< standard deviation of what a cause does that is not in the catalogue
     double leak;     ///< probability that a quantity changes by as much where another one does
   };
@@ -30,6 +33,8 @@ struct SessionPrior {
   /// Prior probability of `b` besides `a`. `effects`: number of effects that may be.
   double further(const std::string& a, const std::string& b, std::size_t effects) const;
   const Block& of(const SessionQuantity& quantity) const { return blocks.at(quantity.block); }
+  /// s_0^2: variance between sessions before any is seen. `noise`: variance by the noise of the flights.
+  double variance(const SessionQuantity& quantity, double noise) const;
 };
 /// io::InputError with file and line.
 SessionPrior read_session_prior(const std::filesystem::path& path);
@@ -49,19 +54,20 @@ SessionValues session_values(const std::vector<FlightQuantities>& flights, const
 class SessionScatter {
  public:
   SessionScatter(const std::vector<SessionQuantity>& quantities, const SessionValues& references,
-                 const SessionPrior& prior);
+                 const SessionTimes& times, const SessionPrior& prior);
   const std::vector<SessionQuantity>& quantities() const { return quantities_; }
+  /// What the unchanged robot shows on the mean when it is tested.
   const Eigen::VectorXd& mean() const { return mean_; }
-  /// Variance between sessions, and of the mean.
+  /// Variance between sessions at one time, and of a session when the robot is tested about mean().
   const Eigen::VectorXd& variance() const { return variance_; }
-  const Eigen::VectorXd& variance_of_mean() const { return variance_of_mean_; }
+  const Eigen::VectorXd& variance_of_next() const { return variance_of_next_; }
   /// Mean over the references of the variance by the noise of their flights, which is part of variance().
   const Eigen::VectorXd& noise() const { return noise_; }
   double freedom() const { return freedom_; }
 
  private:
   std::vector<SessionQuantity> quantities_;
-  Eigen::VectorXd mean_, variance_, variance_of_mean_, noise_;
+  Eigen::VectorXd mean_, variance_, variance_of_next_, noise_;
   double freedom_;
 };
 

@@ -10,18 +10,35 @@
 namespace flappy::gap::session_scatter_test {
 namespace {
 
+using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 const std::vector<SessionQuantity> kThrust = {{"thrust", "share", "thrust"}};
 const std::vector<SessionQuantity> kBoth = {{"thrust", "share", "thrust"}, {"delay", "s", "delay"}};
 
-SessionPrior prior() { return read_session_prior(test::source_path("configs/gap/beat_averaged/session_scatter.toml")); }
+const SessionPrior& prior() {
+  static const SessionPrior read =
+      read_session_prior(test::source_path("configs/gap/beat_averaged/session_scatter.toml"));
+  return read;
+}
 
 SessionValues sessions(const MatrixXd& values) { return {values, MatrixXd::Zero(values.rows(), values.cols())}; }
 
+/// A robot that does not drift.
+SessionPrior still() {
+  SessionPrior p = prior();
+  for (auto& [name, block] : p.blocks) block.drift = 0;
+  return p;
+}
+
+/// Sessions one after the other, then that of the tests.
+SessionTimes in_order(Index n) {
+  return {VectorXd::LinSpaced(n, 0, static_cast<double>(n - 1)), static_cast<double>(n)};
+}
+
 /// Sessions of one quantity.
-SessionScatter scatter(const VectorXd& values) { return {kThrust, sessions(values), prior()}; }
+SessionScatter scatter(const VectorXd& values) { return {kThrust, sessions(values), in_order(values.size()), still()}; }
 
 double density(const SessionScatter& s, double y) {
   return SessionDensity(s, VectorXd::Constant(1, y), VectorXd::Zero(1), prior())
@@ -61,7 +78,7 @@ TEST(SessionScatter, CapsItsFreedom) { EXPECT_EQ(scatter(VectorXd::Zero(50)).fre
 // The delay may follow a large change of the thrust, for the controller does; it may not change by itself, and the
 // thrust does not follow a delay.
 TEST(SessionScatter, LetsChangesLeakIntoWhatTheControllerMoves) {
-  const SessionScatter s(kBoth, sessions(MatrixXd::Zero(5, 2)), prior());
+  const SessionScatter s(kBoth, sessions(MatrixXd::Zero(5, 2)), in_order(5), still());
   VectorXd changed(2), shift(2), none = VectorXd::Zero(2);
   changed << 0.15, 0.02;
   shift << 0.15, 0;
@@ -78,7 +95,7 @@ TEST(SessionScatter, LetsChangesLeakIntoWhatTheControllerMoves) {
 
 // The slope of the log density, by differences, is precision times what is left.
 TEST(SessionScatter, HasThePrecisionOfItsSlope) {
-  const SessionScatter s(kThrust, sessions(MatrixXd::Zero(5, 1)), prior());
+  const SessionScatter s(kThrust, sessions(MatrixXd::Zero(5, 1)), in_order(5), still());
   const VectorXd none = VectorXd::Zero(1), y = VectorXd::Constant(1, 0.02);
   const SessionDensity d(s, y, none, prior());
   constexpr double kStep = 1e-7;

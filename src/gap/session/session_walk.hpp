@@ -1,0 +1,51 @@
+// A quantity of one robot from session to session: sessions scatter, and the robot drifts, as wear and warm rooms do, by
+// a random walk. Of sessions at the times t_i,
+//   x_i = m + w(t_i) + e_i    e_i ~ N(0, s^2)    w(t) - w(t') ~ N(0, s^2 r |t - t'|)    m: anything
+// so that x ~ N(m, s^2 R), R = I + r K, K_ij = min(t_i, t_j) from the first time on. Given r, all else is linear [1]:
+//   m^ = 1' R^-1 x / 1' R^-1 1    sum of squares Q = (x - m^)' R^-1 (x - m^), of n - 1 degrees of freedom
+//   at a time t: mean m^ + k' R^-1 (x - m^), variance s^2 c, c = 1 + r K_tt - k' R^-1 k + (1 - 1' R^-1 k)^2 / 1' R^-1 1
+// With r = 0 these are the mean, the sum of squares about it and 1 + 1 / n.
+// [1] Cressie, Statistics for Spatial Data, 1993, ch. 3.4 (universal kriging).
+#pragma once
+
+#include <Eigen/Dense>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gap/replay/predicted_flight.hpp"
+
+namespace flappy::gap {
+
+class SessionWalk {
+ public:
+  /// `walk`: r. `at`: the time asked about.
+  SessionWalk(const Eigen::VectorXd& times, double at, double walk);
+  double sum_of_squares(const Eigen::VectorXd& x) const;
+  double mean_of_next(const Eigen::VectorXd& x) const { return next_.dot(x); }
+  /// c: variance of a session at the time asked about, over s^2.
+  double factor_of_next() const { return factor_; }
+
+ private:
+  Eigen::MatrixXd inverse_;
+  Eigen::VectorXd mean_, next_;  ///< weights of m^, and of the mean at the time asked about
+  double factor_;
+};
+
+/// PredictedFlight::session() of each flight.
+std::vector<std::string> session_names(const FlightList& flights);
+
+/// Which session each flight is of, from 0 on: flights that name the same session are one, those without a name are each
+/// their own.
+std::vector<int> session_numbers(const std::vector<std::string>& names);
+
+/// When sessions were, in the mean time between reference sessions.
+struct SessionTimes {
+  Eigen::VectorXd references;
+  double tests = 0;  ///< of the test session
+};
+/// By dates, if the sessions of all flights have names or folders that begin with one: 2024-03-05, or with the time of
+/// day 2024-03-05T14:30. Else by the order in which they are given: the tests come after the references.
+SessionTimes session_times(const std::vector<std::string>& references, const std::vector<std::string>& tests);
+
+}  // namespace flappy::gap
