@@ -2,10 +2,14 @@
 """Contrasts of real robots into which others put faults, from a folder with their logs: crazypad/, slung_load/ and gains/. Prints the tables of
 docs/results/faults.md; keeps every log and diagnosis in OUT. What DATA lacks is left out.
 
-    scripts/results/faults.py BIN PROJECT DATA OUT [--normal]      (--normal: only flights without a fault)
+    scripts/results/faults.py BIN PROJECT DATA OUT [--normal | --unseen | --learn FILE]
+
+--normal: only flights without a fault. --unseen: each robot by a file that was learnt from the others. --learn: writes FILE as
+configs/gap/beat_averaged/session_scatter.toml, learnt from flights without a fault of these robots and flapper/, and contrasts nothing.
 """
 
 import csv
+import gzip
 import itertools
 import json
 import pathlib
@@ -16,6 +20,7 @@ import sys
 
 BIN, PROJECT, DATA, OUT = (pathlib.Path(a).resolve() for a in sys.argv[1:5])
 NORMAL_ONLY = "--normal" in sys.argv[5:]
+UNSEEN = "--unseen" in sys.argv[5:]
 NORMAL = "normal_flight"
 # The effect that is taken out of the catalogue, by condition.
 WITHHELD = {
@@ -32,8 +37,10 @@ LOAD_G, LINE_M, HOOK_G = 4.7, 0.52, 2.7
 def imported(folder, mapping):
     """The flights of a folder, by the order of their names."""
     logs = []
-    for file in sorted(f for f in (DATA / folder).iterdir() if "log" in f.name or f.name.startswith("eckart")):
+    for file in sorted(f for f in (DATA / folder).iterdir() if "log" in f.name or f.name.startswith("eckart") or ".csv" in f.name):
         out = OUT / "logs" / folder / file.name.removesuffix(".gz")
+        if file.name.endswith(".csv.gz"):
+            file = unpacked(file)
         if not out.exists():
             done = subprocess.run([BIN / "flappy-gap", "import", file, "--mapping", PROJECT / "configs/mapping" / mapping, "--out", out], capture_output=True, text=True)
             if done.returncode != 0:
@@ -42,7 +49,50 @@ def imported(folder, mapping):
     return logs
 
 
+def unpacked(file):
+    out = OUT / file.name.removesuffix(".gz")
+    out.write_bytes(gzip.decompress(file.read_bytes()))
+    return out
+
+
+# Flights without a fault, by the part of the tables: vehicle, mapping, and folders in which the robot flew the same.
+ROBOTS = {
+    "crazypad": ("crazyflie_sd", "crazyflie_sd", [f"crazypad/{NORMAL}"]),
+    "slung_load": ("crazyflie_rpm", "crazyflie_rpm", ["slung_load/without_figure8_1.0", "slung_load/without_figure8_0.8"]),
+    "gains": ("crazyflie_lee", "crazyflie_lee", ["gains/translation_y_upgraded_0.0375", "gains/translation_y_standard_0.032", "gains/translation_y_standard_0.033"]),
+    "flapper": ("flapper_nimble", "flapper_nimble", ["flapper/level", "flapper/wAlt"]),
+}
+
+
+def learnt(out, without=()):
+    """Has session_scatter.toml learnt from the robots that DATA has."""
+    robots = []
+    for name, (vehicle, mapping, folders) in ROBOTS.items():
+        if name in without or not (DATA / name).is_dir():
+            continue
+        if name == "flapper":  # two manoeuvres in one folder
+            for log in imported(name, f"{mapping}.toml"):
+                group = OUT / "logs" / next(f for f in folders if log.name.startswith(pathlib.Path(f).name)) / log.name
+                group.parent.mkdir(parents=True, exist_ok=True)
+                if not group.exists():
+                    group.symlink_to(log)
+        else:
+            for f in folders:
+                imported(f, f"{mapping}.toml")
+        robots.append(":".join([f"{PROJECT}/configs/vehicles/{vehicle}.toml", *(str(OUT / "logs" / f) for f in folders)]))
+    done = subprocess.run([BIN / "flappy-gap", "learn-sessions", "--robots", *robots, "--out", out], capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(done.stderr.strip())
+    return done.stdout
+
+
 def contrast(name, robot, reference, flights, *more):
+    if UNSEEN:
+        part = next(n for n, (vehicle, _, _) in ROBOTS.items() if robot == f"{vehicle}.toml")
+        file = OUT / f"without_{part}.toml"
+        if not file.exists():
+            learnt(file, (part,))
+        more, name = (*more, "--sessions", file), f"{name}_unseen"
     out = OUT / "diagnoses" / name
     if not (out / "diagnosis.json").exists():
         vehicle = PROJECT / "configs/vehicles" / robot
@@ -188,6 +238,9 @@ def gains():
 
 
 (OUT / "diagnoses").mkdir(parents=True, exist_ok=True)
+if "--learn" in sys.argv[5:]:
+    print(learnt(pathlib.Path(sys.argv[sys.argv.index("--learn") + 1]).resolve()), end="")
+    sys.exit()
 for part in (crazypad, slung_load, gains):
     if (DATA / part.__name__).is_dir():
         part()

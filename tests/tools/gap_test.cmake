@@ -101,14 +101,18 @@ file(REMOVE ${WORK}/bad/flight.toml)
 expect_refused("${WORK}/bad/flight.toml: cannot be read: No such file or directory" check ${WORK}/bad)
 expect_refused("--magnitude wind: no factor; accepted: EFFECT=FACTOR, as wind=2" plan
   --vehicle ${SOURCE}/configs/vehicles/hummingbird_nominal.toml --magnitude wind)
-expect_refused("flappy-gap: A subcommand is required; accepted: check, import, diagnose, mcap, plan, learn-discrepancy, effects; see flappy-gap --help")
-expect_refused("flappy-gap: diagnos: no such command; accepted: check, import, diagnose, mcap, plan, learn-discrepancy, effects; did you mean \"diagnose\"?; see flappy-gap --help" diagnos)
+expect_refused("flappy-gap: A subcommand is required; accepted: check, import, diagnose, mcap, plan, learn-discrepancy, learn-sessions, effects; see flappy-gap --help")
+expect_refused("flappy-gap: diagnos: no such command; accepted: check, import, diagnose, mcap, plan, learn-discrepancy, learn-sessions, effects; did you mean \"diagnose\"?; see flappy-gap --help" diagnos)
 expect_refused("flappy-gap: flight is required; see flappy-gap --help" check)
 set(diagnose diagnose --vehicle ${SOURCE}/configs/vehicles/hummingbird_nominal.toml --priors ${SOURCE}/configs/gap/priors.toml
   --flights ${WORK}/good)
 expect_refused("--withhold gale: no such effect; accepted: those that flappy-gap effects lists" ${diagnose} --withhold gale)
 expect_refused("${WORK}/good/imu.csv: cannot be written: Not a directory" ${diagnose} --out ${WORK}/good/imu.csv)
 
+expect_refused("--robots crazyflie.toml: accepted: VEHICLE.toml:DIR, with more folders as VEHICLE.toml:DIR:DIR"
+  learn-sessions --robots crazyflie.toml --out ${WORK}/scatter.toml)
+expect_refused("${WORK}/bad: no flight; accepted: a folder of flight logs"
+  learn-sessions --robots ${SOURCE}/configs/vehicles/crazyflie.toml:${WORK}/bad --out ${WORK}/scatter.toml)
 set(learn learn-discrepancy --vehicle ${SOURCE}/configs/vehicles/hummingbird_nominal.toml --out ${WORK}/learnt.toml --robots)
 expect_refused("${WORK}/bad: no flight; accepted: a folder of flight logs" ${learn} ${WORK}/bad)
 expect_refused("${WORK}/good/command.csv:152: the flight lasts 3 s, at least 6 s (60 beats) are needed; accepted: flights that flappy-gap check finds no fault in"

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -14,5 +15,14 @@ struct LearnCommand {
 };
 /// Writes the learnt model discrepancy to `out`, or from pairs what differs between sessions. io::InputError if a log has a fault.
 void run_learn_discrepancy(const LearnCommand& command);
+
+struct LearnSessionsCommand {
+  std::vector<std::string>
+      robots;  ///< VEHICLE:DIR or VEHICLE:DIR:DIR..., folders of flights in which the robot flew the same
+  std::string sessions, out;  ///< to begin with; the file
+  int threads = 0;
+};
+/// Writes how much sessions differ to `out`; returns how well each robot's sessions are foretold by what the others say.
+nlohmann::ordered_json run_learn_sessions(const LearnSessionsCommand& command);
 
 }  // namespace flappy::gap

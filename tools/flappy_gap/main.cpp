@@ -239,6 +239,16 @@ int main(int argc, char** argv) {
   learn.option("--discrepancy", lessons.discrepancy, "to begin with").shows_default();
   learn.option("--out", lessons.out, "file for what is learnt").required();
   learn.option("--threads", lessons.threads, "0: one for each processor").range(0, 1024);
+  io::Command scatter = program.app().command(
+      "learn-sessions", "how much sessions of beat-averaged robots differ, from robots to which nothing was done");
+  gap::LearnSessionsCommand normal{
+      .robots = {}, .sessions = io::config_path("gap/beat_averaged/session_scatter.toml"), .out = {}};
+  scatter
+      .option("--robots", normal.robots, "VEHICLE.toml:DIR, its flights; VEHICLE.toml:DIR:DIR, of several manoeuvres")
+      .required();
+  scatter.option("--sessions", normal.sessions, "to begin with").shows_default();
+  scatter.option("--out", normal.out, "file for what is learnt").required();
+  scatter.option("--threads", normal.threads, "0: one for each processor").range(0, 1024);
   io::Command effects = program.app().command("effects", "lists the catalogue of effects: parameters, ranges, sources");
   bool beat_averaged = false;
   effects.flag("--beat-averaged", beat_averaged, "of a beat-averaged vehicle");
@@ -261,6 +271,8 @@ int main(int argc, char** argv) {
       program.write_json(gap::run_mcap({flight, declared, diagnosis, topics}));
     } else if (plan.given()) {
       program.write_json(gap::run_plan(planned));
+    } else if (scatter.given()) {
+      program.write_json(gap::run_learn_sessions(normal));
     } else if (learn.given()) {
       gap::run_learn_discrepancy(lessons);
       program.write_json({{"out", lessons.out}});

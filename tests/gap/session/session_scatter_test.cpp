@@ -51,8 +51,9 @@ TEST(SessionScatter, LearnsFromTheRobotsOwnSessions) {
   EXPECT_NEAR(std::sqrt(scatter(VectorXd::Constant(1, 0.3)).variance()[0]), before, 1e-12);
   VectorXd calm(100), wild(100);
   for (int i = 0; i < 100; ++i) calm[i] = (i % 2 ? 1 : -1) * 1e-3, wild[i] = (i % 2 ? 1 : -1) * 0.1;
-  // the variance of the prior, which counts for `freedom` of 102 degrees, adds to that of +-1e-3
-  EXPECT_NEAR(std::sqrt(scatter(calm).variance()[0]), std::hypot(1e-3, before * std::sqrt(3.0 / 102)), 1e-4);
+  // the variance of the prior, which counts for `freedom` degrees besides 99, adds to that of +-1e-3
+  EXPECT_NEAR(std::sqrt(scatter(calm).variance()[0]),
+              std::hypot(1e-3, before * std::sqrt(prior().freedom / (prior().freedom + 99))), 1e-4);
   EXPECT_NEAR(std::sqrt(scatter(wild).variance()[0]), 0.1, 2e-3);
 }
 
