@@ -90,10 +90,13 @@ std::vector<std::string> contrast_warnings(const std::vector<flightlog::FlightHe
     for (const auto& f : tests)
       for (const double v : values(f)) beyond += v < range.low || v > range.high ? 1 : 0, all += 1;
     if (beyond > kMaxBeyond * all)
-      lines.push_back(io::format(
-          "%.0f %% of the flights have a %s that the reference never has (%.3g to %.3g %s): "
-          "errors of the model do not cancel there",
-          100 * beyond / all, quantities[q].name.c_str(), range.low, range.high, quantities[q].unit.c_str()));
+      lines.push_back(io::format("%.0f %% of the flights have a %s that the reference never has (%.3g to %.3g%s): %s",
+                                 100 * beyond / all, quantities[q].name.c_str(), range.low, range.high,
+                                 quantities[q].unit.empty() ? "" : (" " + quantities[q].unit).c_str(),
+                                 // the quantities of sessions are corrected for what depends on it, as a straight line
+                                 tests.front()->is_averaged()
+                                     ? "what the robot shows there is extrapolated from the reference"
+                                     : "errors of the model do not cancel there"));
   }
   return lines;
 }

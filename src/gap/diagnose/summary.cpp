@@ -48,8 +48,10 @@ std::string next_line(const Diagnosis& r, const std::string& out) {
   const std::string vehicle =
       (out.empty() ? "DIR" : std::filesystem::absolute(out).lexically_normal().string()) + "/vehicle_corrected.toml";
   switch (c.kind) {
-    case VerdictKind::effect:
     case VerdictKind::parameters:
+      if (!r.reference.empty()) return "next: nothing to correct; more reference sessions show smaller changes";
+      [[fallthrough]];
+    case VerdictKind::effect:
       return "next: train or fly on what was found, as with flappy-train CONFIG --set vehicle=" + vehicle;
     case VerdictKind::group:
       return "next: fly so that these differ, and diagnose old and new flights together";

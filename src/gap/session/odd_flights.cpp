@@ -25,7 +25,10 @@ std::vector<OddFlight> odd_flights(const std::vector<std::string>& names, const 
     OddFlight most{names[f], "", 0, {}, {}};
     for (Index q = 0; q < scatter.variance().size(); ++q) {
       const double n = static_cast<double>(flights.size() - 1);
-      const double sd = std::sqrt(scatter.variance()[q] * (1 + 1 / n) +
+      double square = scatter.freedom() * scatter.variance()[q];  // of sessions, and of the others of the set
+      for (std::size_t g = 0; g < flights.size(); ++g)
+        if (g != f) square += std::pow(flights[g].values()[q] - mean.values(0, q), 2);
+      const double sd = std::sqrt(square / (scatter.freedom() + n - 1) * (1 + 1 / n) +
                                   std::max(flights[f].variances()[q] - scatter.noise()[q], 0.0));
       const double times = (flights[f].values()[q] - mean.values(0, q)) / sd;
       if (std::abs(times) > std::abs(most.times))

@@ -82,14 +82,21 @@ flightlog::FlightLog fly(const Robot& r, std::uint64_t seed) {
   return log;
 }
 
-Inference contrast(const Robot& before, const Robot& after, std::vector<std::string> withheld = {}) {
+/// References, then tests. `session`: of all references; empty: each its own.
+Inference contrast(const std::vector<Robot>& before, const std::vector<Robot>& after, const std::string& session,
+                   std::vector<std::string> withheld = {}) {
   model::Vehicle vehicle = model::read_any_vehicle(test::source_path("configs/vehicles/crazyflie_sd.toml"));
   for (model::BeatAveraged::Input& i : vehicle.beat_averaged->inputs) i.high = 1.5;  // room for a heavy robot
   Flights flights;
-  for (std::uint64_t seed = 1; seed <= 4; ++seed)
-    (seed <= 2 ? flights.references : flights.tests)
-        .push_back(std::make_shared<BeatAveragedPrediction>("flight_" + std::to_string(seed),
-                                                            fly(seed <= 2 ? before : after, seed), vehicle));
+  std::uint64_t seed = 1;
+  for (const std::vector<Robot>* robots : {&before, &after})
+    for (const Robot& r : *robots) {
+      flightlog::FlightLog log = fly(r, seed);
+      if (robots == &before) log.header.session = session;
+      (robots == &before ? flights.references : flights.tests)
+          .push_back(
+              std::make_shared<BeatAveragedPrediction>("flight_" + std::to_string(seed++), std::move(log), vehicle));
+    }
   const std::string configs = test::source_path("configs/gap/");
   const sim::Randomisation uncertain =
       sim::read_randomisation(vehicle, io::Config::load(configs + "beat_averaged/priors.toml").root());
@@ -102,6 +109,10 @@ Inference contrast(const Robot& before, const Robot& after, std::vector<std::str
   options.sessions = read_session_prior(configs + "beat_averaged/session_scatter.toml");
   const ReferenceFit fit(flights.references, uncertain, options);
   return infer(flights, uncertain, std::move(options), &fit);
+}
+
+Inference contrast(const Robot& before, const Robot& after, std::vector<std::string> withheld = {}) {
+  return contrast({before, before}, {after, after}, "", std::move(withheld));
 }
 
 SeenQuantity seen(const Inference& d, const std::string& name) {
@@ -142,6 +153,18 @@ TEST(BeatAveragedContrast, TellsWhenAMotorBreaks) {
   const auto step = std::ranges::find_if(d.odd, [](const OddFlight& o) { return o.since_s.has_value(); });
   ASSERT_NE(step, d.odd.end());
   EXPECT_NEAR(*step->since_s, 8, 1);
+}
+
+// Flights of one session differ by 4 % of a motor, far more than sessions of other robots do: none is odd, but one that
+// differs by 40 %.
+TEST(BeatAveragedContrast, AFlightIsOddAmongThoseOfItsSet) {
+  std::vector<Robot> before(6);
+  for (std::size_t i = 0; i < before.size(); ++i) before[i].thrust_N[0] *= i % 2 == 0 ? 0.96 : 1.04;
+  EXPECT_TRUE(contrast(before, {{}}, "one").odd.empty());
+  before[4].thrust_N[0] *= 0.6;
+  const Inference d = contrast(before, {{}}, "one");
+  ASSERT_EQ(d.odd.size(), 1U);
+  EXPECT_EQ(d.odd.front().flight, "flight_5");
 }
 
 // The trims of two sessions differ by half a per cent of a motor, and 0.2 mm: nothing that matters.

@@ -87,6 +87,11 @@ TEST(Summary, SaysWhatToDoInThirtyLines) {
     r.verdict = {kind, {}, false, 0.9};
     EXPECT_TRUE(all().starts_with(begin)) << all();
   }
+  r.verdict.kind = VerdictKind::parameters;
+  EXPECT_NE(all().find("next: train or fly on"), std::string::npos);
+  r.reference = {"before"};
+  EXPECT_NE(all().find("next: nothing to correct; more reference sessions"), std::string::npos);
+  r.reference.clear();
   r.complete = false;
   EXPECT_TRUE(all().starts_with("Stopped before every effect was weighed")) << all();
   EXPECT_EQ(all().find("vehicle_corrected.toml"), std::string::npos);
