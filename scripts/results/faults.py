@@ -234,7 +234,10 @@ def gains():
     if NORMAL_ONLY or not (DATA / "gains/payload_with_figure8").is_dir():
         return
     head("crazyswarm2-tools")
-    row("5 g of payload", contrast("gains_payload", robot, *(imported(f"gains/payload_{w}_figure8", "crazyflie_lee.toml") for w in ("without", "with"))))
+    without, loaded = (imported(f"gains/payload_{w}_figure8", "crazyflie_lee.toml") for w in ("without", "with"))
+    row("5 g of payload, against two flights of a figure 8", contrast("gains_payload", robot, without, loaded))
+    along_y = imported("gains/translation_y_standard_0.032", "crazyflie_lee.toml")
+    row("against twelve flights along y", contrast("gains_payload_along_y", robot, along_y, loaded))
 
 
 (OUT / "diagnoses").mkdir(parents=True, exist_ok=True)
