@@ -19,7 +19,7 @@ namespace flappy::gap {
 struct SessionPrior {
   struct Block {
     double scatter;  ///< s_0, in units of the quantity, before the noise of its flights
-    double drift;    ///< standard deviation by which the robot walks from one session to the next
+    double drift;    ///< standard deviation of the walk from one session to the next, or in a day
     double unknown;  ///< standard deviation of what a cause does that is not in the catalogue
     double leak;     ///< probability that a quantity changes by as much where another one does
   };
