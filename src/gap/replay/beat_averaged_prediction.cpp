@@ -16,11 +16,12 @@ using Vec = model::Vec3<double>;
 
 /// Rows in a period of the bandwidth. Choice: a little more than the two that the sampling theorem asks for.
 constexpr double kRowsPerPeriod = 2.2;
-/// Least number of rows of a flight in the air and seen. Choice.
+/// Smallest number of rows of a flight in the air and seen. Choice.
 constexpr std::size_t kMinRows = 12;
-/// Moments are compared as means over this time. Choice: by then an autopilot has counteracted most of what disturbs it.
+/// Moments are compared as means over this time. Choice: by then an autopilot has counteracted most of what disturbs
+/// it.
 constexpr double kTrim_s = 3;
-/// Least thrust that moments are divided by, as a share of the weight. Choice.
+/// Smallest thrust that moments are divided by, as a share of the weight. Choice.
 constexpr double kMinThrust = 0.1;
 
 Vec vec(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }

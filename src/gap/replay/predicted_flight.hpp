@@ -1,5 +1,6 @@
 // A recorded flight and its predictions as rows: for each beat, the coefficients of each channel. Implemented for
-// vehicles with wings and motors (reset_prediction.hpp) and beat-averaged ones (beat_averaged_prediction.hpp).
+// vehicles with wings and motors (reset_prediction.hpp) and beat-averaged ones (beat_averaged_prediction.hpp). "Beat"
+// is the index of both: for beat-averaged vehicles it counts rows in time, which are not beats of the wings.
 #pragma once
 
 #include <memory>
@@ -16,18 +17,20 @@
 namespace flappy::gap {
 
 enum Channel : int {
+  // of vehicles with wings the angular acceleration is less the recorded one: measured rows are 0
   kAngularAccelerationX,
   kAngularAccelerationY,
   kAngularAccelerationZ,  ///< rad/s^2, B
   kSpecificForceX,
   kSpecificForceY,
   kSpecificForceZ,  ///< at the IMU, or for beat-averaged vehicles at the torso origin, m/s^2, B
+  // from here on only for vehicles with wings
   kStrokeLeft,
-  kStrokeRight,  ///< stroke angle, rad; only where logged
-  kBattery,      ///< battery voltage, V; only where logged
+  kStrokeRight,  ///< stroke angle, rad; only covered where logged
+  kBattery,      ///< battery voltage, V; only covered where logged
   kCurrentLeft,
-  kCurrentRight,  ///< motor current, A; only where logged
-  // motion capture against the IMU, without a vehicle (stream_rows.hpp): only the mean of a beat
+  kCurrentRight,  ///< motor current, A; only covered where logged
+  // motion capture against the IMU, without a vehicle (stream_rows.hpp), so every vehicle predicts 0; only the mean
   kPathX,
   kPathY,
   kPathZ,  ///< acceleration of the torso origin by motion capture less that by the IMU, m/s^2, W
@@ -39,7 +42,8 @@ enum Channel : int {
 const char* channel_name(int channel);
 const char* channel_unit(int channel);
 
-/// Rows of one flight: [beat][channel][coefficient].
+/// Rows of one flight: [beat][channel][coefficient], in the channel's unit. Rows that are not covered are 0 or
+/// undefined.
 using Rows = std::vector<double>;
 inline constexpr std::size_t kRowsPerBeat = static_cast<std::size_t>(kChannels) * kCoefficients;
 
@@ -48,23 +52,26 @@ constexpr std::size_t row_of_mean(std::size_t beat, int channel) {
   return beat * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients;
 }
 
-/// A vehicle that may have flown a recording, and the errors of its sensors.
+/// A vehicle that may have flown a recording, and the errors of its sensors. Hypothesis::vehicle makes it.
 struct VehicleHypothesis {
-  model::Vehicle vehicle;
-  double lag_s = 0;      ///< delay of the sensors relative to the inputs, beyond the latency in the header
-  EffectValues sensors;  ///< errors of sensors that the headers do not declare (gap/replay/sensor_correction.hpp)
-  std::vector<double> variates;  ///< draws of the vehicle's parameters: two that are equal differ only in effects
-  EffectValues file_effects;     ///< the effects of the vehicle file, which reference flights keep
+  model::Vehicle vehicle;  ///< with its effects
+  /// By how much the inputs act later than the log says: a latency of all sensors that their headers do not declare; of
+  /// a beat-averaged vehicle, a delay of the commands.
+  double lag_s = 0;
+  EffectValues sensors;  ///< errors of declared sensors (gap/replay/sensor_correction.hpp); none if beat-averaged
+  /// Draws of the vehicle's parameters. Two vehicles of one robot with the same draws differ in effects alone.
+  std::vector<double> variates;
+  EffectValues file_effects;  ///< effects of the vehicle file: all that the vehicle has in reference flights
 };
 
-/// Kinds of functions of the regime (gap/evidence/evidence.hpp).
+/// Kinds of functions of the regime (gap/evidence/evidence.hpp). Each has a prior of its own (Shares).
 enum class BasisFunction {
   constant,
   input,
-  rate,
-  product,
-  place,
-  flight,  ///< 1 in one flight, 0 in the others
+  rate,     ///< body rates and, of beat-averaged vehicles, angular accelerations
+  product,  ///< of an input and another function
+  place,    ///< height, nearness of surfaces, heading, attitude, time
+  flight,   ///< 1 in one flight, 0 in the others
   velocity_x,
   velocity_y,
   velocity_z,
@@ -74,6 +81,7 @@ enum class BasisFunction {
   count
 };
 
+/// A function of input and motion, of which the model discrepancy is a sum.
 struct RegimeFunction {
   std::string name;
   /// What it depends on: the name of an input, amplitude, velocity, rate, height, ceiling, wall, heading, time, ...
@@ -82,6 +90,7 @@ struct RegimeFunction {
   Eigen::VectorXd values;  ///< [beat]
 };
 
+/// A quantity by which residuals are located (gap/localise/where.hpp).
 struct RegimeQuantity {
   std::string name, unit;
   std::vector<double> values;  ///< [beat]
@@ -90,7 +99,7 @@ struct RegimeQuantity {
 class PredictedFlight {
  public:
   virtual ~PredictedFlight() = default;
-  /// Residuals without the effects of a vehicle, which hypotheses share if the flight is a reference.
+  /// Residuals of earlier vehicles; only residuals() uses it, of reference flights.
   ResidualMemo& memo() const { return *memo_; }
   /// Frees what is kept to be faster: hundreds of megabytes.
   virtual void forget() const { memo_->clear(); }
@@ -100,28 +109,31 @@ class PredictedFlight {
   virtual bool has_ground() const = 0;    ///< whether the log declares a ground
   virtual std::size_t beats() const = 0;  ///< number of beats; of a beat-averaged vehicle, number of rows in time
   virtual double beats_Hz() const = 0;    ///< beats, or these rows, a second
-  /// Whether a channel has data in a beat.
+  /// Whether a channel counts in a beat. Only rows of such beats are compared.
   virtual bool covers(std::size_t beat, int channel) const = 0;
   /// Whether a coefficient of a channel is compared at all.
   virtual bool has_rows(int channel, int coefficient) const = 0;
-  /// Whether what no model explains in a channel counts as noise, but its mean over a session: moments that an autopilot
-  /// counteracts.
+  /// Whether all that no model explains in a channel counts as noise, except its mean over a session: the case for
+  /// moments that an autopilot counteracts.
   virtual bool disturbed(int /*channel*/) const { return false; }
+  /// What the sensors measured.
   virtual const Rows& measured() const = 0;
-  /// The signal of each channel, which the model discrepancy is a share of: the measured rows. Exceptions for vehicles
-  /// with wings and motors: for the angular acceleration the recorded one, as the rows are already differences from it;
-  /// for the battery its voltage less the full voltage; for path and rotate constants. For moments that an autopilot
-  /// counteracts, which add up to nothing: the root of the sum of their squares.
+  /// The signal of each channel, of which the model discrepancy is a share: the measured rows, with exceptions. Of a
+  /// vehicle with wings: the recorded angular acceleration; the battery's voltage less its full voltage; constants for
+  /// path and rotate. Of moments that an autopilot counteracts, which add up to nothing: the root of the sum of the
+  /// squares of the single ones.
   virtual const Rows& signal() const = 0;
-  /// Rows that the sensors of each vehicle would have measured, [vehicle]; empty if its simulation diverges.
+  /// [vehicle] Rows that the sensors of each vehicle would have measured; empty if its simulation diverges. All effects
+  /// of `vehicle` are simulated but, of a vehicle with wings, those of sensors, which are undone in the log instead
+  /// (corrected()). residuals() calls it.
   virtual std::vector<Rows> predict(const std::vector<const VehicleHypothesis*>& vehicles) const = 0;
-  /// Smooths rows that were predicted elsewhere over beats, as `measured` and `predict` do.
-  virtual void weigh(Rows& /*rows*/) const {}
   /// Rows that the declared noise of the sensors alone would give: one realisation for each seed.
   virtual Rows declared_noise(std::uint64_t seed) const = 0;
+  /// Functions of the regime, without the constant, offsets of flights, and products(). RegimeBasis centres them.
   virtual std::vector<RegimeFunction> functions() const = 0;
   /// Pairs of functions, by name, whose products complete the regime basis.
   virtual std::vector<std::pair<std::string, std::string>> products() const = 0;
+  /// Quantities whose thirds residuals are located by, and inputs that they may be proportional to.
   virtual std::vector<RegimeQuantity> regimes() const = 0;
   virtual std::vector<RegimeQuantity> inputs() const = 0;
   /// Logarithm of the rms of the inputs' second differences, in shares of their ranges: how much the controller shakes
@@ -131,10 +143,11 @@ class PredictedFlight {
   virtual bool is_averaged() const = 0;
   /// Null for beat-averaged vehicles.
   virtual const Recording* recording() const { return nullptr; }
-  /// The same beats with another log. Null for beat-averaged vehicles.
+  /// The same beats with another log (Recording's second constructor). Null for beat-averaged vehicles. For
+  /// corrected(), and for tests.
   virtual std::shared_ptr<const PredictedFlight> with_log(const flightlog::FlightLog& /*log*/) const { return nullptr; }
-  /// The same beats with the given errors of sensors undone in the log. Null for beat-averaged vehicles, whose
-  /// prediction includes the effects of their sensors.
+  /// The same beats with the given effects and errors of sensors undone in the log. Null for beat-averaged vehicles,
+  /// whose prediction includes the effects of their sensors.
   virtual std::shared_ptr<const PredictedFlight> corrected(const EffectValues& /*sensors*/) const { return nullptr; }
 
  private:
@@ -143,7 +156,8 @@ class PredictedFlight {
 
 using FlightList = std::vector<std::shared_ptr<const PredictedFlight>>;
 
-/// The flights of one robot. Where all are counted, references come first.
+/// The flights of one robot. An index [flight] counts the references first, then the tests; [test flight] counts the
+/// tests alone.
 struct Flights {
   FlightList references;  ///< from before the change that is asked about: the robot is believed to have had no effects
   FlightList tests;       ///< the flights asked about

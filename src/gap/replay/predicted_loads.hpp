@@ -1,4 +1,5 @@
-// Loads on a vehicle in a flight, as the user's simulator predicts them (model = "predicted"): FOLDER/predicted.csv,
+// Reads the loads on a beat-averaged vehicle in a flight, as the user's simulator predicts them (model = "predicted"):
+// FOLDER/predicted.csv,
 //   t_s                                      on the clock of command.csv; covers the time common to motion capture and
 //                                            commands, in steps of at most half a period of beat.bandwidth_Hz
 //   force_x_N ... moment_z_Nm                in B, about the torso's origin: all but weight, for recorded inputs,
@@ -22,6 +23,7 @@ struct PredictedColumn {
   std::vector<double> values;              ///< [step of the motion's grid] N or N m, over the coefficient's unit
 };
 
+/// The columns of the file but t_s, in its order, interpolated to the grid of the motion; without its low-pass.
 /// `from_s`, `to_s`: the time common to motion capture and commands. io::InputError with file and line if the file is
 /// not a prediction of this vehicle for this flight.
 std::vector<PredictedColumn> read_predicted_loads(const std::filesystem::path& file, const model::BeatAveraged& vehicle,

@@ -1,5 +1,5 @@
-// A recorded flight, prepared for replay: motor voltages, motion of the torso at the bounds of the IMU's intervals, and
-// the measurements in each.
+// A recorded flight of a vehicle with wings and motors, prepared for replay: motor voltages, motion of the torso at the
+// bounds of the IMU's intervals, measured force in each interval. ResetPrediction replays it.
 #pragma once
 
 #include <filesystem>
@@ -24,44 +24,59 @@ inline constexpr double kSpinUpBeats = 6;
 /// Below this height above its stand, a vehicle may touch the ground, which no hypothesis models. Choice.
 inline constexpr double kMinClearance_m = 0.01;
 
-/// Inputs and motion of a flight, as means over one beat.
+/// Inputs and motion in one beat. Inputs are computed from the motor voltages. All are 0 in a beat without intervals.
 struct BeatMotion {
-  double t_s = 0, amplitude_V = 0, difference_V = 0, bias_V = 0, split_cycle = 0;
+  double t_s = 0;           ///< mean of the times at which the beat's intervals end
+  double amplitude_V = 0;   ///< first harmonic of the voltage (its cosine): mean of both sides
+  double difference_V = 0;  ///< the same: half of left less right
+  double bias_V = 0;        ///< mean voltage of both sides
+  double split_cycle = 0;   ///< second harmonic (its sine): half of left less right, over amplitude_V
+  /// Means over the ends of the beat's intervals: velocity of the torso origin in B, body rate in B, position of the
+  /// torso origin in W.
   Eigen::Vector3d velocity_B_m_s, rate_rad_s, position_m;
-  double heading_rad = 0;  ///< in the beat's last interval, not a mean
+  double heading_rad = 0;  ///< of the body's x axis in W, at the end of the beat's last interval
 };
 
 struct Recording {
   std::string name;
   double least_z_m = 0;      ///< below this height of the torso origin in W, the vehicle may touch the ground
   double density_ratio = 1;  ///< air density of the flight over that of the vehicle file
-  /// Battery voltage at the start over nominal, which commands refer to. Its later fall is left to the vehicle's model.
+  /// Battery voltage at the start over the nominal voltage, which commands refer to; 1 if no voltage is logged, or if
+  /// it is less than 1.02. The vehicle's model predicts how it falls from there.
   double full = 1;
   flightlog::FlightLog log;
   flightlog::Smoother smoother;
   sim::World world;
 
-  // the grid: intervals of the IMU, rounded to whole physics steps
-  double begin_s = 0, last_s = 0;
-  std::vector<int> steps;                   ///< [interval] number of physics steps
-  std::vector<double> end_s;                ///< [interval]
-  std::vector<char> valid;                  ///< [interval] all streams have data, and the ground is not touched
-  std::vector<TorsoAt> torso;               ///< at the bounds of the intervals: one more than intervals
-  std::vector<Eigen::Vector3d> force_m_s2;  ///< [interval] measured specific force, mean over the interval
-  std::vector<double> left_V, right_V;      ///< [physics step]
+  // The grid: intervals of the IMU, each rounded to whole physics steps of kPredictionStep_s. A gap of the IMU is cut
+  // into intervals of usual length.
+  double begin_s = 0;         ///< where the first interval begins
+  double last_s = 0;          ///< no interval ends later
+  std::vector<int> steps;     ///< [interval] number of physics steps
+  std::vector<double> end_s;  ///< [interval]
+  /// [interval] Whether it counts: IMU and motion capture have data, commands have no gap, nor had one in the
+  /// kSpinUpBeats before, and the torso is above least_z_m. What wings.csv and power.csv lack is left to
+  /// ResetPrediction.
+  std::vector<char> valid;
+  std::vector<TorsoAt> torso;               ///< [bound of an interval] one more than intervals
+  std::vector<Eigen::Vector3d> force_m_s2;  ///< [interval] mean specific force at the IMU, bias included, in B
+  std::vector<double> left_V, right_V;      ///< [physics step] commanded voltage times `full`
 
-  std::vector<double> beat;         ///< [interval] time at its middle, in beats since the start (beat_at)
-  std::size_t beats = 0;            ///< number of whole beats
+  std::vector<double> beat;  ///< [interval] its middle, in beats since beat 0 began (beat_at)
+  /// Number of beats, counted by the phase of the commands. The grid may begin within beat 0, which is cut off then.
+  std::size_t beats = 0;
   std::vector<BeatMotion> regimes;  ///< [beat]
 
-  /// `nominal`: the vehicle that is believed to have flown. InputError naming `folder` if no part can be replayed.
+  /// `folder`: of the log. `nominal`: the vehicle that is believed to have flown. io::InputError naming `folder` if no
+  /// interval has motion capture around it, or the smoother or the density of the air refuses the log.
   Recording(const std::filesystem::path& folder, flightlog::FlightLog flight_log, const model::Vehicle& nominal);
-  /// The same flight over the same beats, with another log, in which errors of sensors were corrected.
+  /// The same flight over the same beats, with a changed copy of `other.log`, such as one in which errors of sensors
+  /// were undone. Its times are those of regular clocks already (flightlog::on_its_clocks).
   Recording(const Recording& other, flightlog::FlightLog flight_log);
 
   double interval_s(std::size_t k) const { return steps[k] * kPredictionStep_s; }
   std::size_t intervals() const { return steps.size(); }
-  /// Time in beats since the start of beat 0; its fraction is the phase of the beat.
+  /// Time in beats since beat 0 began; its fraction is the phase of the beat. Negative before.
   double beat_at(double t_s) const;
 
  private:

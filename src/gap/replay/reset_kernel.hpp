@@ -1,5 +1,5 @@
-// The reset at the end of an IMU interval, for a block of vehicles that replay one motion. Compiled for each
-// instruction set.
+// The reset at the end of an IMU interval, for a block of vehicles that replay one motion (reset_prediction.hpp).
+// Compiled for each instruction set. A lane is one vehicle of the block.
 #pragma once
 
 #include "sim/block.hpp"
@@ -17,27 +17,29 @@ struct TorsoAt {
          body_rate_rad_s[3] = {0, 0, 0};
 };
 
-/// Rows of lanes: what the sensors of each vehicle would have measured over an interval.
+/// Index of a row in ResetBlockState::rows: what the sensors of each vehicle would have measured over an interval.
 enum ResetRow : int {
   kAngularAcceleration = 0,  ///< mean over the interval, simulated less recorded, rad/s^2, B: 3 rows
-  kSpecificForce = 3,        ///< mean at the IMU, m/s^2, in B half-way through the interval: 3 rows
+  kSpecificForce = 3,        ///< mean at the IMU, m/s^2, in the simulated B half-way through the interval: 3 rows
   kStroke = 6,               ///< stroke angle at the end of the interval, rad: left, right
   kResetRows = 8
 };
 
 /// State that a block keeps from one interval to the next, and the rows of the last interval.
 struct ResetBlockState {
-  alignas(64) Flown imu_velocity_m_s[3][kVehicles];  ///< velocity of the IMU at the start of the interval, in W
-  alignas(64) Flown rows[kResetRows][kVehicles];
+  alignas(64) Flown imu_velocity_m_s[3][kVehicles];  ///< [axis][lane] of the IMU at the start of the interval, in W
+  alignas(64) Flown rows[kResetRows][kVehicles];     ///< [ResetRow][lane]
 };
 
 /// Computes the rows of the interval from `from` to `to`, then resets every torso to the recorded motion at `to`; wings
-/// keep their state. The body rate is not set: it is changed by the mean rate that the simulated rotation lacked.
+/// keep their state. The body rate is not set to the recorded one: the mean rate is added by which the simulated
+/// rotation fell short of the recorded attitude at `to`.
 /// `from` null: the start of a flight; no rows, and the body rate is the recorded one.
 using ResetBlock = void (*)(sim::Block<Flown>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
                             const double imu_position_m[3], double gravity_m_s2, ResetBlockState& kept);
 
-/// `sample`: [signal][lane]; adds it times each weight to the rows of a beat, [weight][signal][lane].
+/// Adds a sample, times each weight, to the rows of a beat: the sums of BeatProjection for all lanes. `sample`:
+/// [signal][lane], `width` signals; `weights`: [coefficient], `count` of them; `rows`: [coefficient][signal][lane].
 using ProjectBlock = void (*)(const Flown* sample, const double* weights, int count, std::size_t width, Flown* rows);
 
 }  // namespace flappy::gap

@@ -27,8 +27,8 @@ constexpr std::size_t kSample = kSignals * kVehicles, kMeter = kMetered * kVehic
 
 /// Rounding error of a time, in steps. Choice.
 constexpr double kSameStep = 1e-3;
-/// Signals of path and rotate; times the shares of the discrepancy, how much both sensors may disagree without an effect.
-/// Choice: so the shares are in these units.
+/// Signals of path and rotate; times the shares of the discrepancy, how much both sensors may disagree without an
+/// effect. Choice: so the shares are in these units.
 constexpr double kStreamSignal_m_s2 = 1, kStreamSignal_rad_s = 1;
 
 /// Beats to either side that a second difference of positions over three beats reaches. Derived: from kKernel.
@@ -182,10 +182,6 @@ void ResetPrediction::smooth_forces(Rows& rows, const Eigen::Matrix3Xd& more_m_s
   }
 }
 
-void ResetPrediction::weigh(Rows& rows) const {
-  smooth_forces(rows, Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(recording_.beats)));
-}
-
 /// `samples`: [interval][channel].
 Rows ResetPrediction::rows_of(const std::vector<double>& samples) const {
   Rows together(recording_.beats * kCoefficients * kSignals, 0), rows(recording_.beats * kRowsPerBeat, 0);
@@ -320,13 +316,14 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const VehicleHypoth
   });
   Rows metered_together(r.log.power ? r.beats * kCoefficients * kMetered * kVehicles : 0, 0);
   if (r.log.power) power_.project(seen.power.data(), kMetered * kVehicles, metered_together.data());
+  const Eigen::Matrix3Xd none = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(r.beats));
   std::vector<Rows> result(vehicles.size());
   for (std::size_t lane = 0; lane < vehicles.size(); ++lane) {
     if (seen.diverged[lane]) continue;
     Rows& rows = result[lane];
     rows.resize(r.beats * kRowsPerBeat);
     put_channels(together, r.beats, kSignals, kVehicles, lane, 0, rows);
-    weigh(rows);
+    smooth_forces(rows, none);
     if (r.log.power) put_channels(metered_together, r.beats, kMetered, kVehicles, lane, kBattery, rows);
   }
   return result;

@@ -1,9 +1,14 @@
-// Reset predictions, as in multiple shooting (Bock, Plitt 1984): what sensors of many vehicles would have measured.
-// Recorded voltages drive each vehicle, and its torso is reset to the record at every interval of the IMU; wings and
-// motors keep their state. So intervals test only their own forces and torques, errors do not accumulate, and a flight
-// is simulated once. Predictions do not depend on the other vehicles of a batch.
+// A flight of vehicles with wings and motors by reset predictions, as in multiple shooting (Bock, Plitt 1984): what the
+// sensors of many vehicles would have measured. Recorded voltages drive each vehicle, and its torso is reset to the
+// record at every interval of the IMU; wings and motors keep their state, and of the body rate only that part changes
+// which the simulated rotation lacked. So intervals test little but their own forces and torques, errors of the motion
+// do not accumulate, and a flight is simulated once. Predictions do not depend on the other vehicles of a batch.
+//
+// Rows of the angular acceleration are differences from the record: predict() gives simulated less recorded, and
+// measured() is 0.
 // A beat's measured mean force is that of motion capture, a second difference of positions over three beats, which
-// weighs beats as 1 2 3 2 1: an accelerometer aliases vibration above its rate. Predicted forces are weighed likewise.
+// weighs beats as 1 2 3 2 1: an accelerometer aliases vibration above its rate. Predicted mean forces are weighed
+// likewise. Harmonics of the force are the accelerometer's.
 #pragma once
 
 #include <deque>
@@ -13,8 +18,8 @@
 
 namespace flappy::gap {
 
-/// What the IMU measured in one of its intervals, less what a vehicle predicts: specific force, and the rate that the
-/// vehicle gains in this interval alone, both in B.
+/// What the IMU measured in one of its intervals less what a vehicle predicts: specific force, and the body rate that
+/// is gained in this interval alone; both in B.
 struct ImuResidual {
   std::size_t sample = 0;  ///< of imu.csv
   Eigen::Vector3d force_m_s2, rate_rad_s;
@@ -22,6 +27,7 @@ struct ImuResidual {
 
 class ResetPrediction final : public PredictedFlight {
  public:
+  /// Channels of wings.csv and power.csv have rows of 0 if their stream is not logged.
   explicit ResetPrediction(Recording recording);
 
   const std::string& name() const override { return recording_.name; }
@@ -29,18 +35,21 @@ class ResetPrediction final : public PredictedFlight {
   bool has_ground() const override { return recording_.world.has_ground(); }
   std::size_t beats() const override { return recording_.beats; }
   double beats_Hz() const override { return recording_.log.header.flapping_Hz; }
-  /// Specific force needs mocap in the beat and the IMU in two more on each side; path and rotate need mocap, the others
-  /// a log.
+  /// No channel covers a beat of the first kSpinUpBeats, or one in which the IMU's intervals are not valid
+  /// (Recording::valid). Besides, path and rotate need motion capture kSpan beats to either side (stream_rows.hpp), the
+  /// specific force the same and two covered beats to either side, strokes need wings.csv, battery and currents
+  /// power.csv.
   bool covers(std::size_t beat, int channel) const override;
-  /// Coefficient 0 is the mean of a beat, the others are its harmonics; path and rotate have only the mean.
+  /// Coefficient 0 is the mean of a beat, the others are its harmonics; path and rotate have only the mean. True of
+  /// streams that are not logged, too, which covers() leaves out.
   bool has_rows(int channel, int coefficient) const override { return channel < kPathX || coefficient == 0; }
   const Rows& measured() const override { return measured_; }
   const Rows& signal() const override { return signal_; }
-  /// Takes 1 to kVehicles vehicles (reset_kernel.hpp). The rows of a vehicle whose simulation diverges are empty.
+  /// Takes 1 to kVehicles vehicles (reset_kernel.hpp). Changes that the log's header declares are made to each.
   std::vector<Rows> predict(const std::vector<const VehicleHypothesis*>& vehicles) const override;
-  /// In the intervals whose sample and motion are known, once the wings have spun up; empty if the simulation diverges.
+  /// Residuals of single samples, for flappy-gap mcap: in valid intervals with a sample, once the wings have spun up;
+  /// empty if the simulation diverges.
   std::vector<ImuResidual> imu_residuals(const VehicleHypothesis& vehicle) const;
-  void weigh(Rows& rows) const override;
   Rows declared_noise(std::uint64_t seed) const override;
   std::vector<RegimeFunction> functions() const override;
   std::vector<std::pair<std::string, std::string>> products() const override;
@@ -49,7 +58,8 @@ class ResetPrediction final : public PredictedFlight {
   bool is_averaged() const override { return false; }
   const Recording* recording() const override { return &recording_; }
   std::shared_ptr<const PredictedFlight> with_log(const flightlog::FlightLog& log) const override;
-  /// Undoes errors of sensors in the log. Caches the last kMaxCorrected results; several threads may call it.
+  /// Leaves alone what the log's header says the robot flew without. Caches the last kMaxCorrected results; several
+  /// threads may call it.
   std::shared_ptr<const PredictedFlight> corrected(const EffectValues& given) const override;
   void forget() const override;
   /// Logs that are kept. Size: of a cache.

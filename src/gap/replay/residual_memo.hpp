@@ -1,4 +1,5 @@
-// Residuals of a reference flight that were computed before. Hypotheses that differ only in effects share them.
+// Residuals of one reference flight that were computed before (residuals.cpp). In references, vehicles have the effects
+// of their file alone, so hypotheses that differ only in effects share them.
 #pragma once
 
 #include <deque>
@@ -14,9 +15,9 @@ namespace flappy::gap {
 
 class ResidualMemo {
  public:
-  /// Draws of the vehicle's parameters, delay of the sensors, errors of the sensors.
+  /// VehicleHypothesis::variates, lag_s and sensors.
   using Key = std::tuple<std::vector<double>, double, EffectValues>;
-  /// None: not known. Thread-safe, as is keep().
+  /// The residual rows of the flight, empty if the simulation diverged; none: not known. All functions are thread-safe.
   std::optional<std::vector<double>> find(const Key& key) const {
     const std::scoped_lock lock(mutex_);
     const auto at = known_.find(key);

@@ -111,7 +111,7 @@ std::vector<Residuals> residuals(const Flights& flights, const std::vector<Vehic
   return list;
 }
 
-Residuals tests_of(const Flights& flights, Residuals residual) {
+TestResiduals tests_of(const Flights& flights, Residuals residual) {
   residual.erase(residual.begin(), residual.begin() + static_cast<std::ptrdiff_t>(flights.references.size()));
   return residual;
 }

@@ -1,17 +1,25 @@
+// What flights measured less what vehicles predict, row by row: all fits and tests of a diagnosis compare by this.
 #pragma once
 
 #include "gap/replay/predicted_flight.hpp"
 
 namespace flappy::gap {
 
-/// Rows of all flights, [flight].
+/// [flight] Rows of all flights of a robot, indexed as Flights: the references first. Functions that are given some
+/// flights alone, such as those of a fold, say so.
 using Residuals = std::vector<Rows>;
+/// [test flight] Rows of the test flights alone.
+using TestResiduals = std::vector<Rows>;
 
-/// Measured less predicted rows, [vehicle][flight]; empty for a vehicle whose simulation diverges. Effects of sensors
-/// are undone in the logs, except for beat-averaged vehicles, which predict them. `threads`: as for io::parallel_for.
-/// Reference flights are predicted without the effects of a vehicle.
+/// [vehicle][flight] Measured less predicted rows. If the simulation of a vehicle diverges in any flight, its whole
+/// list is empty, so [vehicle] has no flights. In test flights a vehicle has its effects; in references it has those of
+/// the vehicle file (VehicleHypothesis::file_effects) in their place.
+/// Effects of sensors are undone in the log, for vehicles with wings; beat-averaged vehicles predict them.
+/// References remember their residuals by the vehicle's variates, lag and sensors, and look at nothing else of it: two
+/// vehicles of the same variates must have the same parameters.
+/// `threads`: as for io::parallel_for.
 std::vector<Residuals> residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads);
-/// Those of the test flights alone.
-Residuals tests_of(const Flights& flights, Residuals residual);
+/// Drops the reference flights. `residual` must not be empty.
+TestResiduals tests_of(const Flights& flights, Residuals residual);
 
 }  // namespace flappy::gap

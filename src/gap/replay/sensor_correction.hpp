@@ -1,4 +1,5 @@
 // Undoes effects of sensors in a log, so that one simulation serves all of them; effects of the vehicle are simulated.
+// Only for vehicles with wings and motors: beat-averaged ones predict their effects of sensors.
 //
 //   gyro_bias                   gyro - drift (1 - exp(-t / warm_up)), t since the log began; the drift's mean is kept
 //   accelerometer_misalignment  specific force rotated back by a small rotation vector
@@ -24,9 +25,11 @@ namespace flappy::gap {
 
 /// Parameter values by [effect or error of a sensor][parameter].
 using EffectValues = std::map<std::string, std::map<std::string, double>>;
+/// Those of `effects` that are effects of sensors.
 EffectValues sensor_effects(const EffectValues& effects);
 
-/// `log` with the given effects and errors of sensors undone; other effects are ignored.
+/// `log` with the given effects and errors of sensors undone, the last that the sensor makes first; other effects are
+/// ignored. Each that is given has all of its parameters (std::out_of_range).
 flightlog::FlightLog without(const EffectValues& effects, flightlog::FlightLog log);
 
 }  // namespace flappy::gap

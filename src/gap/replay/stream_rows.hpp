@@ -14,13 +14,14 @@
 namespace flappy::gap {
 
 struct StreamRow {
-  Eigen::Vector3d path_m_s2 = Eigen::Vector3d::Zero(), rotate_rad_s = Eigen::Vector3d::Zero();
-  bool valid = false;
+  Eigen::Vector3d path_m_s2 = Eigen::Vector3d::Zero();     ///< in W
+  Eigen::Vector3d rotate_rad_s = Eigen::Vector3d::Zero();  ///< in B
+  bool valid = false;  ///< false: motion capture lacks one of the kSpan beats to either side; the rows are 0
 };
 
 /// [beat].
 std::vector<StreamRow> stream_rows(const Recording& recording);
-/// Rows that the declared noise of IMU and motion capture, or of the latter alone, would give, [beat].
+/// [beat] Rows that the declared noise would give: of IMU and motion capture, or of motion capture alone.
 std::vector<StreamRow> stream_noise(const Recording& recording, std::uint64_t seed, bool mocap_alone);
 
 }  // namespace flappy::gap
