@@ -39,7 +39,7 @@ struct Fit {
   SufficientStatistics statistics;  ///< statistics of the residual, averaged over points around `at`
   /// [direction][group][basis] change of the prediction per unit along it; empty if the simulation diverges there.
   std::vector<BasisCoefficients> columns;
-  double law_factor = 1;  ///< by how much the laws of its effects may deviate from the catalogue's (Fitter::law_sd)
+  double law_factor = 1;  ///< factor on how far the laws of its effects may deviate from the catalogue's (law_sd)
   Posterior posterior;    ///< [direction], relative to `at`; its log evidence is with the fitter's scales, in nats
   bool flown() const { return !residual.empty(); }
   /// Posterior mean, [coordinate], and covariance of the coordinates.
@@ -47,7 +47,8 @@ struct Fit {
   Eigen::MatrixXd covariance() const;
 };
 
-/// Background magnitude of an effect: a regressor with a standard normal coefficient.
+/// Background magnitude of an effect: a regressor whose coefficient is standard normal a priori, times a scale
+/// (Scales::effects). In a contrast also what sessions differ by.
 struct Background {
   /// An unknown of an effect ("": of those that all hypotheses share), by index, and by how much the column moves its
   /// coordinate.
@@ -56,8 +57,8 @@ struct Background {
     Eigen::Index unknown;
     double by;
   };
-  std::string effect;
-  BasisCoefficients column;
+  std::string effect;            ///< name of its scale: an effect, perhaps with kOfBoth, kModelOf or kSessionOf
+  BasisCoefficients column;      ///< [group][basis]
   std::vector<Move> moves = {};  ///< empty: the column is no vehicle's, as that of a shape
 };
 
@@ -70,8 +71,8 @@ class Fitter {
   /// Without nuisance regressors; scales are 1. Keeps references to `rules` and `flights`.
   Fitter(const FitRules& rules, const Flights& flights, std::shared_ptr<const Evidence> evidence, int threads);
   Fitter with_evidence(std::shared_ptr<const Evidence> evidence) const;
-  /// Fits `nuisances`, then background magnitudes, jointly with every hypothesis, even those of effects that it names.
-  /// Leaves out regressors on which the flights have no information, given `fit`.
+  /// Fits `nuisances`, then `background`, jointly with every hypothesis. A hypothesis keeps the background of effects
+  /// that it names. Leaves out regressors on which the flights have no information, given `fit`.
   Fitter with_nuisances(const Regressors& nuisances, const std::vector<Background>& background, const Fit& fit) const;
   /// Columns of magnitudes that act linearly and need not be simulated.
   Fitter with_linear_magnitudes(LinearMagnitudes magnitudes) const;
@@ -85,7 +86,7 @@ class Fitter {
   const Scales& scales() const { return scales_; }
   /// Names of Scales::effects.
   const std::vector<std::string>& effects() const { return effects_; }
-  /// Index of an effect in Scales::effects; -1: none.
+  /// Index of a name in effects(), so in Scales::effects; -1: none.
   int place_of(const std::string& effect) const;
   std::vector<char> all_flights() const { return std::vector<char>(flights_->size(), 1); }
 
@@ -102,8 +103,8 @@ class Fitter {
 
   /// The columns of a fit, without empty ones.
   static Regressors own_regressors(const Fit& fit);
-  /// The part of a posterior of own_regressors() and others that is of the fit's directions; those without a column keep
-  /// their prior.
+  /// The part of a posterior of own_regressors() and others that is of the fit's directions; those without a column
+  /// keep their prior.
   static Posterior of_directions(const Fit& fit, const Posterior& posterior);
   /// The columns of a fit, then nuisances and background magnitudes with the robot's scales. A named effect keeps its
   /// background, as the model may have errors along it.
@@ -113,8 +114,9 @@ class Fitter {
 
   /// Posterior along all directions of a fit, from some flights alone. `use`: [flight] whether it counts.
   Posterior posterior(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
-  /// After a fit, by its columns: the most probable coordinates from some flights alone, and the part of the residual
-  /// that nuisances then explain. Of all flights for the corrected vehicle and, in a contrast, for what changed.
+  /// After a fit, by its columns: the most probable coordinates from the flights in `use` alone, and the part of the
+  /// residual that nuisances then explain. All flights are used for the corrected vehicle and, in a contrast, for what
+  /// changed.
   struct JointFit {
     Eigen::VectorXd at;               ///< [coordinate] within the accepted ranges
     BasisCoefficients nuisances;      ///< [group][basis]

@@ -7,8 +7,8 @@
 namespace flappy::gap {
 namespace {
 
-/// Prior standard deviation of the lag of the sensors against the inputs. Choice: a header does not say whether a sample
-/// is instantaneous, averaged, or held.
+/// Prior standard deviation of the lag of the sensors against the inputs. Choice: a header does not say whether a
+/// sample is instantaneous, averaged, or held.
 constexpr double kLagSd_s = 5e-4;
 /// Largest deviation of a parameter, in prior standard deviations. Choice.
 constexpr double kMaxDeviation = 4;

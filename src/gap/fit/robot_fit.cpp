@@ -64,6 +64,7 @@ RobotFit::RobotFit(Extent extent, const FitRules& rules, const Flights& flights,
       no_effects_(uncertain_, {}) {
   if (extent == Extent::planned) {
     parameters_ = nominal_ = fitter_.linearise(no_effects_, no_effects_.start(), Fitter::axes(no_effects_));
+    if (!parameters_.flown()) throw io::InputError(kDiverges);
     find_nuisance_columns();
     return;
   }

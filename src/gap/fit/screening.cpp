@@ -133,7 +133,7 @@ class Screening {
 
 /// Distance of near steps, in standard deviations of the background. Choice.
 constexpr double kNearSd = 2;
-/// Least distance of near steps, in prior standard deviations. Choice: shorter differences are rough.
+/// Smallest distance of near steps, in prior standard deviations. Choice: shorter differences are rough.
 constexpr double kMinNearReach = 0.05;
 
 }  // namespace

@@ -9,37 +9,41 @@ namespace flappy::gap {
 
 struct Magnitude {
   std::string effect;
-  Eigen::Index unknown, unknowns;  ///< index among the effect's unknowns, and their number
+  Eigen::Index unknown, unknowns;  ///< index among the effect's unknowns, and number of these
   bool one_sided;                  ///< cannot be negative
   double from;                     ///< coordinate in the vehicle file
 };
 
+/// The vehicles that RobotFit simulates for one magnitude.
 struct MagnitudeStep : Magnitude {
-  VehicleHypothesis vehicle;               ///< one step, kMagnitudeReach, away
-  std::vector<VehicleHypothesis> shaped;   ///< one step away, with one shape parameter a standard deviation away
+  VehicleHypothesis vehicle;               ///< one step, kMagnitudeReach, above the vehicle file's value
+  std::vector<VehicleHypothesis> shaped;   ///< the same, each with one shape parameter a standard deviation up
   std::vector<VehicleHypothesis> further;  ///< two to kMaxSteps steps away; only if one_sided
-  double near_reach;                       ///< about as large as background magnitudes become
-  std::vector<VehicleHypothesis> near;     ///< near_reach away: above and, unless one_sided, below
+  double near_reach;                       ///< two standard deviations of the background, from 0.05 to kMagnitudeReach
+  std::vector<VehicleHypothesis> near;     ///< near_reach away: above and, unless one_sided, below; none if in_log
 };
-/// Number of steps along a magnitude of one sign. Choice.
+/// Number of steps along a magnitude that cannot be negative. Choice.
 inline constexpr std::size_t kMaxSteps = 5;
 /// Length of such a step, in prior standard deviations. Choice.
 inline constexpr double kMagnitudeReach = 0.4;
-/// Effects whose change is at most this are not seen. Choice: less is rounding.
+/// Effects none of whose coefficients changes by more than this are not seen. Choice: less is rounding.
 inline constexpr double kNoChange = 1e-9;
 
 /// Steps for each effect but `withheld`, with shape parameters in mid-prior. `at`: [coordinate] parameters of the
-/// robot, [0, shared()). `background`: reach of near steps; null: no near and no shaped steps.
+/// robot, [0, shared()). `background`: priors that set near_reach (FitRules::near_steps); null: no near and no shaped
+/// steps.
 std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, const Eigen::VectorXd& at,
                                            const std::vector<std::string>& withheld,
                                            const ModelDiscrepancy* background = nullptr);
 
-/// Change of the prediction for a unit of a magnitude's coordinate, near its value in the vehicle file.
+/// How a magnitude changes the prediction, per unit of its coordinate; [group][basis] each. RobotFit makes it of a
+/// MagnitudeStep.
 struct MagnitudeColumn : Magnitude {
-  BasisCoefficients change;
-  /// Change per unit at background magnitudes, above and below: small magnitudes may act differently.
+  BasisCoefficients change;  ///< mean over the first step from the value in the vehicle file
+  /// At background magnitudes, above and, if there is a step, below: small magnitudes may act differently. At least
+  /// one: `change` where nothing was simulated.
   std::vector<BasisCoefficients> near;
-  /// Change at large magnitudes, where the effect is not linear: a delay of a third of a beat acts unlike a small one.
+  /// At large magnitudes, where the effect is not linear: a delay of a third of a beat acts unlike a small one.
   struct Large {
     double at;                        ///< coordinate less that of the vehicle file
     BasisCoefficients chord, change;  ///< per unit: mean on the way to `at`; local at `at`
@@ -54,8 +58,9 @@ struct ScreenedEffect {
   Eigen::VectorXd coordinates;  ///< [unknown of the effect]
 };
 
-/// Screens each effect that has columns; the largest gain first. The columns of one effect have to be consecutive.
-/// `law_sd`: [group][basis] standard deviation of what the law of the robot's effect deviates by; empty: 0.
+/// Screens each effect that has columns, each alone, jointly with the regressors of `fit`; the largest gain first. The
+/// columns of one effect have to be consecutive. `law_sd`: [group][basis] standard deviation of what the law of the
+/// robot's effect deviates by; empty: 0.
 std::vector<ScreenedEffect> screen(const Fitter& fitter, const Fit& fit, const std::vector<MagnitudeColumn>& columns,
                                    const BasisCoefficients& law_sd = {});
 
