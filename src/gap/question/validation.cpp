@@ -40,7 +40,7 @@ void for_rows(const FlightList& flights, int channel, const Use& use) {
         use(f, j, j * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients);
 }
 
-double rms_of(const FlightList& flights, const Residuals& rest, int channel) {
+double rms_of(const FlightList& flights, const TestResiduals& rest, int channel) {
   double sum = 0, n = 0;
   for_rows(flights, channel, [&](std::size_t f, std::size_t, std::size_t row) {
     if (rest[f].empty()) return;
@@ -57,7 +57,7 @@ std::vector<int> channels_of(const FlightList& flights) {
   return list;
 }
 
-HeldOutError error_of(const FlightList& flights, const Residuals& each, const Residuals& by_type, int channel) {
+HeldOutError error_of(const FlightList& flights, const TestResiduals& each, const TestResiduals& by_type, int channel) {
   HeldOutError e{channel_name(channel), rms_of(flights, each, channel), 0, 0, rms_of(flights, by_type, channel)};
   std::vector<double> sums, counts;
   std::vector<std::size_t> first;  // block of each flight
@@ -88,17 +88,19 @@ HeldOutError error_of(const FlightList& flights, const Residuals& each, const Re
   return e;
 }
 
-/// Rms in held-out flights of `y` fitted by the column `x` to the other flights; both [flight][beat].
-double left_given(const std::vector<std::vector<double>>& y, const std::vector<std::vector<double>>& x) {
-  double sum = 0, n = 0;
+/// Share of the rms of `y` that `x` removes, each flight by a factor of `x` that is fitted to the other flights, a lone
+/// flight by its own; both [flight][row].
+double removed_by(const std::vector<std::vector<double>>& y, const std::vector<std::vector<double>>& x) {
+  double before = 0, after = 0;
   for (std::size_t out = 0; out < y.size(); ++out) {
     double xy = 0, xx = 1e-12;
     for (std::size_t f = 0; f < y.size(); ++f)
       for (std::size_t j = 0; (f != out || y.size() == 1) && j < y[f].size(); ++j)
         xy += x[f][j] * y[f][j], xx += x[f][j] * x[f][j];
-    for (std::size_t j = 0; j < y[out].size(); ++j) sum += std::pow(y[out][j] - xy / xx * x[out][j], 2), n += 1;
+    for (std::size_t j = 0; j < y[out].size(); ++j)
+      before += std::pow(y[out][j], 2), after += std::pow(y[out][j] - xy / xx * x[out][j], 2);
   }
-  return std::sqrt(sum / std::max(n, 1.0));
+  return before > 0 ? 1 - std::sqrt(after / before) : 0;
 }
 
 /// Subtracts the mean over all flights, for a constant cannot be shifted in time.
@@ -110,8 +112,8 @@ void centre(std::vector<std::vector<double>>& v) {
     for (double& value : flight) value -= sum / n;
 }
 
-/// For each effect, the share of the rms that its contribution removes given the others, and the most that a shifted
-/// copy removes.
+/// Appends one control for each effect whose vehicles can be simulated. `flights`: without references. `at`:
+/// coordinates of `all`, fitted to all flights.
 void control(const Flights& flights, const FittedHypothesis& all, const VectorXd& at, int threads, Validation& to) {
   std::vector<VehicleHypothesis> vehicles = {all.hypothesis.vehicle(at)};
   for (const std::string& e : all.hypothesis.effects()) {
@@ -123,35 +125,26 @@ void control(const Flights& flights, const FittedHypothesis& all, const VectorXd
     vehicles.push_back(all.hypothesis.vehicle(without));
   }
   const std::vector<Residuals> rest = residuals(flights, vehicles, threads);
-  std::mt19937_64 random(1);
   for (std::size_t e = 0; e + 1 < vehicles.size(); ++e) {
     if (rest[0].empty() || rest[e + 1].empty()) continue;
     Validation::Control best{all.hypothesis.effects()[e], "", 0, 0};
     for (const int channel : channels_of(flights.tests)) {
-      std::vector<std::vector<double>> y(flights.size()), x(flights.size());
+      std::vector<std::vector<double>> y(flights.tests.size()), x(flights.tests.size());
       for_rows(flights.tests, channel, [&](std::size_t f, std::size_t, std::size_t row) {
         y[f].push_back(rest[e + 1][f][row]);
         x[f].push_back(rest[e + 1][f][row] - rest[0][f][row]);
       });
+      const auto cannot_shift = [](const std::vector<double>& flight) { return flight.size() < 2; };
+      std::erase_if(y, cannot_shift);
+      std::erase_if(x, cannot_shift);
+      if (y.empty()) continue;
       centre(y);
       centre(x);
-      std::vector<std::vector<double>> none = x;
-      for (std::vector<double>& v : none) std::ranges::fill(v, 0.0);
-      const double before = left_given(y, none), gain = 1 - left_given(y, x) / before;
+      const double gain = removed_by(y, x);
       if (!best.channel.empty() && gain <= best.gain) continue;
-      double shifted = -1;
-      for (int copy = 0; copy < kCopies; ++copy) {
-        std::vector<std::vector<double>> moved = x;
-        for (std::vector<double>& v : moved)
-          if (v.size() > 2 * kMinShift)
-            std::rotate(v.begin(),
-                        v.begin() + static_cast<std::ptrdiff_t>(kMinShift + random() % (v.size() - 2 * kMinShift)),
-                        v.end());
-        shifted = std::max(shifted, 1 - left_given(y, moved) / before);
-      }
-      best.channel = channel_name(channel), best.gain = gain, best.best_of_shifted = shifted;
+      best.channel = channel_name(channel), best.gain = gain, best.best_of_shifted = best_of_shifted(y, x);
     }
-    to.controls.push_back(best);
+    if (!best.channel.empty()) to.controls.push_back(best);
   }
 }
 
@@ -186,13 +179,29 @@ void agree(const Fitter& fitter, const Flights& flights, const FittedHypothesis&
 
 }  // namespace
 
-Residuals smoothed_away(const Evidence& evidence, const Flights& flights, const Residuals& residual) {
+double best_of_shifted(const std::vector<std::vector<double>>& y, const std::vector<std::vector<double>>& x) {
+  std::mt19937_64 random(1);
+  double most = -1;
+  for (int copy = 0; copy < kCopies; ++copy) {
+    std::vector<std::vector<double>> moved = x;
+    for (std::vector<double>& flight : moved) {
+      // rotated by n rows, a flight is shifted by n at its begin and by the others at its end
+      const std::size_t least = std::max<std::size_t>(1, std::min(kMinShift, flight.size() / 4));
+      const std::size_t shift = least + random() % (flight.size() - 2 * least + 1);
+      std::rotate(flight.begin(), flight.begin() + static_cast<std::ptrdiff_t>(shift), flight.end());
+    }
+    most = std::max(most, removed_by(y, moved));
+  }
+  return most;
+}
+
+TestResiduals smoothed_away(const Evidence& evidence, const Flights& flights, const TestResiduals& residual) {
   const RegimeBasis& basis = evidence.basis();
   const FlightList& tests = flights.tests;
   const auto values = [&](std::size_t f, std::size_t j) {
     return basis.values(flights.references.size() + f).row(static_cast<Index>(j));
   };
-  Residuals rest = residual;
+  TestResiduals rest = residual;
   for (const int channel : channels_of(tests)) {
     struct Sums {
       Eigen::MatrixXd normal;
@@ -224,7 +233,7 @@ Residuals smoothed_away(const Evidence& evidence, const Flights& flights, const 
   return rest;
 }
 
-double mean_square(const Evidence& evidence, const FlightList& tests, const Residuals& residual) {
+double mean_square(const Evidence& evidence, const FlightList& tests, const TestResiduals& residual) {
   double sum = 0, n = 0;
   for (const int channel : channels_of(tests)) {
     const double noise = evidence.noise_sd(channel * kCoefficients);
@@ -239,7 +248,7 @@ Validation validation_of(const Question& question, const Fitter& fitter, const s
                          const Flights& flights, const Inference& d, int threads) {
   Validation v;
   std::vector<FittedHypothesis> fits = {{Hypothesis(uncertain, {}), &d.parameters}};
-  std::vector<const Residuals*> rest = {&d.refit};
+  std::vector<const TestResiduals*> rest = {&d.refit};
   const std::vector<std::string>& effects = d.conclusion().effects;
   for (std::size_t n = 1; n <= effects.size(); ++n) {
     const std::vector<std::string> set(effects.begin(), effects.begin() + static_cast<std::ptrdiff_t>(n));
@@ -257,11 +266,11 @@ Validation validation_of(const Question& question, const Fitter& fitter, const s
     if (!std::ranges::count(types, name)) types.push_back(name);
     type.push_back(static_cast<int>(std::ranges::find(types, name) - types.begin()));
   }
-  std::vector<Residuals> by_type;
+  std::vector<TestResiduals> by_type;
   if (types.size() > 1) by_type = question.held_out(fitter, flights, fits, type, threads);
   else
-    for (const Residuals* each : rest) by_type.push_back(*each);  // holding out the only type leaves no flight
-  const auto rung = [&](const std::string& added, const Residuals& each, const Residuals& by_types) {
+    for (const TestResiduals* each : rest) by_type.push_back(*each);  // holding out the only type leaves no flight
+  const auto rung = [&](const std::string& added, const TestResiduals& each, const TestResiduals& by_types) {
     v.ladder.push_back({added, {}});
     for (const int channel : channels_of(flights.tests))
       v.ladder.back().errors.push_back(error_of(flights.tests, each, by_types, channel));

@@ -7,6 +7,7 @@
 
 #include "gap/answer/verdict.hpp"
 #include "gap/diagnose/diagnose.hpp"
+#include "gap/question/validation.hpp"
 #include "gap/replay/beat_averaged_prediction.hpp"
 #include "io/config.hpp"
 #include "io/csv.hpp"
@@ -171,6 +172,32 @@ TEST(BeatAveragedDiagnosis, NamesWhatTheFileLacksWithItsSize) {
     EXPECT_LT(c.best_of_shifted, c.gain / 2) << c.effect;  // its motion repeats
   }
   for (const Validation::Agreement& a : d.validation->agreements) EXPECT_GT(a.p_value, 1e-3) << a.name;
+}
+
+/// What an effect may explain, and what it changes, [flight][row]: all of `y` but noise of a tenth is `x`, which has no memory.
+std::array<std::vector<std::vector<double>>, 2> explained_by_an_effect(std::size_t flights, std::size_t rows) {
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  std::array<std::vector<std::vector<double>>, 2> yx;
+  for (auto& all : yx) all.assign(flights, std::vector<double>(rows));
+  for (std::size_t f = 0; f < flights; ++f)
+    for (std::size_t j = 0; j < rows; ++j) {
+      yx[1][f][j] = normal(random);
+      yx[0][f][j] = yx[1][f][j] + 0.1 * normal(random);
+    }
+  return yx;
+}
+
+// An effect that explains nine tenths of the rms. Of n rows, a copy's correlation with y has a standard deviation of 1 / sqrt(n), and it
+// removes half the square of the correlation: 0.1 of the rms at 0.44, four standard deviations of 80 rows.
+TEST(BeatAveragedDiagnosis, ShiftsCopiesInShortFlightsToo) {
+  struct Case {
+    std::size_t flights, rows;
+  };
+  for (const Case& c : {Case{2, 60}, Case{2, 99}, Case{3, 130}, Case{40, 3}, Case{1, 80}}) {
+    const auto [y, x] = explained_by_an_effect(c.flights, c.rows);
+    EXPECT_LT(best_of_shifted(y, x), 0.1) << c.flights << " flights of " << c.rows << " rows";
+  }
 }
 
 TEST(BeatAveragedDiagnosis, SaysTheSameOfForcesThatItsSimulatorPredicted) {
