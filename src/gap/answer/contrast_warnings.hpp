@@ -1,4 +1,4 @@
-// What makes reference flights a poor measure for test flights.
+// Says what makes reference flights a poor measure for test flights.
 #pragma once
 
 #include <string>
@@ -13,7 +13,8 @@ namespace flappy::gap {
 /// for messages.
 void check_same_streams(const std::vector<flightlog::FlightLog>& logs, const std::vector<std::string>& folders);
 
-/// One line each, with what it costs the answer: another vehicle file, other sensors, too short, other regimes.
+/// One line for each thing that makes the answer less sure, with what it costs: another vehicle file, other sensors,
+/// too short flights, references of one session, regimes that the references never have. `headers`: [flight].
 std::vector<std::string> contrast_warnings(const std::vector<flightlog::FlightHeader>& headers, const Flights& flights);
 
 }  // namespace flappy::gap

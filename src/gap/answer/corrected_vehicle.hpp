@@ -6,9 +6,10 @@
 
 namespace flappy::gap {
 
-/// The vehicle with the parameters and effects of inference.predicting(): the conclusion's, and perhaps further effects.
-/// Its posterior has their uncertainty. The conclusion none leaves the vehicle as it is, except for its name.
-/// The minor draws of `inference` shift parameters and do not enter the posterior.
+/// The vehicle with the parameters and effects of inference.corrected. Its posterior (model::Posterior) has the
+/// uncertainty of parameters and effects of inference.predicting(); background magnitudes are certain there. Minor
+/// draws of `inference` shift parameters and do not enter the posterior. The conclusion none leaves the vehicle as it
+/// is, except for its name. `vehicle`: the vehicle file; `uncertain`: the same with the priors of its parameters.
 model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Inference& inference,
                                  sim::Randomisation uncertain);
 

@@ -1,14 +1,15 @@
-// The middle of a diagnosis: effects are screened, fitted, and combined into hypotheses with several effects.
+// The middle of a diagnosis: effects are screened, fitted, and combined into hypotheses with several effects. infer()
+// calls these functions in the order in which they stand here.
 #pragma once
 
 #include "gap/question/question.hpp"
 
 namespace flappy::gap {
 
-/// Hypotheses without effects.
+/// Hypotheses without effects, with their log evidence.
 struct Baselines {
   ScoredHypothesis none, parameters, unknown;
-  Scales unknown_scales;  ///< scales of the fit with an unknown cause
+  Scales unknown_scales;  ///< scales with which an unknown cause explains most
 };
 Baselines weigh_baselines(const Question& question, const RobotFit& robot, const VerdictRule& rule);
 
@@ -19,24 +20,28 @@ struct ScreenedCatalogue {
 };
 ScreenedCatalogue screen_catalogue(const RobotFit& robot, const InferenceOptions& options);
 
+/// Fits effects and sets of them.
 class EffectFits {
  public:
+  /// Keeps references to all.
   EffectFits(const Question& question, const RobotFit& robot, const Baselines& baselines,
              const InferenceOptions& options, int threads);
 
-  /// A hypothesis for each effect, the best first. Finalists are fitted by simulation if `by_simulation`; others
+  /// A hypothesis for each effect, the one that explains most first. Finalists are fitted by simulation if
+  /// `by_simulation`, and keep a linear fit where the simulated one did not find the effect; others are fitted
   /// linearly.
   std::vector<ScoredHypothesis> single_effects(const ScreenedCatalogue& catalogue, bool by_simulation) const;
 
   struct Sets {
-    std::vector<ScoredHypothesis> hypotheses;  ///< with one effect and with several, the best first
-    Scales scales;                             ///< scales given the parameters alone
+    std::vector<ScoredHypothesis> hypotheses;  ///< with one effect and with several, the one that explains most first
+    Scales scales;                             ///< scales of the parameters alone, searched from those of the best set
   };
-  /// Effects join the set that explains most, one after another, as long as it gains more than by chance.
+  /// Effects join the set that explains most, one after another, as long as a set gains more than by chance. `singles`:
+  /// of single_effects. `progress` returns false to stop.
   Sets combine(std::vector<ScoredHypothesis> singles,
                const std::function<bool(double, const std::string&)>& progress) const;
 
-  /// The hypotheses that explain most, with a remainder; only those for which one is found.
+  /// The few hypotheses that explain most, each once more with a remainder, if one is found. Arguments as in Sets.
   std::vector<ScoredHypothesis> with_remainders(const std::vector<ScoredHypothesis>& hypotheses,
                                                 const Scales& scales) const;
 

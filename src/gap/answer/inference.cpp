@@ -27,7 +27,7 @@ class Progress {
 void hold_out(const Question& question, const Fitter& fitter, const sim::Randomisation& uncertain,
               const Flights& flights, int threads, Inference& d) {
   std::vector<FittedHypothesis> fits = {{Hypothesis(uncertain, {}), &d.parameters}};
-  std::vector<Residuals*> of = {&d.refit};
+  std::vector<TestResiduals*> of = {&d.refit};
   for (ScoredHypothesis& a : d.hypotheses)
     if (a.fitted()) {
       fits.push_back({Hypothesis(uncertain, a.effects), &a.fit});
@@ -35,7 +35,7 @@ void hold_out(const Question& question, const Fitter& fitter, const sim::Randomi
     }
   std::vector<int> each(flights.tests.size());
   std::iota(each.begin(), each.end(), 0);
-  std::vector<Residuals> rest = question.held_out(fitter, flights, fits, each, threads);
+  std::vector<TestResiduals> rest = question.held_out(fitter, flights, fits, each, threads);
   for (std::size_t i = 0; i < of.size(); ++i) *of[i] = std::move(rest[i]);
 }
 

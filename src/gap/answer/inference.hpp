@@ -8,9 +8,9 @@
 
 namespace flappy::gap {
 
-/// Diagnoses the flights of one robot. After a stop it decides among the hypotheses fitted by then.
-/// `uncertain`: the vehicle file with the priors of its parameters. `reference`: the fit of its references; null: there
-/// are none.
+/// Diagnoses the test flights of one robot. After a stop (InferenceOptions::progress) it decides among the hypotheses
+/// fitted by then. `uncertain`: the vehicle file with the priors of its parameters. `reference`: the fit of
+/// flights.references; null if there are none. io::InputError as from RobotFit.
 Inference infer(const Flights& flights, const sim::Randomisation& uncertain, InferenceOptions options,
                 const ReferenceFit* reference = nullptr);
 

@@ -136,9 +136,10 @@ Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flig
   });
 
   const ScoredHypothesis* best = best_fitted(inference);
-  const std::pair<Fitted, const Residuals*> fits[] = {{Fitted::nominal, &inference.nominal},
-                                                      {Fitted::refit, &inference.refit},
-                                                      {Fitted::effect, best != nullptr ? &best->held_out : nullptr}};
+  const std::pair<Fitted, const TestResiduals*> fits[] = {
+      {Fitted::nominal, &inference.nominal},
+      {Fitted::refit, &inference.refit},
+      {Fitted::effect, best != nullptr ? &best->held_out : nullptr}};
   for (const auto& [fitted, residual] : fits) {
     if (residual == nullptr) continue;
     std::vector<ResidualLocation> locations = locate(context, *residual, fitted);

@@ -1,3 +1,5 @@
+// Makes the result of a diagnosis, plain data, from what was inferred: losses and closures in flights held out,
+// estimates, suspects, and where residuals lie.
 #pragma once
 
 #include <string>
@@ -7,14 +9,15 @@
 
 namespace flappy::gap {
 
-/// The result for faulty data. `folders`: of the logs.
+/// The result for faulty data: the verdict `data`. `folders`: of the logs.
 Diagnosis result_of(const std::vector<std::string>& folders, std::vector<flightlog::DataFault> faults);
 
-/// The result without closed-loop check and proposed flight. `uncertain`: with the minor draws of the inference.
+/// The result without warnings, references' folders, closed-loop check and proposed flight: diagnose() and its
+/// companions add these. `folders`: [test flight]. `uncertain`: with the minor draws of the inference.
 Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flights,
                     const sim::Randomisation& uncertain, const Inference& inference);
 
-/// Magnitudes and shape parameters of the effects of a hypothesis, with 90 % intervals.
+/// Magnitudes and shape parameters of the effects of a hypothesis, with 90 % intervals; empty without a fit.
 std::vector<Estimate> estimates_of(const ScoredHypothesis& hypothesis, const sim::Randomisation& uncertain);
 
 }  // namespace flappy::gap

@@ -39,7 +39,7 @@ std::optional<double> Losses::mean() const {
   return s / n;
 }
 
-Losses losses_of(const RowContext& around, const Residuals& residual) {
+Losses losses_of(const RowContext& around, const TestResiduals& residual) {
   Losses l;
   for (std::size_t f = 0; f < around.beats.size(); ++f) {
     if (residual.size() <= f || residual[f].empty()) return {};

@@ -1,7 +1,7 @@
 // The share of the closable gap that a hypothesis closes,
 //   closure = (E_refit - E_effect) / (E_refit - E_floor)
-// E: mean over beats and channels of the Huber loss of residual / noise standard deviation in held-out flights; refit:
-// fitted parameters without effect; E_floor: normal noise alone.
+// E: mean over beats and channels of the Huber loss of residual / noise standard deviation in test flights held out.
+// refit: fitted parameters without effects; effect: a hypothesis with effects; floor: normal noise alone.
 #pragma once
 
 #include <optional>
@@ -13,20 +13,24 @@ namespace flappy::gap {
 
 /// Where the Huber loss becomes linear, in standard deviations of the noise. Derived: 95 % efficient with normal noise.
 inline constexpr double kHuber = 1.345;
+/// z^2 / 2 up to kHuber, then linear.
 double huber_loss(double z);
 /// Mean of huber_loss over a standard normal z.
 double huber_floor();
 
-/// Losses of one hypothesis: sum and number in each block of consecutive beats; empty if the simulation diverged.
+/// Losses of one hypothesis over all test flights.
 struct Losses {
-  std::vector<double> sum, count;
-  std::optional<double> mean() const;
+  std::vector<double> sum, count;      ///< [block of consecutive beats] sum and number; empty if a simulation diverged
+  std::optional<double> mean() const;  ///< none: no losses
 };
-Losses losses_of(const RowContext& around, const Residuals& residual);
-/// Standard deviation of the difference of two mean losses, from its scatter over blocks.
+/// `around`: of the test flights. Empty also if the residual of any flight is.
+Losses losses_of(const RowContext& around, const TestResiduals& residual);
+/// Standard deviation of the difference of two mean losses of the same flights, from its scatter over blocks; 0 if one
+/// is empty.
 double sd_of_difference(const Losses& a, const Losses& b);
 
-/// The closure with its 90 % interval by resampled blocks. None if E_refit is less than two of its sd above the floor.
+/// The closure with its 90 % interval by resampled blocks. None if E_refit is less than two of its standard deviations
+/// above `floor`, huber_floor(), or one of the losses is empty.
 std::optional<Closure> closure_of(const Losses& refit, const Losses& effect, double floor);
 
 }  // namespace flappy::gap

@@ -13,9 +13,9 @@
 namespace flappy::gap {
 namespace {
 
-/// Least number of blocks for a test of whiteness. Choice.
+/// Smallest number of blocks for a test of whiteness. Choice.
 constexpr std::size_t kMinWhiteness = 20;
-/// Least number of effective blocks for a test of a mean or a slope. Choice.
+/// Smallest number of effective blocks for a test of a mean or a slope. Choice.
 constexpr double kMinBlocks = 5;
 
 }  // namespace

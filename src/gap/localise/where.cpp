@@ -37,7 +37,7 @@ struct TestedBeat {
 
 class ChannelRows {
  public:
-  ChannelRows(const RowContext& around, const Residuals& residual, int channel, Fitted fitted)
+  ChannelRows(const RowContext& around, const TestResiduals& residual, int channel, Fitted fitted)
       : around_(around), channel_(channel), fitted_(fitted) {
     const std::vector<int> all = blocks_of(around.beats, kLongBlock), fine = blocks_of(around.beats, kShortBlock);
     std::size_t i = 0;
@@ -243,7 +243,7 @@ RowContext row_context_of(const FlightList& flights, std::vector<double> noise_s
   return s;
 }
 
-std::vector<ResidualLocation> locate(const RowContext& around, const Residuals& residual, Fitted fitted) {
+std::vector<ResidualLocation> locate(const RowContext& around, const TestResiduals& residual, Fitted fitted) {
   std::vector<ResidualLocation> places;
   for (int channel = 0; channel < kChannels; ++channel) ChannelRows(around, residual, channel, fitted).test_all(places);
   std::vector<double> p_values;

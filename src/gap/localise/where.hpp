@@ -1,5 +1,5 @@
-// Locates residuals that exceed the noise. The table has a row for each test of one channel: rms of residual and noise,
-// and the p value of noise alone:
+// Locates residuals that exceed the noise, for the table of the report. The table has a row for each test of one
+// channel: rms of residual and noise, and the p value of noise alone:
 //   channel     all beats
 //   regime      a third of the beats: those with low, middle or high height, speed, ...
 //   phase       the mean or one harmonic of the beats: where in the stroke
@@ -22,23 +22,25 @@ namespace flappy::gap {
 /// False discovery rate among all tests of a stage. Choice.
 inline constexpr double kFalseDiscoveries = 0.05;
 
+/// Index of a coefficient of a channel among the groups (gap/evidence/evidence.hpp).
 constexpr std::size_t group_of(int channel, int coefficient) {
   return static_cast<std::size_t>(channel) * kCoefficients + static_cast<std::size_t>(coefficient);
 }
 
+/// A RegimeQuantity of all flights.
 struct Quantity {
   std::string name, unit;
   std::vector<std::vector<double>> values;  ///< [flight][beat]
 };
 
-/// Properties of the rows of all flights that the tests need.
+/// Properties of the flights that are tested: in a diagnosis, of the test flights. All indices [flight] are theirs.
 struct RowContext {
-  std::vector<std::size_t> beats;          ///< [flight]
+  std::vector<std::size_t> beats;          ///< [flight] number of beats
   std::vector<double> beats_Hz;            ///< [flight]
-  std::vector<std::vector<char>> covered;  ///< [flight][beat][channel]
-  std::vector<Quantity> regimes, inputs;
-  std::vector<char> rows;        ///< [group] whether the group has rows
-  std::vector<double> noise_sd;  ///< [group]
+  std::vector<std::vector<char>> covered;  ///< [flight][beat and channel, in one row]
+  std::vector<Quantity> regimes, inputs;   ///< those that all flights have
+  std::vector<char> rows;                  ///< [group] whether the group has rows
+  std::vector<double> noise_sd;            ///< [group] of a row
   bool has_rows(int channel, int coefficient) const { return rows[group_of(channel, coefficient)] != 0; }
   bool covers(std::size_t flight, std::size_t beat, int channel) const {
     return covered[flight][beat * kChannels + static_cast<std::size_t>(channel)] != 0;
@@ -46,8 +48,9 @@ struct RowContext {
 };
 RowContext row_context_of(const FlightList& flights, std::vector<double> noise_sd);
 
-/// All rows of the table for the residual after a fit. `residual`: [flight], empty where the simulation diverged. In the
-/// test of an input, `gap` and `noise_floor` are the rms of the part proportional to it.
-std::vector<ResidualLocation> locate(const RowContext& around, const Residuals& residual, Fitted fitted);
+/// All rows of the table for one residual. `residual`: [flight of `around`], empty where the simulation diverged.
+/// `fitted`: what had been fitted, which the rows state. In the test of an input, `gap` and `noise_floor` are the rms
+/// of the part proportional to the input.
+std::vector<ResidualLocation> locate(const RowContext& around, const TestResiduals& residual, Fitted fitted);
 
 }  // namespace flappy::gap

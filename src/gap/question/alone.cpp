@@ -67,8 +67,8 @@ void share_backgrounds(const RobotFit& robot, const Scales& scales, double penal
 /// How far a joint fit moves the coordinates of unknowns, by effect and index of the unknown.
 using Moves = std::map<std::pair<std::string, Eigen::Index>, double>;
 
-/// Moves by background magnitudes, of effects in of_models only: the background of others belongs to the flights, not to
-/// the robot. `first`: NuisanceMean::place of the first background.
+/// Moves by background magnitudes, of effects in of_models only: the background of others belongs to the flights, not
+/// to the robot. `first`: NuisanceMean::place of the first background.
 Moves moves_of(const ModelDiscrepancy& discrepancy, const std::vector<Background>& background,
                const Fitter::JointFit& joint, std::size_t first) {
   Moves moves;
@@ -80,8 +80,8 @@ Moves moves_of(const ModelDiscrepancy& discrepancy, const std::vector<Background
   return moves;
 }
 
-/// The parameters of a joint fit, and effects with its background magnitudes; one that would leave its accepted range has
-/// none.
+/// The parameters of a joint fit, and effects with its background magnitudes; one that would leave its accepted range
+/// has none.
 CorrectedParameters with_background(const RobotFit& robot, const Fitter& fitter, const Hypothesis& hypothesis,
                                     const Fit& fit) {
   const Regressors nuisances = robot.nuisance_regressors();
@@ -212,9 +212,9 @@ double Alone::log_evidence_of_none(const RobotFit& robot) const {
   return robot.weigh(robot.no_effects(), robot.nominal(), robot.fitter().scales()).posterior.log_evidence;
 }
 
-std::vector<Residuals> Alone::held_out(const Fitter& fitter, const Flights& flights,
-                                       const std::vector<FittedHypothesis>& fits, const std::vector<int>& fold,
-                                       int threads) const {
+std::vector<TestResiduals> Alone::held_out(const Fitter& fitter, const Flights& flights,
+                                           const std::vector<FittedHypothesis>& fits, const std::vector<int>& fold,
+                                           int threads) const {
   return held_out_by_simulation(fitter, flights, fits, fold, true, threads);
 }
 

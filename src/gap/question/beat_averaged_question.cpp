@@ -27,9 +27,9 @@ std::optional<Fit> BeatAveraged::refit_jointly(const Fitter& /*fitter*/, const H
   return std::nullopt;
 }
 
-std::vector<Residuals> BeatAveraged::held_out(const Fitter& fitter, const Flights& flights,
-                                              const std::vector<FittedHypothesis>& fits, const std::vector<int>& fold,
-                                              int threads) const {
+std::vector<TestResiduals> BeatAveraged::held_out(const Fitter& fitter, const Flights& flights,
+                                                  const std::vector<FittedHypothesis>& fits,
+                                                  const std::vector<int>& fold, int threads) const {
   return held_out_by_simulation(fitter, flights, fits, fold, false, threads);
 }
 

@@ -1,5 +1,5 @@
-// What is missing in the model of a vehicle of which only means over beats are predicted, from its flights alone. What no
-// effect explains counts as noise, and flights held out decide.
+// The question what is missing in the model of a beat-averaged vehicle, from its flights alone, without references.
+// What no effect explains counts as noise, scales are held at 1, and flights held out decide. The rest is as in Alone.
 #pragma once
 
 #include "gap/question/alone.hpp"
@@ -10,30 +10,38 @@ class BeatAveraged final : public Alone {
  public:
   using Alone::Alone;
 
+  /// None: flights have no offsets.
   std::vector<std::size_t> offsets(const Flights& /*flights*/) const override { return {}; }
-  /// The rest is noise, so laws do not deviate.
+  /// 0: what another law leaves is noise.
   BasisCoefficients law_sd(const Evidence& evidence, const std::string& effect, const BasisCoefficients& change,
                            double law_factor) const override;
+  /// As noise with a memory, which scales no longer follow.
   void describe_rest(RobotFit& robot) const override;
+  /// None.
   std::optional<Scales> larger_background(const RobotFit& robot, const Hypothesis& hypothesis, const Fit& fit,
                                           const Scales& now) const override;
   /// Simulations cost little: parameters and effects are fitted jointly from the start.
   Fit fit_set(const Fitter& fitter, const Hypothesis& hypothesis, const Eigen::VectorXd& start,
               const Fit& parameters) const override;
+  /// None: fit_set did.
   std::optional<Fit> refit_jointly(const Fitter& fitter, const Hypothesis& hypothesis, const Eigen::VectorXd& start,
                                    const Fit& parameters) const override;
   std::size_t max_further() const override { return 1; }
-  /// Nuisances are no noise of the flights held out.
-  std::vector<Residuals> held_out(const Fitter& fitter, const Flights& flights,
-                                  const std::vector<FittedHypothesis>& fits, const std::vector<int>& fold,
-                                  int threads) const override;
+  /// By simulation; what nuisances explain stays in the residual.
+  std::vector<TestResiduals> held_out(const Fitter& fitter, const Flights& flights,
+                                      const std::vector<FittedHypothesis>& fits, const std::vector<int>& fold,
+                                      int threads) const override;
+  /// Refutes idle effects alone; no background is credited.
   void refute(const RobotFit& robot, const Fitter& fitter, const Flights& flights, const VerdictRule& rule,
               Inference& d) const override;
+  /// The conclusion predicts by its own fit.
   void choose_predicting(Inference& /*d*/) const override {}
+  /// validation_of (validation.hpp).
   std::optional<Validation> validate(const Fitter& fitter, const sim::Randomisation& uncertain, const Flights& flights,
                                      const Inference& d, int threads) const override;
 
  protected:
+  /// Without background magnitudes.
   CorrectedParameters by_themselves(const RobotFit& robot, const Fitter& fitter, const Hypothesis& hypothesis,
                                     const Fit& fit) const override;
 };

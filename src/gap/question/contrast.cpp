@@ -145,8 +145,8 @@ BasisCoefficients Contrast::effects_discrepancy_sd(const Fitter& fitter, const H
   return fitter.discrepancy_sd(hypothesis, fit);
 }
 
-/// The point with the largest evidence among a fit, points from it to `there`, and points from it to no effect: the step
-/// of a linear model may lead to where the model does not hold.
+/// The point with the largest evidence among a fit, points from it to `there`, and points from it to no effect: the
+/// step of a linear model may lead to where the model does not hold.
 VectorXd Contrast::next_effects(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit,
                                 const VectorXd& there, const BasisCoefficients& sd) const {
   const Index shared = hypothesis.shared(), effects = hypothesis.size() - shared;
@@ -246,12 +246,12 @@ double Contrast::log_evidence_of_none(const RobotFit& robot) const {
 }
 
 /// References hold the parameters where they were linearised, so the columns predict.
-std::vector<Residuals> Contrast::held_out(const Fitter& fitter, const Flights& flights,
-                                          const std::vector<FittedHypothesis>& fits, const std::vector<int>& fold,
-                                          int /*threads*/) const {
+std::vector<TestResiduals> Contrast::held_out(const Fitter& fitter, const Flights& flights,
+                                              const std::vector<FittedHypothesis>& fits, const std::vector<int>& fold,
+                                              int /*threads*/) const {
   const std::size_t first = flights.references.size();
   const std::vector<std::vector<char>> others = others_of(flights, fold);
-  std::vector<Residuals> rest(fits.size(), Residuals(fold.size()));
+  std::vector<TestResiduals> rest(fits.size(), TestResiduals(fold.size()));
   for (std::size_t i = 0; i < fits.size(); ++i)
     for (std::size_t k = 0; k < others.size(); ++k) {
       const BasisCoefficients explained = fitter.explained(*fits[i].fit, others[k]);

@@ -13,9 +13,9 @@ std::vector<std::vector<char>> others_of(const Flights& flights, const std::vect
   return others;
 }
 
-std::vector<Residuals> held_out_by_simulation(const Fitter& fitter, const Flights& flights,
-                                              const std::vector<FittedHypothesis>& fits, const std::vector<int>& fold,
-                                              bool less_nuisances, int threads) {
+std::vector<TestResiduals> held_out_by_simulation(const Fitter& fitter, const Flights& flights,
+                                                  const std::vector<FittedHypothesis>& fits,
+                                                  const std::vector<int>& fold, bool less_nuisances, int threads) {
   const std::vector<std::vector<char>> others = others_of(flights, fold);
   std::vector<VehicleHypothesis> vehicles;
   std::vector<BasisCoefficients> nuisances;
@@ -26,7 +26,7 @@ std::vector<Residuals> held_out_by_simulation(const Fitter& fitter, const Flight
       nuisances.push_back(std::move(joint.nuisances));
     }
   std::vector<Residuals> rows = residuals(flights, vehicles, threads);
-  std::vector<Residuals> rest(fits.size(), Residuals(fold.size()));
+  std::vector<TestResiduals> rest(fits.size(), TestResiduals(fold.size()));
   for (std::size_t i = 0; i < fits.size(); ++i)
     for (std::size_t f = 0; f < fold.size(); ++f) {
       const std::size_t k = i * others.size() + static_cast<std::size_t>(fold[f]);

@@ -1,4 +1,5 @@
-// Residuals in held-out flights: each flight is predicted by a fit to other flights.
+// Residuals in held-out flights: each test flight is predicted by a fit to other flights. Flights that are held out
+// together are a fold; `fold` is [test flight] the number of its fold, from 0 on.
 #pragma once
 
 #include <vector>
@@ -7,18 +8,21 @@
 
 namespace flappy::gap {
 
+/// A hypothesis, and its fit to all flights.
 struct FittedHypothesis {
   Hypothesis hypothesis;
   const Fit* fit;
 };
 
-/// For each fold, [flight] whether the flight is in another one; if there is only one fold, all are.
+/// [fold][flight] Whether a fit that predicts the fold may use the flight: all references, and tests of other folds. If
+/// there is only one fold, its fit uses all flights.
 std::vector<std::vector<char>> others_of(const Flights& flights, const std::vector<int>& fold);
 
-/// As Question::held_out: vehicles fitted to the other folds are simulated in flights without references.
-/// `less_nuisances`: less what the nuisance regressors explain.
-std::vector<Residuals> held_out_by_simulation(const Fitter& fitter, const Flights& flights,
-                                              const std::vector<FittedHypothesis>& fits, const std::vector<int>& fold,
-                                              bool less_nuisances, int threads);
+/// As Question::held_out, for flights without references: each fit is adapted to the other folds by its columns
+/// (Fitter::joint_fit), and the vehicle there is simulated. A flight is empty if that diverges. `less_nuisances`: less
+/// what nuisance regressors explain, by the same fit.
+std::vector<TestResiduals> held_out_by_simulation(const Fitter& fitter, const Flights& flights,
+                                                  const std::vector<FittedHypothesis>& fits,
+                                                  const std::vector<int>& fold, bool less_nuisances, int threads);
 
 }  // namespace flappy::gap

@@ -1,4 +1,5 @@
 // What the parts of a diagnosis hand to each other: options, hypotheses with their evidence, and all that is inferred.
+// infer() (gap/answer/inference.hpp) fills an Inference; result_of() makes the Diagnosis of it.
 #pragma once
 
 #include <functional>
@@ -12,26 +13,34 @@
 
 namespace flappy::gap {
 
-/// A block of the model discrepancy that exceeds its prior: the residual there is explained by no effect.
+/// A block of the model discrepancy (gap/evidence/evidence.hpp) that exceeds its prior: no effect explains the residual
+/// there. For other_law, a coefficient in which the law of an effect deviates.
 struct FreeBlock {
-  int channel = 0, harmonic = 0;
-  int function = 0;      ///< index of the basis function that takes most of the block
-  double times = 0;      ///< scale of the block over that of the robot; for other_law, the law factor
+  int channel = 0, harmonic = 0;  ///< harmonic: 0 is the mean
+  int function = 0;               ///< index of the basis function that takes most of the block
+  /// Scale of the block over that of the robot, in a contrast over that of the session; for other_law, the law factor.
+  double times = 0;
   double gain_nats = 0;  ///< gain of evidence; for a free block, less the penalty of an unknown cause
 };
 
-/// A hypothesis with its fit. Its parameters, loss and closure are left to the result (diagnose/result.hpp).
+/// A hypothesis with its fit. RankedHypothesis::group, remainder, parameters, loss and closure are empty here:
+/// result_of() fills them (gap/answer/result.hpp).
 struct ScoredHypothesis : RankedHypothesis {
   ScoredHypothesis() { kind = HypothesisKind::parameters; }
   std::vector<FreeBlock> unexplained;     ///< blocks of an unknown cause, or of a remainder in addition to the effects
   std::vector<std::string> jointly_with;  ///< effects with which these blocks are fitted jointly
-  Fit fit;                                ///< effects and parameters; without a residual if fitted only linearly
-  /// The largest deviation of an effect by the place from the catalogue's law. None: the law factor does not exceed 1.
+  /// Effects and parameters, of kind effect alone; without a residual if fitted only linearly.
+  Fit fit;
+  /// The largest deviation of an effect from the catalogue's law, in a function of the place. None: the law factor does
+  /// not exceed 1.
   std::optional<FreeBlock> other_law;
-  Residuals held_out;  ///< [test flight], fitted to the others, a lone one to itself; empty if not fitted by simulation
-  /// Effects of another hypothesis whose fit predicts for this one: its own effects and further ones, whose gain may be
-  /// due to chance. Empty: its own fit predicts.
+  /// Residuals of the fit to the other test flights, a lone flight's by its own fit; in a contrast by sessions, of the
+  /// fit to all test flights. Empty if not fitted by simulation.
+  TestResiduals held_out;
+  /// Effects of another hypothesis whose fit predicts for this one. They are this one's effects and further ones, whose
+  /// gain may be due to chance. Empty: its own fit predicts.
   std::vector<std::string> predicted_with;
+  /// Whether the effects were fitted by simulation.
   bool fitted() const { return fit.flown(); }
   bool has_remainder() const { return !unexplained.empty(); }
 };
@@ -39,7 +48,7 @@ struct ScoredHypothesis : RankedHypothesis {
 /// Parameters and effects of the corrected vehicle.
 struct CorrectedParameters {
   std::vector<std::string> effects;  ///< those of Inference::predicting(), then those of background magnitudes alone
-  Eigen::VectorXd at;                ///< coordinates of their Hypothesis
+  Eigen::VectorXd at;                ///< coordinates of the Hypothesis of these effects
   std::vector<double> minors;        ///< variates for sim::Randomisation::set_minors
 };
 
@@ -50,53 +59,59 @@ inline constexpr int kMaxFinalists = 8;
 /// Largest number of effects in a hypothesis, of a vehicle with wings. Choice.
 inline constexpr int kMaxEffects = 3;
 
+/// read_request() makes these of the settings of a diagnosis.
 struct InferenceOptions {
-  int threads = 0;
+  int threads = 0;                                                      ///< as for io::parallel_for
   int max_finalists = kMaxFinalists;                                    ///< effects that are fitted by simulation
   int max_effects = kMaxEffects;                                        ///< largest number of effects in a hypothesis
   std::vector<std::string> withheld;                                    ///< effects to leave out of the catalogue
   std::function<bool(double share, const std::string& what)> progress;  ///< returns false to fit no further effect
   ModelDiscrepancy discrepancy;
   VerdictRule rule;
-  SessionPrior sessions;
+  SessionPrior sessions;  ///< only of a contrast of a beat-averaged vehicle
 };
 
+/// All that a diagnosis infers of one set of test flights.
 struct Inference {
   bool complete = true;                      ///< false: stopped by `progress`
   std::vector<ScoredHypothesis> hypotheses;  ///< the most probable first
   Verdict verdict;
   std::size_t concluded = 0;            ///< index of the most probable hypothesis of the verdict
-  std::vector<std::string> untestable;  ///< effects that change no row
-  Fit parameters;                       ///< the parameters fitted without effects
+  std::vector<std::string> untestable;  ///< effects that the logs cannot show
+  Fit parameters;                       ///< the parameters fitted without effects; in a contrast to the references
   CorrectedParameters corrected;
   std::vector<double> minors;          ///< variates for sim::Randomisation::set_minors, at which hypotheses are fitted
-  std::vector<SensorFinding> sensors;  ///< errors of declared sensors, given the conclusion
-  std::optional<Validation> validation;  ///< only for a beat-averaged vehicle
-  Residuals nominal;                     ///< [test flight] residuals of the vehicle file
-  /// [test flight] Residuals with parameters fitted to the other flights, without effects.
-  Residuals refit;
+  std::vector<SensorFinding> sensors;  ///< lag and errors of declared sensors, given predicting(); none by sessions
+  std::optional<Validation> validation;  ///< only of a beat-averaged vehicle without references
+  TestResiduals nominal;                 ///< of the vehicle file
+  /// Without effects, with parameters fitted to the other test flights, a lone flight's to itself; in a contrast, with
+  /// the parameters of the references (Contrast::held_out).
+  TestResiduals refit;
   std::vector<SeenQuantity> seen;  ///< only in a contrast
-  std::vector<OddFlight> odd;
-  std::vector<double> noise_sd;  ///< [channel and coefficient of the beat] standard deviation of the noise of a row
+  std::vector<OddFlight> odd;      ///< only in a contrast of a beat-averaged vehicle
+  std::vector<double> noise_sd;    ///< [group] standard deviation of the noise of a row (gap/evidence/evidence.hpp)
 
   const ScoredHypothesis& conclusion() const { return hypotheses[concluded]; }
   /// The hypothesis whose fit predicts for the conclusion (ScoredHypothesis::predicted_with).
   const ScoredHypothesis& predicting() const;
 };
 
-/// What a contrast takes from its reference flights.
+/// What a contrast takes from its reference flights. Several sets of test flights may share it. Not to be moved or
+/// copied: `fit` refers to `flights`.
 struct ReferenceFit {
   ReferenceFit(const FlightList& references, const sim::Randomisation& uncertain, const InferenceOptions& options);
-  Flights flights;                ///< the references, without tests
-  RobotFit fit;                   ///< as RobotFit::of_references
-  CorrectedParameters corrected;  ///< without effects
+  Flights flights;  ///< the references, without tests
+  RobotFit fit;     ///< as RobotFit::of_references
+  /// For the corrected vehicle; of one with wings, with background magnitudes (corrected_without_effects).
+  CorrectedParameters corrected;
 };
 
 /// Sorted groups of the effects, joined by +: "body_drag+world_force". An effect without a group is its own group.
 std::string pool_name(const std::vector<std::string>& effects);
 
-/// Sets predicted_with of the conclusion to the effects of the likeliest hypothesis that contains its own. Further
-/// effects may be due to chance, so they are not named; yet a vehicle with them predicts better.
+/// Sets predicted_with of the conclusion: to the effects of the likeliest fitted hypothesis that contains the
+/// conclusion's effects, if it is likelier. Its further effects may be due to chance, so they are not named; yet a
+/// vehicle with them predicts better. The conclusion none keeps the file.
 void predict_with_the_likeliest(Inference& d);
 
 }  // namespace flappy::gap

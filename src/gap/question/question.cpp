@@ -8,9 +8,9 @@
 namespace flappy::gap {
 namespace {
 
-/// Least gain of a step of a fit, of a vehicle with wings. Choice: each step costs a simulation.
+/// Smallest gain of a step of a fit, of a vehicle with wings. Choice: each step costs a simulation.
 constexpr double kWingStep_nats = 0.5;
-/// Least gain of a step of a fit, of a beat-averaged vehicle. Choice: a step costs almost nothing.
+/// Smallest gain of a step of a fit, of a beat-averaged vehicle. Choice: a step costs almost nothing.
 constexpr double kBeatAveragedStep_nats = 0.05;
 
 const Alone kAlone(kWingStep_nats), kReferencesOfBeatAveraged(kBeatAveragedStep_nats);

@@ -1,4 +1,4 @@
-// A hypothesis as a vehicle that may fly next.
+// A hypothesis as a vehicle that may fly next (gap/next/next_experiment.hpp). Question::rival makes it.
 #pragma once
 
 #include <string>
@@ -9,24 +9,25 @@
 namespace flappy::gap {
 
 struct Rival {
-  std::string name;
+  std::string name;  ///< name_of() the hypothesis
   double probability;
   Hypothesis hypothesis;
-  Eigen::VectorXd at;
-  Directions directions;
-  Eigen::MatrixXd covariance;  ///< along the directions
+  Eigen::VectorXd at;          ///< [coordinate]
+  Directions directions;       ///< along which it is uncertain; none: nothing is
+  Eigen::MatrixXd covariance;  ///< [direction][direction]
   bool open;  ///< its effect was fitted only linearly: the vehicle of the parameters, with magnitudes added
   VehicleHypothesis vehicle() const { return hypothesis.vehicle(at); }
 };
 
 /// Effects joined by +, or "none" or "parameters".
 std::string name_of(const ScoredHypothesis& hypothesis);
-/// A rival in which nothing is uncertain.
+/// A rival in which nothing is uncertain. `at`: coordinates of `h`.
 Rival certain_rival(const ScoredHypothesis& hypothesis, const Hypothesis& h, const Eigen::VectorXd& at);
-/// A rival with parameters or effects as they were fitted, which may be out of their ranges. `d.parameters`: those of a
-/// rival that was left open.
+/// A rival with parameters or effects as they were fitted, which may be out of their ranges. A rival that was left open
+/// has the parameters of `d`, and the root mean square of each magnitude under its posterior.
 Rival fitted_rival(const ScoredHypothesis& hypothesis, const Inference& d, const sim::Randomisation& uncertain);
-/// Columns along a rival's directions for the shared parameters, from another rival's columns: spares simulations.
+/// [direction] Columns along `directions` of the `shared` coordinates, from the columns of `l` along its own directions
+/// of the same coordinates: spares simulations.
 std::vector<BasisCoefficients> turned(const Fit& l, const Directions& directions, Eigen::Index shared);
 
 }  // namespace flappy::gap

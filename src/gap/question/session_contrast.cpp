@@ -30,7 +30,7 @@ constexpr double kStepBeyond = 1.5;
 constexpr std::size_t kMaxSets = 3;
 /// Step of the derivative by an actuator's share. Choice.
 constexpr double kLoss = 0.01;
-/// Least probability of what is named, and of "unchanged". Choice.
+/// Smallest probability of what is named, and of "unchanged". Choice.
 constexpr double kMoreThanNot = 0.5;
 
 /// Any one or two kinds of quantities change, or all, each choice as probable as any other.
@@ -249,8 +249,8 @@ class Weighing {
   std::vector<std::string> effects_, untestable_;
 };
 
-/// Unchanged, if that is more probable than not. Else the few most probable sets of effects that are so together: the best
-/// of them, if all share an effect, else a group; or something unknown.
+/// Unchanged, if that is more probable than not. Else the few most probable sets of effects that are so together: the
+/// best of them, if all share an effect, else a group; or something unknown.
 void conclude_by_sessions(Inference& d) {
   const std::vector<ScoredHypothesis>& all = d.hypotheses;
   const auto find = [&](HypothesisKind kind) {

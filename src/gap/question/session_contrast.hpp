@@ -1,6 +1,7 @@
-// What changed in a beat-averaged vehicle, whose flights are compared by a few numbers each
-// (gap/session/quantities.hpp). The robot's own reference sessions say how much these differ while nothing is done to
-// it (gap/session/session_scatter.hpp). A hypothesis shifts them by what its effects change in the rows:
+// The question what changed in a beat-averaged vehicle since the references. Flights are compared by a few numbers
+// each, the quantities y (gap/session/quantities.hpp). The robot's own reference sessions say how much quantities
+// differ while nothing is done to the robot (gap/session/session_scatter.hpp). A hypothesis shifts them by what its
+// effects change in the rows:
 //   p(y | effects) = integral of t(y - shift(z)) N(z; 0, 1) dz
 // with z the unknowns of the effects, by Laplace's method around the most probable z (MacKay, Information Theory,
 // Inference, and Learning Algorithms, 2003, ch. 27).
@@ -14,6 +15,7 @@ namespace flappy::gap {
 class SessionContrast final : public Contrast {
  public:
   using Contrast::Contrast;
+  /// The whole answer: infer() returns it, and calls none of Contrast's functions.
   std::optional<Inference> by_sessions(const Flights& flights, const sim::Randomisation& uncertain,
                                        const InferenceOptions& options, const ReferenceFit& reference) const override;
 };

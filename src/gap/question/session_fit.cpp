@@ -47,7 +47,7 @@ constexpr int kMaxNewtonSteps = 12;
 /// A step that gains less ends the search. Choice.
 constexpr double kMinStepGain_nats = 1e-3;
 
-/// Most probable coordinates among `free`, and the evidence.
+/// The most probable coordinates among `free`, and the evidence.
 EffectFit fit_effects(const TestSession& tests, const Hypothesis& h, VectorXd at, const std::vector<Index>& free,
                       const VectorXd& more) {
   const SessionDensity& density = tests.density();
@@ -152,7 +152,7 @@ EffectFit fit_effects(const TestSession& tests, const Hypothesis& h, VectorXd at
 constexpr double kStart = 0.3;
 /// Where the first shape parameter starts, in coordinates. Choice.
 constexpr double kShapeStarts[] = {-1, 0, 1, 2, 3};
-/// Least change that shows, in standard deviations between sessions. Choice.
+/// Smallest change that shows, in standard deviations between sessions. Choice.
 constexpr double kMinShown = 0.1;
 
 /// Coordinates that are free together, and points to start from.

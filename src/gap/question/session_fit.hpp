@@ -13,13 +13,14 @@ inline constexpr const char* kActuatorLoss = "actuator_loss";
 /// Test flights as one session. Quantities are those of gap/session/quantities.hpp.
 class TestSession {
  public:
-  /// Keeps references. `robot`: that of the references.
+  /// Keeps references to all but `prior` and `robot`. `quantities`: [test flight]; `density`: of the session; `robot`:
+  /// the vehicle of the references.
   TestSession(const FlightList& tests, const std::vector<FlightQuantities>& quantities, const SessionDensity& density,
               const SessionPrior& prior, const VehicleHypothesis& robot);
   const SessionDensity& density() const { return density_; }
   /// [quantity] Variance that is added to the noise of the inputs if a damaged actuator shakes; 0 of other quantities.
   const Eigen::VectorXd& noise_variance() const { return noise_variance_; }
-  /// [vehicle][quantity] What vehicles would have shown less what the robot of the references would.
+  /// [vehicle][quantity] What each vehicle would have shown less what the vehicle of the references would.
   std::vector<Eigen::VectorXd> shifts(const std::vector<VehicleHypothesis>& vehicles) const;
 
  private:
@@ -34,18 +35,19 @@ class TestSession {
 struct EffectFit {
   Eigen::VectorXd at;          ///< all coordinates of the hypothesis
   Eigen::MatrixXd covariance;  ///< of all coordinates; 0 for those that were not fitted
-  double explained = -std::numeric_limits<double>::infinity();  ///< log evidence
+  double explained = -std::numeric_limits<double>::infinity();  ///< log evidence, without the prior of the hypothesis
   std::vector<Eigen::Index> free;                               ///< coordinates that were fitted
 };
 
-/// The mean evidence of all ways in which the effects of `h` may act, which are equally probable, and the fit of the
-/// most probable one.
-/// `robot`: coordinates of the references' parameters. `first`: a fit of the effects before the last; null: there are
-/// none. An actuator that lost a part of its thrust may shake, or not.
+/// Fits the last effect of `h`, jointly with the ones before it. The effect may act in several ways, which are equally
+/// probable: a loss of actuators by all of them or by each alone, and a damaged actuator may shake, or not. The
+/// evidence is the mean over all ways, the fit that of the most probable way.
+/// `robot`: [coordinate] the references' parameters. `first`: a fit of the effects before the last; null: there are
+/// none.
 EffectFit fit_each_way(const TestSession& tests, const Hypothesis& h, const Eigen::VectorXd& robot,
                        const EffectFit* first);
-/// Whether a magnitude of one prior standard deviation changes a quantity by a tenth of what sessions differ by, or
-/// more.
+/// Whether a magnitude of one prior standard deviation, of any sign that it may have, changes any quantity by more than
+/// a tenth of what sessions differ by.
 bool shows(const TestSession& tests, const Hypothesis& h, const Eigen::VectorXd& robot);
 /// Logarithm of the sum of exponentials.
 double log_sum(const std::vector<double>& values);

@@ -43,13 +43,14 @@ struct VerdictRule {
   } tempering{};
   struct Naming {
     double of_all, of_pool, member_of_pool;
-    double least;  ///< effects are named if they, alone or with others, are at least this probable
+    /// Effects are named if the probabilities of all hypotheses that contain their groups add up to at least this.
+    double least;
   } naming{};
 };
 
 /// io::InputError with file and line.
 VerdictRule read_verdict_rule(const std::filesystem::path& path = io::config_path("gap/verdict.toml"));
-/// The same of a file's text; `name` is the file in messages.
+/// The same of a file's text; `name` is the file's in messages.
 VerdictRule parse_verdict_rule(std::string_view text, const std::string& name);
 
 }  // namespace flappy::gap
