@@ -9,13 +9,14 @@
 namespace flappy::gap {
 
 struct DiagnoseCommand {
-  DiagnosisSettings settings;  ///< a withheld effect withholds its whole group
+  DiagnosisSettings settings;  ///< each withheld effect withholds its whole group of the catalogue
   std::string out;             ///< folder for diagnosis.json and vehicle_corrected.toml; empty: no files are written
   bool quiet = false;          ///< prints no summary
 };
 
-/// Diagnoses, writes the files and returns the content of diagnosis.json. After Ctrl-C it is incomplete, or lacks the
-/// closed-loop check or the proposed flight. io::InputError as from read_request and diagnose.
+/// Diagnoses, writes the files, prints the summary and returns the content of diagnosis.json. After Ctrl-C the result
+/// is incomplete, or lacks the closed-loop check or the proposed flight. io::InputError as from read_request and
+/// diagnose, and for a folder that cannot be written.
 nlohmann::ordered_json run_diagnose(const DiagnoseCommand& command);
 
 }  // namespace flappy::gap

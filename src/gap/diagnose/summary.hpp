@@ -1,3 +1,4 @@
+// The summary of a diagnosis that flappy-gap diagnose prints.
 #pragma once
 
 #include <string>
@@ -10,7 +11,8 @@ namespace flappy::gap {
 /// Largest number of lines. Size: of what is printed.
 inline constexpr std::size_t kSummaryLines = 30;
 
-/// The summary for a person, in general fewer than kSummaryLines lines. `out`: folder of the files; empty: none.
+/// The summary for a person, line by line. It has kSummaryLines or fewer, but for long lists of warnings or sets.
+/// `out`: folder of the files, which the last line names; empty: none were written.
 std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::string& out);
 
 }  // namespace flappy::gap

@@ -1,4 +1,5 @@
-// Prior standard deviations of the coefficients of a regime basis, as shares of the signal of their channel.
+// Prior standard deviations of the coefficients of a regime basis, as shares of the signal of their channel. The model
+// discrepancy has a table of these, and the session variation another.
 #pragma once
 
 #include <array>
@@ -19,9 +20,10 @@ inline double share_of(const Shares& shares, int channel, int harmonic, BasisFun
                [static_cast<std::size_t>(function)];
 }
 
-/// Reads the tables [share.CHANNEL], or [share.all] for channels without one. io::InputError with file and line.
+/// Reads the tables [share.CHANNEL] of a file, or [share.all] for channels without one. io::InputError with file and
+/// line.
 Shares read_shares(const io::Table& root);
-/// Text of these tables.
+/// The text that read_shares reads.
 std::string shares_text(const Shares& shares);
 /// Comment in files on `other` of the background magnitudes, which learning keeps.
 inline constexpr const char* kOthers = "  # Of effects that are not listed. Choice.";

@@ -1,5 +1,5 @@
-// How probable residuals are under a hypothesis, in closed form. Rows (gap/replay/beat_rows.hpp) form groups: one
-// channel, one coefficient of the beat. In a group, over the beats of a flight,
+// How probable residuals are under a hypothesis, in closed form. Rows (gap/replay/predicted_flight.hpp) form groups:
+// one channel, one coefficient of the beat. In a group, over the beats of a flight,
 //   residual = regressors theta + basis delta + noise
 //   theta  unknowns of the hypothesis, standard normal a priori, shared by all groups
 //   delta  model discrepancy: what every model gets wrong, a smooth function of input and motion (RegimeBasis),
@@ -24,12 +24,15 @@
 
 namespace flappy::gap {
 
+/// Number of groups; [group] is channel x kCoefficients + coefficient.
 inline constexpr int kGroups = kChannels * kCoefficients;
 
-/// Smooth functions of the regime; over all flights each has mean 0 and rms 1, except the constant. In a contrast, each
-/// function but the offsets of flights follows a second time, as what differs in the test flights: 0 in the references.
+/// Smooth functions of the regime; [basis] is an index of them. The first is the constant; over all flights each other
+/// one has mean 0 and rms 1. One that never changes is left out. In a contrast, each function but the offsets of
+/// flights follows a second time, as what differs in the test flights: 0 in the references, as it is in the tests.
 class RegimeBasis {
  public:
+  /// io::InputError if flights have different functions.
   RegimeBasis(const EvidenceRules& rules, const Flights& flights);
   int size() const { return static_cast<int>(functions_.size()); }
   const std::string& name(int i) const { return function(i).name; }
@@ -37,9 +40,10 @@ class RegimeBasis {
   BasisFunction kind(int i) const { return function(i).kind; }
   /// Whether a function is 0 in the references. These functions come last; none without references.
   bool of_tests(int i) const { return function(i).of_tests; }
-  /// The same change in the test flights alone. `coefficients`: [group][size()].
+  /// [group][basis] The same change in the test flights alone. `coefficients`: [group][basis] of a change in all
+  /// flights. Only in a contrast, as in_all().
   Eigen::MatrixXd in_tests(const Eigen::MatrixXd& coefficients) const { return coefficients * in_tests_; }
-  /// A change of the test flights alone, as it would be in all flights.
+  /// [group][basis] A change of the test flights alone, as it would be in all flights.
   Eigen::MatrixXd in_all(const Eigen::MatrixXd& coefficients) const { return coefficients * in_all_; }
   /// [function][function] Takes the values of a reference flight to those that it would have as one of the tests
   /// (`as_test`) or as a reference, without offsets of flights.
@@ -47,7 +51,7 @@ class RegimeBasis {
   /// Whether the references vary enough in this class of regimes to tell what differs in the tests.
   bool covers(Regimes regimes) const { return covered_[static_cast<std::size_t>(regimes)]; }
   bool covers_all() const { return std::ranges::all_of(covered_, std::identity()); }
-  /// [beat][size()].
+  /// [beat][basis] Values in a flight, an index of Flights.
   const Eigen::MatrixXd& values(std::size_t flight) const { return values_[flight]; }
 
  private:
@@ -70,9 +74,10 @@ class RegimeBasis {
 /// The part of rows that is a smooth function of the regime: [group][basis].
 using BasisCoefficients = Eigen::MatrixXd;
 
-/// Regressors; the priors of their coefficients are normal with standard deviation 1.
+/// Regressors of the residual; the priors of their coefficients are normal with standard deviation 1. All lists are
+/// [regressor].
 struct Regressors {
-  std::vector<const BasisCoefficients*> columns;
+  std::vector<const BasisCoefficients*> columns;  ///< not owned
   std::vector<double> prior_means;
   std::vector<int> effects;        ///< index in Scales::effects of the scale that multiplies the regressor; -1: none
   std::vector<ScalePrior> priors;  ///< prior of that scale
@@ -81,7 +86,8 @@ struct Regressors {
   void add(const BasisCoefficients& column, double prior_mean, int effect = -1, ScalePrior prior = {});
 };
 
-/// Sums over the whitened rows of a group, basis x residual: [flight][group], each [basis].
+/// All that evidence needs of a residual: sums over the whitened rows of a group, basis x residual,
+/// [flight][group][basis].
 struct SufficientStatistics {
   std::vector<std::vector<Eigen::VectorXd>> sums;
 };
@@ -134,8 +140,9 @@ struct Scales {
   double centre(std::size_t b) const { return block_of_tests(b) ? session : robot; }
 };
 
+/// Of coefficients, [regressor], or of a fit's directions (Fit::posterior).
 struct Posterior {
-  double log_evidence = 0;
+  double log_evidence = 0;  ///< nats, but for a constant that all hypotheses of a robot share
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;
 };
@@ -145,8 +152,8 @@ struct ScaledEvidence {
   Posterior posterior;  ///< its evidence includes the prior of the scales
   Scales scales;
   double law_factor = 1;      ///< as Fit::law_factor
-  BasisCoefficients delta;    ///< posterior mean of delta over its standard deviation
-  BasisCoefficients squares;  ///< expected squares of delta over those of its prior; 0 in groups without rows
+  BasisCoefficients delta;    ///< posterior mean of delta, with deviations of laws, over its prior standard deviation
+  BasisCoefficients squares;  ///< expected squares of delta over its prior's at scale 1; 0 in groups without rows
 };
 
 /// Rows of flights, whitened by a model of their noise. Immutable: with_... return a changed copy.
@@ -155,27 +162,30 @@ class Evidence {
   /// With the noise that the headers declare. Keeps references to `rules` and `flights`.
   Evidence(const EvidenceRules& rules, const Flights& flights, ModelDiscrepancy discrepancy, int threads);
 
-  /// Learns standard deviation, autocorrelation and weights of outliers from the residual of a good fit.
+  /// Learns standard deviation, autocorrelation and weights of outliers from what the whole basis leaves of the
+  /// residual of a good fit. The noise is at least the declared one.
   Evidence with_noise(const Residuals& residual) const;
-  /// Learns only the weights of outliers: for residuals that are larger than the noise.
+  /// Learns only the weights of outliers: for the residual of the vehicle file, before the first fit.
   Evidence with_weights(const Residuals& residual) const;
-  /// Learns the noise from the whole residual, with its smooth part. From then on, scales stay 1 except of free blocks.
+  /// As with_noise, from the whole residual with its smooth part. From then on, scales stay 1 except of free blocks.
   Evidence with_rest_as_noise(const Residuals& residual) const;
   Evidence with_discrepancy(ModelDiscrepancy discrepancy) const;
   /// As if these flights, which are references, were the tests: a contrast among references. Flights have no offsets.
-  /// `tests`: [flight]; `statistics`: of a residual, which changes alike.
+  /// `tests`: [flight] whether it is one; `statistics`: of a residual, is changed to those of the contrast.
   Evidence with_tests(const std::vector<char>& tests, SufficientStatistics& statistics) const;
 
   const RegimeBasis& basis() const { return *basis_; }
   const ModelDiscrepancy& discrepancy() const { return discrepancy_; }
 
-  /// Coefficients of rows on the basis, by least squares. Simulated differences are rough, as a small change moves the
-  /// step in which a wing meets its stop; what is not smooth in the regime is noise under every hypothesis.
+  /// [group][basis] Coefficients of rows on the basis, by least squares: how all columns are made of simulated
+  /// differences. These are rough, as a small change moves the step in which a wing meets its stop; what is not smooth
+  /// in the regime is noise under every hypothesis.
   BasisCoefficients basis_coefficients(const Residuals& rows) const;
+  /// Of a residual that is not empty.
   SufficientStatistics statistics(const Residuals& residual) const;
   /// Adds `share` times a smooth change to the residual of `to`.
   void add(double share, const BasisCoefficients& change, SufficientStatistics& to) const;
-  /// The residual of a flight less a smooth change.
+  /// The residual of a flight, an index of Flights, less a smooth change.
   Rows without(std::size_t flight, Rows residual, const BasisCoefficients& change) const;
 
   /// Prior standard deviation of the discrepancy coefficients, [group][basis].
@@ -188,7 +198,8 @@ class Evidence {
   /// Posterior mean of the discrepancy coefficients, [group][basis], given what else explains the residual.
   BasisCoefficients discrepancy_mean(const SufficientStatistics& residual, const BasisCoefficients& explained,
                                      const std::vector<char>& use, const BasisCoefficients& discrepancy_sd) const;
-  /// Posterior of the chosen regressors' coefficients, with prior standard deviation 1.
+  /// Posterior of the coefficients of the regressors in `chosen`, indices of `reduced`; those not chosen are absent.
+  /// `prior_mean`: [chosen]. `covariance`: whether to compute it.
   static Posterior posterior(const Reduced& reduced, const std::vector<int>& chosen, const Eigen::VectorXd& prior_mean,
                              bool covariance = true);
 
@@ -205,6 +216,7 @@ class Evidence {
   /// Block of a function of the basis in a group.
   int block_of(int group, int function) const;
 
+  /// Standard deviation of the noise of a row of a group, in the channel's unit.
   double noise_sd(int group) const;
   /// Rms of the signal of a group; its mean square is averaged with that of its channel.
   double signal(int group) const { return groups_[static_cast<std::size_t>(group)].signal; }

@@ -18,15 +18,16 @@ class EvidenceRules {
   virtual ~EvidenceRules() = default;
   /// Indices of the flights that have an offset of their own in the regime basis.
   virtual std::vector<std::size_t> offsets(const Flights& flights) const = 0;
-  /// Indices of the flights for which all functions but offsets follow a second time, as what differs in them: the
-  /// tests of a contrast; else none.
+  /// Indices of the flights for which all functions but offsets follow a second time, as what differs in these flights:
+  /// the tests of a contrast; else none.
   virtual std::vector<std::size_t> apart(const Flights& flights) const = 0;
   /// Whether an excess of a block over its prior is a sign of an unknown cause.
   virtual bool may_be_free(std::size_t block, const RegimeBasis& basis, const ModelDiscrepancy& discrepancy) const = 0;
-  /// Scales from which expectation-maximisation starts. `given`: those that it would start from; `log_evidence`: of any
-  /// scales, in nats.
+  /// Scales from which expectation-maximisation starts (Evidence::weigh). `given`: those that the caller gave;
+  /// `log_evidence`: of any scales, in nats. Asked only where Scales::session is still the centre of its prior.
   virtual Scales first_scales(const Scales& given, const std::function<double(const Scales&)>& log_evidence) const = 0;
-  /// How often an iteration maximises blocks and the centres of their scales in turn, at most.
+  /// How often, at most, an iteration maximises scales of blocks and, in turn, the centres of their priors:
+  /// Scales::robot and Scales::session.
   virtual int max_passes() const = 0;
 };
 

@@ -1,5 +1,6 @@
-// The model discrepancy: what every model gets wrong before anything is known of a vehicle (Kennedy and O'Hagan 2001).
-// configs/gap/model_discrepancy.toml has its parameters and how they were learnt.
+// The priors of the model discrepancy: of what every model gets wrong, before anything is known of a vehicle (Kennedy
+// and O'Hagan 2001). configs/gap/model_discrepancy.toml has them and says how they were learnt; beat-averaged vehicles
+// have files of their own in configs/gap/beat_averaged.
 #pragma once
 
 #include <filesystem>
@@ -32,20 +33,22 @@ struct ModelDiscrepancy {
     double sd;
   };
   std::vector<Nuisance> nuisances;
-  /// Prior sd of the coefficients of functions of this kind, as a share of the channel's signal.
+  /// Prior sd of the coefficients of functions of this kind, as a share of the group's signal (Evidence::signal).
   double share(int channel, int harmonic, BasisFunction function) const {
     return share_of(shares, channel, harmonic, function);
   }
   /// Prior sd of the background magnitude of an effect, in its coordinates (hypothesis.hpp): what a vehicle without the
   /// effect has of it, or of something that looks like it.
   double background_sd(const std::string& effect) const;
+  /// Degrees of freedom of the scale of a block.
   double freedom_of(Regimes regimes) const {
     return regimes == Regimes::place ? spread.place_freedom : spread.block_freedom;
   }
+  /// Prior of the scale of a background magnitude: of an effect, perhaps with one of the prefixes or the suffix below.
   ScalePrior scale_prior(const std::string& effect) const;
 
   Shares shares{};
-  SessionVariation session;                  ///< only used in a contrast
+  SessionVariation session;                  ///< only used in a contrast of a vehicle with wings
   std::map<std::string, double> background;  ///< background_sd by effect; "other": effects that are not listed
   /// Effects of wings, hinges and drive, which models describe differently: their background follows the robot
   /// (model_freedom).

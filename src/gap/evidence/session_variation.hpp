@@ -1,5 +1,6 @@
-// What differs between two sessions of flights of one robot in which nothing that matters has changed: weather, a warm
-// winding, a battery put back. configs/gap/session_variation.toml has its parameters and how they were learnt.
+// Priors of what differs between two sessions of flights of one robot with wings, between which nothing that matters
+// has changed: weather, a warm winding, a battery put back. For contrasts. configs/gap/session_variation.toml has them
+// and says how they were learnt.
 #pragma once
 
 #include <array>
@@ -27,7 +28,7 @@ struct ScalePrior {
 /// What contrasts of each reference session of the robot with the others say (gap/fit/own_sessions.hpp).
 struct OwnSessions {
   double count = 0;             ///< K, number of sessions
-  double mean_log_scale = 0;    ///< of the scales f_k
+  double mean_log_scale = 0;    ///< mean of log f_k, the scale of session k against the others
   std::vector<double> squares;  ///< [block] sum of delta^2 / f_k^2, in units of the prior
   std::vector<double> known;    ///< [block] number of coefficients that the flights determine
   /// Of the magnitudes of what changes, by the name of its background (Fitter::effects()): the same two sums, of squares
@@ -40,15 +41,16 @@ struct OwnSessions {
 struct SessionVariation {
   /// How far a pair of sessions differs more or less than others: log scale ~ N(0, scale_sd^2).
   double scale_sd = 0.5;
-  /// Sessions of one robot: standard deviation of the log scale; by how much it is larger in tests than contrasts among
-  /// references say, whose flights are fewer; share of what these say of the scales of blocks that counts.
+  /// Sessions of one robot: standard deviation of the log scale; by how much the log scale is larger in tests than
+  /// contrasts among references say, which have fewer flights; share that counts of what these contrasts say of scales
+  /// of blocks.
   double own_scale_sd = 0.25, own_offset = 0, own_share = 0.05;
   std::optional<OwnSessions> own;  ///< none: the references are one session
   /// Degrees of freedom of the scales of blocks, and of those of background magnitudes (ScalePrior).
   double block_freedom = 30, effect_freedom = 30;
-  /// Deviation of another law of the same cause from the catalogue's, as a share of the change by the effect. law_error:
-  /// [stage] the centre over effects and robots; law_spread: standard deviation of its logarithm; law_most: the largest
-  /// over the centre.
+  /// Deviation of another law of the same cause from the catalogue's, as a share of the change by the effect.
+  /// law_error: [stage] the centre over effects and robots; law_spread: standard deviation of its logarithm; law_most:
+  /// the largest over the centre.
   std::array<double, model::kStages> law_error{};
   double law_spread = 1, law_most = 8;
   /// Prior sd of the change of a parameter, in its prior standard deviations, by a part of its name.
@@ -72,8 +74,9 @@ struct SessionVariation {
   /// Of the scale of a change of magnitude, by the name of its background: the same, with effect_freedom and a w of
   /// (K - 1)/K.
   ScalePrior of_magnitude(const std::string& name) const;
-  /// 0: a parameter that does not change between sessions.
+  /// Prior sd of the change of a parameter, in its prior standard deviations; 0: it does not change between sessions.
   double parameter_sd(const std::string& name) const;
+  /// Prior sd of the change of an effect's magnitude, in its coordinate.
   double background_sd(const std::string& effect) const;
   /// Law error of the effect's stage.
   double law_error_of(const std::string& effect) const;

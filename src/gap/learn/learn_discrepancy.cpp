@@ -27,13 +27,14 @@ constexpr int kIterations = 16;
 /// The mean square of like channels counts as much as this many coefficients. The scale that pairs of sessions start
 /// with counts as much as this many pairs. Choice.
 constexpr double kShrink = 6;
-/// Least share of the discrepancy that is learnt. Choice: smaller ones are due to the small number of robots.
+/// Smallest share of the discrepancy that is learnt. Choice: smaller ones are due to the small number of robots.
 constexpr double kMinShare = 2e-4;
-/// Least standard deviation of a background magnitude that is learnt. Choice: smaller ones are due to the small number of robots.
+/// Smallest standard deviation of a background magnitude that is learnt. Choice: smaller ones are due to the small
+/// number of robots.
 constexpr double kMinBackground = 0.01;
 /// Errors of laws are learnt from no fewer pairs. Choice.
 constexpr std::size_t kMinLaws = 5;
-/// Least standard deviation of the logarithm of errors of laws. Choice.
+/// Smallest standard deviation of the logarithm of errors of laws. Choice.
 constexpr double kMinSpread = 0.25;
 /// The centre over all stages counts as much as this many errors of a stage. Choice.
 constexpr double kShrinkLaws = 2;

@@ -1,4 +1,5 @@
-// Learns the model discrepancy from trusted robots: their flights contain nothing that the vehicle file lacks.
+// Learns the model discrepancy, and what sessions differ by, from trusted robots: their flights contain nothing that
+// the vehicle file lacks. flappy-gap learn-discrepancy calls it.
 #pragma once
 
 #include <string>
@@ -8,22 +9,24 @@
 
 namespace flappy::gap {
 
-/// Prior standard deviations of coefficients, by channel, harmonic and kind, and of background magnitudes that make all
-/// residuals most probable: each robot is fitted, then expectation-maximisation runs from `start`, whose other
-/// parameters stay. Estimates are shrunk towards like ones, as each rests on few coefficients. `flights`: [robot].
-/// io::InputError after Ctrl-C.
+/// Finds the prior standard deviations that make the residuals of all robots most probable: of coefficients, by
+/// channel, harmonic and kind of function, and of background magnitudes. Each robot is fitted, then
+/// expectation-maximisation runs from `start`, whose other parameters stay, as do standard deviations of which no
+/// flight tells. Estimates are shrunk towards like ones, as each rests on few coefficients. `flights`: [robot], test
+/// flights alone. `uncertain`: the vehicle file of all robots with the priors of its parameters. io::InputError after
+/// Ctrl-C, and as from RobotFit.
 ModelDiscrepancy learn_discrepancy(const std::vector<Flights>& flights, const sim::Randomisation& uncertain,
                                    const ModelDiscrepancy& start, int threads);
 
-/// Two sessions of a robot.
+/// Sessions of a robot with wings: the references, of one session or of several, and the tests, a later session.
 struct SessionPair {
   Flights flights;
-  std::string effect;  ///< effect of the catalogue that appeared between them; empty: none
+  std::string effect;  ///< effect of the catalogue that appeared before the tests; empty: none
 };
 
-/// Learns what differs between sessions from pairs in which nothing that matters changed, and how far laws of one cause
-/// differ from pairs with an effect, if there are enough. What cannot be learnt stays as in `start`.
-/// io::InputError after Ctrl-C.
+/// Learns what differs between sessions from pairs without an effect. Then, from pairs with one, how far laws of one
+/// cause differ. What too few pairs tell of stays as in `start.session`. io::InputError after Ctrl-C, as from RobotFit,
+/// and if all pairs have an effect but too few tell of its law.
 SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim::Randomisation& uncertain,
                                 const ModelDiscrepancy& start, int threads);
 

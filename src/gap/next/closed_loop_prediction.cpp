@@ -29,7 +29,7 @@ constexpr double kLearn_s = 3, kApproach_s = 1, kRest_s = 0.5, kLead_s = kLearn_
 constexpr double kClear_m = 0.5;
 /// Left out at the start of each flight. Choice: a simulated vehicle starts at rest and has to catch up.
 constexpr double kCatchUp_s = 0.5;
-/// Least number of beats of a flight that is compared. Choice.
+/// Smallest number of beats of a flight that is compared. Choice.
 constexpr std::size_t kMinBeats = 40;
 
 constexpr std::array<const char*, 9> kQuantities = {"mean_amplitude_V", "mean_difference_V", "mean_bias_V",

@@ -24,23 +24,25 @@
 
 namespace flappy::gap {
 
-/// nats(A, each hypothesis). `log_evidence`: [hypothesis] log p of the rows that hypothesis `a` predicts, less anything
-/// that all have in common.
+/// [hypothesis] nats(a, hypothesis), before any flight. `log_evidence`: [hypothesis] log p of the rows that hypothesis
+/// `a` predicts, less anything that all have in common.
 Eigen::VectorXd expected_nats(const Eigen::VectorXd& log_evidence, Eigen::Index a);
 
-/// A fitted hypothesis' prediction of a flight.
+/// A fitted hypothesis' prediction of a next flight.
 struct Expected {
-  SufficientStatistics residual;             ///< measured less predicted, of a log that all hypotheses are given
+  SufficientStatistics residual;             ///< measured less predicted, of one simulated log for all hypotheses
   std::vector<BasisCoefficients> uncertain;  ///< [independent unknown] change for one standard deviation
   BasisCoefficients law_sd;  ///< [group][basis] standard deviation of the deviations of the laws of its effects
 };
-/// nats(a, b). K: declared noise, model discrepancy at scale 1, both laws' deviations, and what is uncertain of b.
+/// nats(a, b), after some flights. K: declared noise, model discrepancy at scale 1, the deviations of the laws of both,
+/// and what is uncertain of b. `evidence`: of the next flight and, in a contrast, the references.
 double expected_nats(const Evidence& evidence, const Expected& a, const Expected& b);
 
 /// Share of its odds that a rival keeps after a flight that brings `nats` over it; 1 if it brings none.
 double kept_odds(double nats, const VerdictRule& rule);
 
-/// I, in nats. `probability`: [hypothesis] p_A; of some hypotheses alone, their share of I. `nats`: [hypothesis] N_A.
+/// I, in nats. `probability`: [hypothesis] p_A; `nats`: [hypothesis] N_A. Given some hypotheses alone, their part of
+/// the sum.
 double expected_information(const std::vector<double>& probability, const std::vector<double>& nats,
                             const VerdictRule& rule);
 

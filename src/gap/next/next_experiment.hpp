@@ -4,14 +4,14 @@
 // the flight would bring follows from how their predictions differ (expected_nats.hpp):
 //   nats(A, B) = 1/2 Delta^T K^-1 Delta      K: covariance of noise, model discrepancy (evidence.hpp), deviations of
 //                                            the laws of their effects, and what is still uncertain of B
-// So B may adapt to the new flight as far as the flights so far allow. The correlation of its errors in old and new
-// flights is neglected, which makes the nats small. For an effect left open, the magnitude is the root mean square of
-// its posterior. The strongest rival is the most probable one (for that one: the next). The manoeuvre of the largest
-// expected information is proposed.
+// So B may adapt to the new flight as far as the flights so far allow. The correlation of B's errors in old and new
+// flights is neglected, which makes the nats small. For an effect that was fitted only linearly, the magnitude is the
+// root mean square of its posterior. The strongest rival of a hypothesis is the most probable one (of the most probable
+// one: the next). The manoeuvre of the largest expected information is proposed.
 //
 // In a contrast the new flight is a further test flight. All rivals have the parameters of the reference, so they
 // differ by their effects alone. The references stay among the flights: in the regimes that they visit, the model
-// discrepancy cancels, and K has the differences between sessions.
+// discrepancy cancels, and K has the differences between sessions. Only for vehicles with wings.
 #pragma once
 
 #include <filesystem>
@@ -34,14 +34,14 @@ struct Manoeuvre {
 /// File of interventions in a folder of manoeuvres.
 inline constexpr const char* kInterventions = "interventions.toml";
 
-/// The configurations (*.toml) of a folder by name, then its interventions. io::InputError if there is none or a faulty
-/// one.
+/// The configurations (*.toml) of a folder by name, then its interventions. `overrides`: KEY=VALUE for all
+/// configurations. io::InputError if there is no configuration, or a faulty one.
 std::vector<Manoeuvre> read_manoeuvres(const std::filesystem::path& folder,
                                        const std::vector<std::string>& overrides = {});
 
 struct NextOptions {
-  int threads = 0;
-  double least_probability = 0.01;  ///< least probability of a rival
+  int threads = 0;                  ///< as for io::parallel_for
+  double least_probability = 0.01;  ///< smallest probability of a rival
   FlightList references;            ///< reference flights of a contrast; empty: no contrast
   ModelDiscrepancy discrepancy;
   VerdictRule rule;
@@ -49,7 +49,8 @@ struct NextOptions {
 
 /// The most informative manoeuvre first; empty with fewer than two rivals. Hypotheses with an unknown cause or a
 /// remainder are no rivals: no vehicle simulates them. Leaves out manoeuvres in which one of the four most probable
-/// rivals crashes.
+/// rivals crashes, or which the two most probable ones cannot predict. `uncertain`: with the minor draws of the
+/// inference.
 std::vector<NextExperiment> rank_experiments(const Inference& inference, const sim::Randomisation& uncertain,
                                              const std::vector<Manoeuvre>& manoeuvres, const NextOptions& options);
 

@@ -12,14 +12,14 @@ namespace flappy::gap {
 
 struct PlanSettings {
   std::string vehicle;             ///< the vehicle file
-  std::string sensors;             ///< empty: as the manoeuvres have them
+  std::string sensors;             ///< file of sensors; empty: as the manoeuvres have them
   std::string experiments;         ///< folder of manoeuvres; empty: configs/gap/experiments
   std::string manoeuvre = "tour";  ///< name of a configuration in `experiments`
   /// Folders of flights in place of a manoeuvre, and of reference flights; the latter empty: `like`.
   std::vector<std::string> like, like_reference;
-  int flights = 3;           ///< number of flights, and of reference flights
+  int flights = 3;           ///< number of flights; not used with `like`
   double duration_s = 10;    ///< a flight ends after this time, or with the manoeuvre
-  bool reference = false;    ///< with as many reference flights
+  bool reference = false;    ///< with as many reference flights, or with those of `like_reference`
   bool matrix_only = false;  ///< neither other flights nor from which magnitude on an effect is sure
   /// Empty: the files of configs/gap that a diagnosis reads.
   std::string priors, discrepancy, verdict, sessions;
@@ -27,8 +27,9 @@ struct PlanSettings {
   int threads = 0;                           ///< 0: one for each processor
 };
 
-/// io::InputError for a setting or file that is not accepted, a vehicle without wings and motors, or a manoeuvre that
-/// the vehicle cannot fly.
+/// Simulates the flights by the vehicle file, or reads those of `like`, and weighs them. After Ctrl-C choices are
+/// missing. io::InputError for a setting or file that is not accepted, a vehicle without wings and motors, a log with
+/// faults, or a manoeuvre that the vehicle cannot fly.
 Plan make_plan(const PlanSettings& settings);
 
 }  // namespace flappy::gap

@@ -107,8 +107,8 @@ class Separator {
     double times;
   };
 
-  /// [asked] Gains of all rivals if the robot has this effect, at `factors` times its magnitude; a factor of 0: not asked.
-  /// None: the simulation diverges.
+  /// [asked] Gains of all rivals if the robot has this effect, at `factors` times its magnitude; a factor of 0: not
+  /// asked. None: the simulation diverges.
   std::vector<std::optional<VectorXd>> gains_at(const std::vector<double>& factors) const {
     std::vector<std::size_t> which;
     std::vector<VehicleHypothesis> vehicles;

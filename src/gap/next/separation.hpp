@@ -1,6 +1,6 @@
-// Which effects planned flights would tell apart. If the robot has effect T, its rows change by c. A hypothesis R, with
-// the magnitudes of its effect, parameters, errors of sensors, model discrepancy and noise integrated out
-// (gap/evidence/evidence.hpp), gains over the parameters alone
+// Which effects planned flights would tell apart (plan.hpp). If the robot has effect T, its rows change by c. A
+// hypothesis R, with the magnitudes of its effect, parameters, errors of sensors, model discrepancy and noise
+// integrated out (gap/evidence/evidence.hpp), gains over the parameters alone
 //   G_R(c) = log p(c | R) - log p(c | parameters)
 // as screening finds it (gap/fit/screening.hpp), and expected_nats.hpp makes of it the expected evidence for T over R,
 //   nats(T, R) = G_T(c) - G_R(c).
@@ -18,13 +18,13 @@
 namespace flappy::gap {
 
 struct Separation {
-  std::vector<std::string> effects;  ///< that the robot may have
+  std::vector<std::string> effects;  ///< those asked about; without any that change no row, or diverge
   std::vector<std::string> rivals;   ///< all effects that change a row, then "parameters": none
   Eigen::MatrixXd nats;              ///< [effect][rival] expected evidence for the effect over the rival
-  /// [effect] Probability that a diagnosis gives the effect, if the robot has it.
+  /// [effect] How probable a diagnosis finds the effect, if the robot has it.
   std::vector<double> probability;
-  /// [effect] Factor on the magnitude from which on that probability is kSure; none: not up to kMaxFactor and
-  /// largest_factor().
+  /// [effect] Factor on the magnitude from which on that probability is kSure, 1 / kMaxFactor or more. None: not up to
+  /// kMaxFactor, largest_factor() or a simulation that diverges; or not asked.
   std::vector<std::optional<double>> sure_from;
 };
 /// A probability that counts as sure. Choice.
@@ -32,11 +32,11 @@ inline constexpr double kSure = 0.9;
 /// Largest factor on a magnitude that is tried, and one over the smallest. Choice.
 inline constexpr double kMaxFactor = 16;
 
-/// The largest factor on the typical magnitudes of an effect that a vehicle file accepts.
+/// The largest factor on all typical magnitudes of an effect that a vehicle file accepts.
 double largest_factor(const model::CatalogueEffect& effect);
 
-/// `robot`: of RobotFit::planned. `asked`: [effect] magnitude over the typical one. Leaves out effects that change no
-/// row, or whose simulation diverges. `sure`: also find sure_from.
+/// `robot`: of RobotFit::planned, for `flights`. `asked`: [effect] magnitude over the typical one. `rule`: as
+/// Question::rule gives it. `sure`: also find sure_from.
 Separation separation_of(const Flights& flights, const RobotFit& robot, const std::map<std::string, double>& asked,
                          const VerdictRule& rule, int threads, bool sure = true);
 

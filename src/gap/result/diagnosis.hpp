@@ -21,9 +21,9 @@ struct Closure {
   double value = 0, low = 0, high = 0;
 };
 
-/// none: the file explains the flights; parameters: with other parameters; effect: effects of the catalogue are missing
-/// in it; unknown: something else is. In a contrast: nothing changed since the reference; no more than sessions differ
-/// by; effects appeared; something else did.
+/// none: the file explains the flights; parameters: it does with other parameters; effect: effects of the catalogue are
+/// missing in the file; unknown: something else is. In a contrast: none: nothing changed since the reference;
+/// parameters: no more than sessions differ by; effect: effects appeared; unknown: something else changed.
 enum class HypothesisKind { none, parameters, effect, unknown };
 
 /// One of the hypotheses that exclude each other; their probabilities add up to 1.
@@ -119,30 +119,33 @@ struct NextExperiment {
   std::vector<Course> courses;  ///< the largest difference first
 };
 
+/// Rms of the residual of a channel, over all beats of all test flights, each flight held out.
 struct HeldOutError {
   std::string channel;
-  double rms = 0, low = 0, high = 0;  ///< 90 % interval by resampling blocks of beats
+  double rms = 0, low = 0, high = 0;  ///< in the channel's unit; 90 % interval by resampling blocks of beats
   double by_type = 0;  ///< rms where all flights of a type are held out together; `rms` if all have one type
 };
 
-/// Controls of a diagnosis of a beat-averaged vehicle, in held-out flights.
+/// How far a diagnosis of a beat-averaged vehicle without references holds in flights that were held out.
 struct Validation {
-  /// The vehicle file, then the file with its parameters fitted, then one effect more on each rung.
+  /// The vehicle file, then the file with its parameters fitted, then one concluded effect more on each rung.
   struct Rung {
-    std::string added;
-    std::vector<HeldOutError> errors;
+    std::string added;                 ///< "file", "parameters", or the effect
+    std::vector<HeldOutError> errors;  ///< [channel with rows]
   };
   std::vector<Rung> ladder;
-  /// Gain by the contribution of an effect, and by copies of it that are shifted in time, which should gain nothing.
+  /// What the change by an effect removes from the residual without the effect, and what copies of this change remove
+  /// that are shifted in time: these should remove nothing.
   struct Control {
     std::string effect, channel;  ///< the channel in which the effect gains most
     double gain = 0;              ///< share of the rms that the effect removes
     double best_of_shifted = 0;   ///< the largest share that a shifted copy removes
   };
   std::vector<Control> controls;
+  /// A magnitude by each flight alone.
   struct Agreement {
-    std::string name;
-    std::vector<double> value, sd;  ///< [flight]
+    std::string name;               ///< as Estimate::name
+    std::vector<double> value, sd;  ///< [test flight]
     double p_value = 1;             ///< p value of the null hypothesis that all flights have the same magnitude
   };
   std::vector<Agreement> agreements;

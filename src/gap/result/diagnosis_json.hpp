@@ -14,9 +14,11 @@ inline constexpr int kDiagnosisSchema = 3;
 inline constexpr const char *kDiagnosisFile = "diagnosis.json", *kVehicleFile = "vehicle_corrected.toml";
 
 nlohmann::ordered_json to_json(const Diagnosis& diagnosis);
+/// Writes kDiagnosisFile into the folder, atomically.
 void write_diagnosis(const std::filesystem::path& folder, const Diagnosis& diagnosis);
 
-/// `file`: named in errors. io::InputError if `json` is not a diagnosis, or has another schema.
+/// Reads what to_json wrote. `file`: named in errors. io::InputError if `json` is not a diagnosis, or has another
+/// schema.
 Diagnosis diagnosis_from(const nlohmann::ordered_json& json, const std::filesystem::path& file);
 
 }  // namespace flappy::gap

@@ -1,4 +1,4 @@
-// plan.json and matrix.csv of a plan (docs/reference/plan.md).
+// Writes plan.json and matrix.csv of a plan, as text (docs/reference/plan.md).
 #pragma once
 
 #include <filesystem>

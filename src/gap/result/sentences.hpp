@@ -1,5 +1,6 @@
-// What is said of a diagnosis, in one place for the summary and the page. Sentences begin with a small letter where they
-// may stand within a line.
+// What is said of a diagnosis, in one place for the printed summary (gap/diagnose/summary.hpp) and the page of the
+// report (src/view). Sentences begin with a small letter where they may stand within a line. Comments below show
+// examples.
 #pragma once
 
 #include "gap/result/diagnosis.hpp"
@@ -18,7 +19,7 @@ inline constexpr const char* kMendLogs = "mend the logs, until flappy-gap check 
 inline constexpr const char* kReferenceDecides =
     "that would be decided by flights of the same robot without it, given as --reference";
 
-/// With a capital letter at its start.
+/// `words` with a capital letter at their start.
 std::string capitalised(std::string words);
 /// "a, b and c".
 std::string spoken_list(const std::vector<std::string>& words, const char* last = "and");
@@ -32,12 +33,13 @@ std::string hypothesis_words(const RankedHypothesis& hypothesis, Spoken spoken);
 std::string hypothesis_words(const std::string& name, Spoken spoken);
 /// "if an effect is missing, then most probably wind 0.40 (closes 30 %) or tether 0.20".
 std::string suspects_words(const std::vector<Suspect>& suspects, Spoken spoken);
-/// A quantity is told beyond so many times what sessions differ by. Choice: of twenty quantities one goes so far by chance.
+/// A quantity is told beyond so many times what sessions differ by. Choice: of twenty quantities one goes so far by
+/// chance.
 inline constexpr double kTold = 2;
-/// What changed most, whatever the cause, one line each, the largest first: "thrust of rotor_3 -9.4 %, 6.1 times what
-/// sessions differ by".
+/// Quantities that changed by more than kTold, whatever the cause, one line each, the largest first: "thrust of rotor_3
+/// -9.4 %, 6.1 times what sessions differ by".
 std::vector<std::string> seen_words(const std::vector<SeenQuantity>& seen, Spoken spoken);
-/// A value of a quantity in the unit that people use: shares in %, metres in mm, seconds in ms.
+/// A value of a quantity in the unit that people use: shares in %, metres in mm, seconds in ms. `sign`: with + or -.
 std::string seen_value(const SeenQuantity& quantity, double value, bool sign);
 /// "flight b differs from the others of its set, most in thrust (8.1 times what sessions differ by)"; "flight b changes
 /// 12.3 s after its begin, in thrust by -0.094 (14 times its noise)".
