@@ -137,8 +137,10 @@ DiagnosisRequest read_request(const DiagnosisSettings& settings) {
                          (beat_averaged ? "with wings" : "that are beat-averaged") +
                          "; accepted: one that was learnt from vehicles like " + vehicle.name);
   if (contrast && beat_averaged) options.sessions = read_session_prior(file(s.sessions, "session_scatter.toml"));
-  if (contrast && !beat_averaged)
-    options.discrepancy.session = read_session_variation(file(s.sessions, "session_variation.toml"));
+  // of a beat-averaged vehicle, only its errors of laws count
+  if (contrast)
+    options.discrepancy.session =
+        beat_averaged ? read_session_variation() : read_session_variation(file(s.sessions, "session_variation.toml"));
   return {s,
           std::move(sets),
           std::move(sessions),

@@ -174,7 +174,8 @@ class Weighing {
     const double each = prior.effect / static_cast<double>(effects_.size());
     std::vector<EffectFit> singles(effects_.size());
     io::parallel_for(singles.size(), options_.threads, [&](std::size_t i) {
-      singles[i] = fit_each_way(tests_, Hypothesis(uncertain_, {effects_[i]}), robot_, nullptr);
+      singles[i] =
+          fit_each_way(tests_, Hypothesis(uncertain_, {effects_[i]}), robot_, nullptr, law_error_of({effects_[i]}));
     });
     for (std::size_t i = 0; i < effects_.size(); ++i) list.push_back(with({effects_[i]}, singles[i], each));
     const bool further_ones = go_on(0.7, "fitting another jointly");
@@ -191,6 +192,12 @@ class Weighing {
     std::size_t first, second;
     EffectFit fit;
   };
+  /// The largest of the effects' stages.
+  double law_error_of(const std::vector<std::string>& effects) const {
+    double error = 0;
+    for (const std::string& e : effects) error = std::max(error, options_.discrepancy.session.law_error_of(e));
+    return error;
+  }
   double further(const Pair& p) const {
     return options_.sessions.further(effects_[p.first], effects_[p.second], effects_.size() - 1);
   }
@@ -207,7 +214,7 @@ class Weighing {
           pairs.push_back({order[a], b, {}});
     io::parallel_for(pairs.size(), options_.threads, [&](std::size_t i) {
       const Hypothesis both(uncertain_, {effects_[pairs[i].first], effects_[pairs[i].second]});
-      pairs[i].fit = fit_each_way(tests_, both, robot_, &singles[pairs[i].first]);
+      pairs[i].fit = fit_each_way(tests_, both, robot_, &singles[pairs[i].first], law_error_of(both.effects()));
     });
     std::ranges::stable_sort(pairs, std::greater{},
                              [&](const Pair& p) { return p.fit.explained + std::log(further(p)); });

@@ -49,7 +49,7 @@ constexpr double kMinStepGain_nats = 1e-3;
 
 /// The most probable coordinates among `free`, and the evidence.
 EffectFit fit_effects(const TestSession& tests, const Hypothesis& h, VectorXd at, const std::vector<Index>& free,
-                      const VectorXd& more) {
+                      const VectorXd& more, double law_error) {
   const SessionDensity& density = tests.density();
   const auto n = static_cast<Index>(free.size());
   const auto coordinates = [&](const VectorXd& z) {
@@ -64,8 +64,9 @@ EffectFit fit_effects(const TestSession& tests, const Hypothesis& h, VectorXd at
   };
   VectorXd z = part(at);
   VectorXd shift = tests.shifts({h.vehicle(coordinates(z))}).front();
+  const auto with_law = [&](const VectorXd& s) -> VectorXd { return more + (law_error * s).cwiseAbs2(); };
   const auto value = [&](const VectorXd& s, const VectorXd& c) {
-    return density.log_density(s, more) - 0.5 * c.squaredNorm();
+    return density.log_density(s, with_law(s)) - 0.5 * c.squaredNorm();
   };
   double now = value(shift, z);
   MatrixXd j(shift.size(), n), hessian;
@@ -83,7 +84,7 @@ EffectFit fit_effects(const TestSession& tests, const Hypothesis& h, VectorXd at
     const std::vector<VectorXd> moved = tests.shifts(vehicles);
     for (Index i = 0; i < n; ++i)
       j.col(i) = (moved[static_cast<std::size_t>(i)] - shift) / steps[static_cast<std::size_t>(i)];
-    const VectorXd precision = density.precision(shift, more);
+    const VectorXd precision = density.precision(shift, with_law(shift));
     hessian = j.transpose() * precision.asDiagonal() * j + MatrixXd::Identity(n, n);
     gradient = j.transpose() * precision.cwiseProduct(density.difference() - shift) - z;
   };
@@ -198,7 +199,8 @@ double log_sum(const std::vector<double>& values) {
   return most + std::log(sum);
 }
 
-EffectFit fit_each_way(const TestSession& tests, const Hypothesis& h, const VectorXd& robot, const EffectFit* first) {
+EffectFit fit_each_way(const TestSession& tests, const Hypothesis& h, const VectorXd& robot, const EffectFit* first,
+                       double law_error) {
   VectorXd base = h.start();
   base.head(h.shared()) = robot.head(h.shared());
   if (first != nullptr) base.head(first->at.size()) = first->at;
@@ -212,7 +214,7 @@ EffectFit fit_each_way(const TestSession& tests, const Hypothesis& h, const Vect
     for (const VectorXd& more : shaking) {
       EffectFit of_way;
       for (const VectorXd& start : way.starts) {
-        EffectFit f = fit_effects(tests, h, start, way.free, more);
+        EffectFit f = fit_effects(tests, h, start, way.free, more, law_error);
         if (f.explained > of_way.explained) of_way = std::move(f);
       }
       evidence.push_back(of_way.explained);

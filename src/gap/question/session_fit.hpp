@@ -42,10 +42,11 @@ struct EffectFit {
 /// Fits the last effect of `h`, jointly with the ones before it. The effect may act in several ways, which are equally
 /// probable: a loss of actuators by all of them or by each alone, and a damaged actuator may shake, or not. The
 /// evidence is the mean over all ways, the fit that of the most probable way.
+/// `law_error`: deviation of the robot's law of the effects from the catalogue's, as a share of what they change.
 /// `robot`: [coordinate] the references' parameters. `first`: a fit of the effects before the last; null: there are
 /// none.
 EffectFit fit_each_way(const TestSession& tests, const Hypothesis& h, const Eigen::VectorXd& robot,
-                       const EffectFit* first);
+                       const EffectFit* first, double law_error);
 /// Whether a magnitude of one prior standard deviation, of any sign that it may have, changes any quantity by more than
 /// a tenth of what sessions differ by.
 bool shows(const TestSession& tests, const Hypothesis& h, const Eigen::VectorXd& robot);
