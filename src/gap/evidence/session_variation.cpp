@@ -14,8 +14,8 @@ constexpr const char* kSessionHead =
 #
 # Learnt: flappy-gap learn-discrepancy --pairs, )";
 constexpr const char* kSessionSpread =
-    R"(# scale_sd: standard deviation of the logarithm of the scale of a pair of sessions. block_freedom, effect_freedom: degrees of freedom of the scales of
-# single blocks and of single effects. Choice: high, for no session differs by a hundred times as much as others.
+    R"(# scale_sd: standard deviation of the logarithm of the scale of a pair of sessions. block_freedom: degrees of freedom of the scales of
+# single blocks. Choice: high, for no session differs by a hundred times as much as others.
 )";
 constexpr const char* kSessionLaws =
     R"(# How far another law of the same cause deviates from that of the catalogue, as a share of the change by the effect: by the stage in which it acts, the
@@ -26,6 +26,7 @@ constexpr const char* kOwnScaleSd =
     "  # The same among sessions of one robot, where references are of several sessions. Learnt.";
 constexpr const char* kOwnOffset =
     "  # By how much this logarithm is larger in tests than contrasts among references say. Learnt.";
+constexpr const char* kEffectFreedom = "  # Of the scales of magnitudes. Learnt.";
 constexpr const char* kOwnShare =
     "  # Share of what these say of the scales of single blocks that counts: few causes move all coefficients. Learnt.";
 const char* stage_name(std::size_t stage) { return name_of(static_cast<model::Stage>(stage)); }
@@ -98,7 +99,7 @@ std::string session_text(const SessionVariation& s, const std::string& learnt) {
       kSessionHead + learnt + ".\nschema = 1\n\n" + kSessionSpread + "[spread]\nscale_sd = " + number(s.scale_sd) +
       kScaleSd + "\nown_scale_sd = " + number(s.own_scale_sd) + kOwnScaleSd + "\nown_offset = " + number(s.own_offset) +
       kOwnOffset + "\nown_share = " + number(s.own_share) + kOwnShare + "\nblock_freedom = " + number(s.block_freedom) +
-      "\neffect_freedom = " + number(s.effect_freedom) + "\n\n" + kSessionLaws + "[law_error]\n";
+      "\neffect_freedom = " + number(s.effect_freedom) + kEffectFreedom + "\n\n" + kSessionLaws + "[law_error]\n";
   for (std::size_t stage = 0; stage < model::kStages; ++stage)
     text += std::string(stage_name(stage)) + " = " + number(s.law_error[stage]) + "\n";
   text += "spread = " + number(s.law_spread) + "\nmost = " + number(s.law_most) + "\n\n" + kSessionParametersHead +

@@ -290,7 +290,7 @@ void choose(const Robots& pairs, const std::vector<std::optional<OwnSessions>>& 
       const ScaledEvidence w = weigh_harmless(*pairs[k], now);
       sum += w.posterior.log_evidence - by_maximising_nats(*pairs[k], now, w);
     }
-    io::log(io::LogLevel::warning, io::format("%s %.2f: %.2f nats", what, value, sum));
+    io::log(io::LogLevel::info, io::format("%s %.2f: %.2f nats", what, value, sum));
     if (sum > most) most = sum, best = value;
   }
   to = best;
