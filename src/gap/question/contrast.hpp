@@ -41,7 +41,8 @@ class Contrast : public Question {
   /// With the deviations of the effects' laws.
   BasisCoefficients effects_discrepancy_sd(const Fitter& fitter, const Hypothesis& hypothesis,
                                            const Fit& fit) const override;
-  /// The point with the largest evidence among `fit`, points on the way to `there`, and points with smaller magnitudes.
+  /// The point with the largest evidence among `fit`, points on the way to `there`, and points with smaller magnitudes;
+  /// `there` itself for effects that are undone in the log, as these are linear.
   Eigen::VectorXd next_effects(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit,
                                const Eigen::VectorXd& there, const BasisCoefficients& sd) const override;
   const ModelDiscrepancy* near_steps(const ModelDiscrepancy& /*discrepancy*/) const override { return nullptr; }

@@ -11,7 +11,7 @@ namespace flappy::gap {
 /// A hypothesis, and its fit to all flights.
 struct FittedHypothesis {
   Hypothesis hypothesis;
-  const Fit* fit;
+  const Fit* fit;  ///< not owned
 };
 
 /// [fold][flight] Whether a fit that predicts the fold may use the flight: all references, and tests of other folds. If
