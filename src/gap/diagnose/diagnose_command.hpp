@@ -10,8 +10,10 @@ namespace flappy::gap {
 
 struct DiagnoseCommand {
   DiagnosisSettings settings;  ///< each withheld effect withholds its whole group of the catalogue
-  std::string out;             ///< folder for diagnosis.json and vehicle_corrected.toml; empty: no files are written
-  bool quiet = false;          ///< prints no summary
+  /// Folder for diagnosis.json, log.txt and, unless the data are at fault or it was stopped, vehicle_corrected.toml;
+  /// those of an earlier diagnosis are removed. Empty: no files are written.
+  std::string out;
+  bool quiet = false;  ///< prints no summary
 };
 
 /// Diagnoses, writes the files, prints the summary and returns the content of diagnosis.json. After Ctrl-C the result

@@ -25,7 +25,7 @@ inline double share_of(const Shares& shares, int channel, int harmonic, BasisFun
 Shares read_shares(const io::Table& root);
 /// The text that read_shares reads.
 std::string shares_text(const Shares& shares);
-/// Comment in files on `other` of the background magnitudes, which learning keeps.
+/// Comment in files after `other` of the background magnitudes, which learning does not change.
 inline constexpr const char* kOthers = "  # Of effects that are not listed. Choice.";
 
 }  // namespace flappy::gap

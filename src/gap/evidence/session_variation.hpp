@@ -31,20 +31,19 @@ struct OwnSessions {
   double mean_log_scale = 0;    ///< mean of log f_k, the scale of session k against the others
   std::vector<double> squares;  ///< [block] sum of delta^2 / f_k^2, in units of the prior
   std::vector<double> known;    ///< [block] number of coefficients that the flights determine
-  /// Of the magnitudes of what changes, by the name of its background (Fitter::effects()): the same two sums, of squares
-  /// in units of the prior.
+  /// Of the magnitudes of what changes, by the name of its background (Fitter::effects()): sum of squares in units of
+  /// the prior, not over f_k^2; number that the flights determine.
   std::map<std::string, std::pair<double, double>> magnitudes;
-  /// Of the log scale: tests are compared with all K sessions, and each of these with K - 1 others.
+  /// Correction of the log scale: the mean of the K - 1 others varies more than that of all K.
   double from_fewer() const { return 0.5 * std::log(1 - 1 / (count * count)); }
 };
 
 struct SessionVariation {
   /// How far a pair of sessions differs more or less than others: log scale ~ N(0, scale_sd^2).
   double scale_sd = 0.5;
-  /// Sessions of one robot: standard deviation of the log scale; by how much the log scale is larger in tests than
-  /// contrasts among references say, which have fewer flights; share that counts of what these contrasts say of scales
-  /// of blocks.
-  double own_scale_sd = 0.25, own_offset = 0, own_share = 0.05;
+  double own_scale_sd = 0.25;      ///< standard deviation of the log scale among sessions of one robot
+  double own_offset = 0;           ///< log scale of tests less what contrasts among references say
+  double own_share = 0.05;         ///< share that counts of what these contrasts say of the scales of blocks
   std::optional<OwnSessions> own;  ///< none: the references are one session
   /// Degrees of freedom of the scales of blocks, and of those of background magnitudes (ScalePrior).
   double block_freedom = 30, effect_freedom = 30;
@@ -63,16 +62,18 @@ struct SessionVariation {
   ///   p = 1 / (scale_sd^2 - own_scale_sd^2) + (K - 1) / own_scale_sd^2
   ///   log_scale = (K - 1) / (own_scale_sd^2 p) (mean log f_k + own_offset + 1/2 log(1 - 1/K^2))
   ///   sd_of_scale^2 = own_scale_sd^2 + 1/p
-  /// as the mean of K - 1 others varies more than that of all K.
+  /// Without own sessions: 0 and scale_sd^2.
   double log_scale() const;
   double sd_of_scale() const;
   double first_scale() const { return std::exp(log_scale()); }
   /// Degrees of freedom of the scale of a block, and its centre over that of the session:
   ///   freedom = block_freedom + w known,    centre^2 = (block_freedom + w squares) / freedom,    w = own_share (K - 1)/K
+  /// Without own sessions: block_freedom and 1.
   double freedom(std::size_t block) const;
   double centre(std::size_t block) const;
-  /// Of the scale of a change of magnitude, by the name of its background: the same, with effect_freedom and a w of
-  /// (K - 1)/K.
+  /// Of the scale of a change of magnitude, by the name of its background:
+  ///   freedom = effect_freedom + w known,    centre^2 = (effect_freedom + w squares) / freedom,    w = (K - 1)/K
+  /// This centre is not over the session's scale.
   ScalePrior of_magnitude(const std::string& name) const;
   /// Prior sd of the change of a parameter, in its prior standard deviations; 0: it does not change between sessions.
   double parameter_sd(const std::string& name) const;

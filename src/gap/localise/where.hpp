@@ -7,8 +7,8 @@
 //   input       the part that is proportional to an input
 //   whiteness   correlation between blocks of beats; not for path and rotate, whose rows are differences over beats
 // The tests of channel, regime, phase and input use sums over blocks (significance.hpp) and the smallest p value of a
-// channel's coefficients times their number (Bonferroni). The share of false discoveries after a fit is held to
-// kFalseDiscoveries.
+// channel's coefficients times their number (Bonferroni). The share of false discoveries is held to
+// kFalseDiscoveries in each stage (Fitted).
 #pragma once
 
 #include <string>
@@ -50,7 +50,7 @@ RowContext row_context_of(const FlightList& flights, std::vector<double> noise_s
 
 /// All rows of the table for one residual. `residual`: [flight of `around`], empty where the simulation diverged.
 /// `fitted`: what had been fitted, which the rows state. In the test of an input, `gap` and `noise_floor` are the rms
-/// of the part proportional to the input.
+/// of the part proportional to the input; in that of whiteness, the rms of means of blocks, of residual and of noise.
 std::vector<ResidualLocation> locate(const RowContext& around, const TestResiduals& residual, Fitted fitted);
 
 }  // namespace flappy::gap

@@ -26,8 +26,8 @@ Rival certain_rival(const ScoredHypothesis& hypothesis, const Hypothesis& h, con
 /// A rival with parameters or effects as they were fitted, which may be out of their ranges. A rival that was left open
 /// has the parameters of `d`, and the root mean square of each magnitude under its posterior.
 Rival fitted_rival(const ScoredHypothesis& hypothesis, const Inference& d, const sim::Randomisation& uncertain);
-/// [direction] Columns along `directions` of the `shared` coordinates, from the columns of `l` along its own directions
-/// of the same coordinates: spares simulations.
+/// [direction] Columns along the first `shared` of `directions`, combined from those of `l`, which needs no simulation:
+/// both sets of directions span the same coordinates.
 std::vector<BasisCoefficients> turned(const Fit& l, const Directions& directions, Eigen::Index shared);
 
 }  // namespace flappy::gap

@@ -17,7 +17,7 @@
 namespace flappy::gap {
 
 enum Channel : int {
-  // of vehicles with wings the angular acceleration is less the recorded one: measured rows are 0
+  // of vehicles with wings, rows are relative to the recorded angular acceleration, so measured rows are 0
   kAngularAccelerationX,
   kAngularAccelerationY,
   kAngularAccelerationZ,  ///< rad/s^2, B
@@ -75,7 +75,7 @@ enum class BasisFunction {
   velocity_x,
   velocity_y,
   velocity_z,
-  drag_x,
+  drag_x,  ///< the velocity along x times its amount; y and z likewise
   drag_y,
   drag_z,
   count
@@ -113,7 +113,7 @@ class PredictedFlight {
   virtual bool covers(std::size_t beat, int channel) const = 0;
   /// Whether a coefficient of a channel is compared at all.
   virtual bool has_rows(int channel, int coefficient) const = 0;
-  /// Whether all that no model explains in a channel counts as noise, except its mean over a session: the case for
+  /// Whether the noise of a channel is learnt from its whole residual, less the mean of each session: the case for
   /// moments that an autopilot counteracts.
   virtual bool disturbed(int /*channel*/) const { return false; }
   /// What the sensors measured.

@@ -16,7 +16,8 @@ struct Estimate {
   std::string unit;  ///< for example "kg/m"; "": dimensionless
 };
 
-/// Share that a hypothesis closes of the loss of refitted parameters above that of noise (gap/localise/closure.hpp).
+/// (loss of refitted parameters - loss of a hypothesis) / (loss of refitted parameters - loss of noise)
+/// (gap/localise/closure.hpp).
 struct Closure {
   double value = 0, low = 0, high = 0;
 };
@@ -83,7 +84,7 @@ struct ResidualLocation {
   Regime regime;
   double gap = 0, noise_floor = 0;
   double p_value = 1;       ///< p value of the null hypothesis that the residual is noise alone
-  bool discovered = false;  ///< significant; at most 5 % of the discoveries after a fit are false
+  bool discovered = false;  ///< significant; of the discoveries of a stage (Fitted), at most 5 % should be false
 };
 
 struct UnexplainedTerm {
@@ -134,8 +135,8 @@ struct Validation {
     std::vector<HeldOutError> errors;  ///< [channel with rows]
   };
   std::vector<Rung> ladder;
-  /// What the change by an effect removes from the residual without the effect, and what copies of this change remove
-  /// that are shifted in time: these should remove nothing.
+  /// How much of the residual without the effect the effect's change removes. Controls are copies of this change,
+  /// shifted in time; they should remove nothing.
   struct Control {
     std::string effect, channel;  ///< the channel in which the effect gains most
     double gain = 0;              ///< share of the rms that the effect removes
@@ -176,9 +177,8 @@ struct Diagnosis {
   std::vector<flightlog::DataFault> faults;  ///< if not empty, nothing was diagnosed
   bool complete = true;                      ///< false: stopped before every effect was weighed
   Verdict verdict;
-  /// In a contrast of a beat-averaged vehicle: what changed, whatever the cause, and which flights stand out.
-  std::vector<SeenQuantity> seen;
-  std::vector<OddFlight> odd;
+  std::vector<SeenQuantity> seen;            ///< in a contrast: what changed, whatever the cause
+  std::vector<OddFlight> odd;                ///< in a contrast of a beat-averaged vehicle: which flights stand out
   std::vector<RankedHypothesis> hypotheses;  ///< those with effects, then the others; each by falling probability
   std::vector<Suspect> suspects;             ///< at most three, the most probable first
   /// Terms of the conclusion's remainder; without one, those of the hypothesis unknown, even an improbable one.
@@ -195,7 +195,7 @@ struct Diagnosis {
   std::optional<Closure> closure;                               ///< closure of the most probable fitted hypothesis
   std::vector<std::string> untestable;                          ///< effects that cannot show in these logs
   std::optional<Validation> validation;                         ///< only for a beat-averaged vehicle
-  std::vector<ClosedLoop> closed_loop;
+  std::vector<ClosedLoop> closed_loop;  ///< empty in a contrast, for a beat-averaged vehicle or a stopped diagnosis
   /// None for a beat-averaged vehicle, a stopped diagnosis, no safe manoeuvre, or fewer than two probable hypotheses.
   std::optional<NextExperiment> next;
   /// In a contrast: other sets of reference flights, each against the same reference as `flights`.

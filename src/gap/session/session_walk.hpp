@@ -1,5 +1,5 @@
-// A quantity of one robot from session to session: sessions scatter, and the robot drifts, as wear and warm rooms do, by
-// a random walk. Of sessions at the times t_i,
+// A quantity of one robot from session to session: sessions scatter, and the robot drifts, as wear and warm rooms do,
+// by a random walk. Of sessions at the times t_i,
 //   x_i = m + w(t_i) + e_i    e_i ~ N(0, s^2)    w(t) - w(t') ~ N(0, s^2 r |t - t'|)    m: anything
 // so that x ~ N(m, s^2 R), R = I + r K, K_ij = min(t_i, t_j) from the first time on. Given r, all else is linear [1]:
 //   m^ = 1' R^-1 x / 1' R^-1 1    sum of squares Q = (x - m^)' R^-1 (x - m^), of n - 1 degrees of freedom
@@ -35,17 +35,19 @@ class SessionWalk {
 /// PredictedFlight::session() of each flight.
 std::vector<std::string> session_names(const FlightList& flights);
 
-/// Which session each flight is of, from 0 on: flights that name the same session are one, those without a name are each
-/// their own.
+/// Which session each flight is of, from 0 on: flights that name the same session are one, those without a name are
+/// each their own.
 std::vector<int> session_numbers(const std::vector<std::string>& names);
 
-/// When sessions were, in the mean time between reference sessions.
+/// When sessions were, in units of the mean time from a reference session to the next; in days if all references were
+/// at one time.
 struct SessionTimes {
   Eigen::VectorXd references;
-  double tests = 0;  ///< of the test session
+  double tests = 0;  ///< mean over the test flights
 };
 /// By dates, if the sessions of all flights have names or folders that begin with one: 2024-03-05, or with the time of
-/// day 2024-03-05T14:30. Else by the order in which they are given: the tests come after the references.
+/// day 2024-03-05T14:30. Else by the order in which they are given: the tests come after the references. `references`,
+/// `tests`: [flight] name of its session.
 SessionTimes session_times(const std::vector<std::string>& references, const std::vector<std::string>& tests);
 
 }  // namespace flappy::gap
