@@ -188,10 +188,10 @@ TEST(BeatAveragedStep, EffectsActByTheirMeans) {
   EXPECT_NEAR(after_a_second(v, 9.81, 0).position_m[2], -9.81 / 2, 1e-9);
 }
 
-// A robot that hovers and is pushed takes a weight along, which hung at rest. It is compared with two masses and a stiff spring, which stretches by 3 um,
+// A robot that hovers and is pushed takes a weight along, which hung at rest. It is compared with two masses and a stiff spring, which stretches by some um,
 // integrated in fourth-order steps; the kernel's steps of 1 ms are of first order for the weight.
 TEST(BeatAveragedStep, ASlungLoadSwings) {
-  for (const double speed_m_s : {0.2, 2.5}) {
+  for (const double speed_m_s : {0.2, 1.5}) {
     SCOPED_TRACE(speed_m_s);
     Vehicle v = flapper();
     v.torso.com_m = {};
@@ -200,8 +200,8 @@ TEST(BeatAveragedStep, ASlungLoadSwings) {
     v.effects["slung_load"] = {
         {"mass_kg", mass}, {"length_m", length}, {"moment_x_kg_m", 0}, {"moment_y_kg_m", 0}, {"z_m", 0}};
     using Eight = Eigen::Matrix<double, 8, 1>;  // places and velocities along x and z of robot and weight
+    constexpr double kStiff_N_m = 1e5;
     const auto rate = [&](const Eight& y) {
-      constexpr double kStiff_N_m = 1e5;
       const Eigen::Vector2d d = y.segment<2>(2) - y.head<2>();
       const Eigen::Vector2d pull = kStiff_N_m * (d.norm() - length) * d.normalized();
       Eight r;
@@ -210,7 +210,9 @@ TEST(BeatAveragedStep, ASlungLoadSwings) {
       return r;
     };
     Eight y;
-    y << 0, 0, 0, -length, speed_m_s, 0, 0, 0;
+    // stretched by the tension of the begin, or robot and weight would tremble
+    const double pull_N = mass * (speed_m_s * speed_m_s / length + lift_N / robot) / (1 + mass / robot);
+    y << 0, 0, 0, -length - pull_N / kStiff_N_m, speed_m_s, 0, 0, 0;
     constexpr double kStep_s = 2e-5;
     double steepest = 0;
     for (int i = 0; i < 50'000; ++i) {
@@ -220,9 +222,11 @@ TEST(BeatAveragedStep, ASlungLoadSwings) {
     }
     EXPECT_EQ(steepest > 0.6, speed_m_s > 1) << steepest;
     const FlapperState s = after_a_second(v, gravity, speed_m_s, std::to_string(lift_N));
+    // in the first step the weight still pulls by its rest, with g in place of 1.1 g
+    const double late_m_s = 0.1 * gravity * mass / robot * 1e-3;
     EXPECT_NEAR(s.velocity_m_s[0], y[4], 2e-3 * speed_m_s);
     EXPECT_NEAR(s.position_m[0], y[0], 1e-3 * speed_m_s);
-    EXPECT_NEAR(s.velocity_m_s[2], y[5], 2e-3 * speed_m_s);
+    EXPECT_NEAR(s.velocity_m_s[2], y[5], late_m_s + 1e-3 * speed_m_s);
   }
 }
 
