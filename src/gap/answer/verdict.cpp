@@ -66,7 +66,6 @@ double beyond_chance(const ScoredHypothesis& a, const std::vector<ScoredHypothes
 }
 
 double tempered(double nats, const VerdictRule& rule) {
-  if (std::isinf(rule.tempering.freedom)) return std::exp(-nats / rule.tempering.nats);
   return std::exp(-rule.tempering.freedom / 2 * std::log1p(2 * nats / (rule.tempering.nats * rule.tempering.freedom)));
 }
 

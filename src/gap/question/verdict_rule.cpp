@@ -1,7 +1,6 @@
 #include "gap/question/verdict_rule.hpp"
 
 #include <cmath>
-#include <limits>
 
 #include "io/config.hpp"
 #include "model/effects/registry.hpp"
@@ -48,8 +47,7 @@ VerdictRule rule_of(const io::Config& config) {
   const io::Table interval = root.table("interval");
   r.interval = {interval.number("sd_factor", kPositive), interval.number("magnitude_error", kNats)};
   const io::Table tempering = root.table("tempering");
-  r.tempering = {tempering.number("nats", kPositive),
-                 tempering.number_or("freedom", std::numeric_limits<double>::infinity(), kPositive)};
+  r.tempering = {tempering.number("nats", kPositive), tempering.number("freedom", kPositive)};
   const io::Table naming = root.table("naming");
   r.naming = {naming.number("of_all", kShare), naming.number("of_pool", kShare),
               naming.number("member_of_pool", kShare), naming.number_or("least", 0, kShare)};

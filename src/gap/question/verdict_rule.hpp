@@ -39,7 +39,7 @@ struct VerdictRule {
     double sd_factor, magnitude_error;
   } interval{};
   struct Tempering {
-    double nats, freedom;  ///< infinite: evidence counts in full, but for `nats`
+    double nats, freedom;
   } tempering{};
   struct Naming {
     double of_all, of_pool, member_of_pool;
