@@ -26,6 +26,7 @@ using Json = nlohmann::ordered_json;
 struct FamilyOptions {
   std::string family;     ///< empty: family A with its own options
   std::string reference;  ///< folder for a session without effects that the robot flies before; empty: none
+  std::size_t reference_sessions = 1;  ///< of the flights of `reference`, in turn
   bool calm_reference = false;
   bool hover = false, own_parameters = false, conventions = false;
 };
@@ -47,7 +48,7 @@ Json fly_family(const RobotOptions& o, const FamilyOptions& f) {
     reference->calm = f.calm_reference;
     a.session = 1;
   }
-  const benchmark::FlownRobot robot = benchmark::fly_drawn(family, a, o.seed, {}, reference);
+  const benchmark::FlownRobot robot = benchmark::fly_drawn(family, a, o.seed, {}, reference, f.reference_sessions);
   for (std::size_t draw = 0; draw < robot.lost.size(); ++draw)
     std::printf("draw %zu: %s; the next draw\n", draw, robot.lost[draw].c_str());
   Json folders = Json::array();
@@ -182,6 +183,10 @@ int main(int argc, char** argv) {
       fly.option("--reference", of.reference,
                  "of a family: folder for a session of the same robot without the effects, flown before")
           .needs(family);
+  fly.option("--reference-sessions", of.reference_sessions, "sessions of the flights of --reference, in turn")
+      .range(std::size_t{1}, blind::Family::kFlights)
+      .needs(reference)
+      .shows_default();
   fly.flag("--calm-reference", of.calm_reference, "the reference hovers and follows slow paths").needs(reference);
   fly.flag("--own-parameters", of.own_parameters, "of a family: draw the parameters of each body").needs(family);
   fly.flag("--conventions", of.conventions, "of a family: draw sensors and declarations as laboratories have them")
