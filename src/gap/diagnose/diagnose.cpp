@@ -137,7 +137,7 @@ DiagnosisRequest read_request(const DiagnosisSettings& settings) {
                          (beat_averaged ? "with wings" : "that are beat-averaged") +
                          "; accepted: one that was learnt from vehicles like " + vehicle.name);
   if (contrast && beat_averaged) options.sessions = read_session_prior(file(s.sessions, "session_scatter.toml"));
-  // of a beat-averaged vehicle, only its errors of laws count
+  // a contrast of a beat-averaged vehicle uses only the errors of laws of the session variation
   if (contrast)
     options.discrepancy.session =
         beat_averaged ? read_session_variation() : read_session_variation(file(s.sessions, "session_variation.toml"));
@@ -159,14 +159,15 @@ struct CheckedLogs {
   std::vector<std::string> folders;
   std::vector<flightlog::FlightLog> logs;
   std::vector<flightlog::FlightHeader> headers;
-  std::vector<flightlog::DataFault> faults;  ///< of all flights of the set, if more than half have some
-  std::vector<std::string> left_out;         ///< why each doubtful flight is left out, one line each
+  std::vector<flightlog::DataFault>
+      faults;                         ///< faults of all flights of the set; empty unless more than half have some
+  std::vector<std::string> left_out;  ///< why each doubtful flight is left out, one line each
 };
 
 /// Leaves out flights with faults, as long as half of them remain.
 void leave_out_faulty(CheckedLogs& set, std::vector<std::vector<flightlog::DataFault>> faults) {
   const auto sound = static_cast<std::size_t>(std::ranges::count_if(faults, [](const auto& f) { return f.empty(); }));
-  if (2 * sound < faults.size() || sound == 0) {  // what most flights have is no accident of one
+  if (2 * sound < faults.size() || sound == 0) {  // then the fault is not of one flight
     for (auto& f : faults) std::ranges::move(f, std::back_inserter(set.faults));
     return;
   }

@@ -48,7 +48,7 @@ struct ModelDiscrepancy {
   ScalePrior scale_prior(const std::string& effect) const;
 
   Shares shares{};
-  SessionVariation session;                  ///< only used in a contrast of a vehicle with wings
+  SessionVariation session;                  ///< only used in a contrast
   std::map<std::string, double> background;  ///< background_sd by effect; "other": effects that are not listed
   /// Effects of wings, hinges and drive, which models describe differently: their background follows the robot
   /// (model_freedom).

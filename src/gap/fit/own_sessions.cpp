@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+
+#include "gap/replay/session_names.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -11,15 +12,10 @@ using Eigen::Index;
 
 /// Flights of each session of the references, [session][flight].
 std::vector<std::vector<char>> sessions_of(const Flights& flights) {
-  std::vector<std::vector<char>> sessions;
-  std::map<std::string, std::size_t> known;
-  for (std::size_t f = 0; f < flights.references.size(); ++f) {
-    const std::string name = flights[f]->session();
-    std::size_t at = sessions.size();
-    if (!name.empty()) at = known.try_emplace(name, at).first->second;
-    if (at == sessions.size()) sessions.emplace_back(flights.size(), 0);
-    sessions[at][f] = 1;
-  }
+  const std::vector<int> of = session_numbers(session_names(flights.references));
+  std::vector<std::vector<char>> sessions(static_cast<std::size_t>(std::ranges::max(of)) + 1,
+                                          std::vector<char>(flights.size(), 0));
+  for (std::size_t f = 0; f < of.size(); ++f) sessions[static_cast<std::size_t>(of[f])][f] = 1;
   return sessions;
 }
 

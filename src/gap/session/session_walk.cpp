@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <map>
 
 #include "io/files.hpp"
 
@@ -34,24 +33,6 @@ SessionWalk::SessionWalk(const VectorXd& times, double at, double walk) {
 double SessionWalk::sum_of_squares(const VectorXd& x) const {
   const VectorXd rest = x.array() - mean_.dot(x);
   return rest.dot(inverse_ * rest);
-}
-
-std::vector<std::string> session_names(const FlightList& flights) {
-  std::vector<std::string> names;
-  for (const auto& flight : flights) names.push_back(flight->session());
-  return names;
-}
-
-std::vector<int> session_numbers(const std::vector<std::string>& names) {
-  std::vector<int> of;
-  std::map<std::string, int> named;
-  int next = 0;
-  for (const std::string& name : names) {
-    const auto [at, fresh] = named.try_emplace(name.empty() ? "/" + std::to_string(next) : name, next);
-    next += fresh;
-    of.push_back(at->second);
-  }
-  return of;
 }
 
 namespace {

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "gap/replay/predicted_flight.hpp"
+#include "gap/replay/session_names.hpp"
 
 namespace flappy::gap {
 
@@ -31,13 +31,6 @@ class SessionWalk {
   Eigen::VectorXd mean_, next_;  ///< weights of m^, and of the mean at the time asked about
   double factor_;
 };
-
-/// PredictedFlight::session() of each flight.
-std::vector<std::string> session_names(const FlightList& flights);
-
-/// Which session each flight is of, from 0 on: flights that name the same session are one, those without a name are
-/// each their own.
-std::vector<int> session_numbers(const std::vector<std::string>& names);
 
 /// When sessions were, in units of the mean time from a reference session to the next; in days if all references were
 /// at one time.
