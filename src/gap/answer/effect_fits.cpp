@@ -116,6 +116,22 @@ Baselines weigh_baselines(const Question& question, const RobotFit& robot, const
   return b;
 }
 
+void raise_parameters(const Question& question, const RobotFit& robot, int threads,
+                      std::vector<ScoredHypothesis>& singles, Baselines& baselines) {
+  std::vector<double> gains(singles.size(), 0);
+  io::parallel_for(singles.size(), threads, [&](std::size_t i) {
+    if (singles[i].fitted())
+      gains[i] = question.log_evidence_of_other_laws(robot, Hypothesis(robot.uncertain(), singles[i].effects),
+                                                     singles[i].fit) -
+                 baselines.parameters.explained();
+  });
+  const double gain = gains.empty() ? 0 : std::max(0.0, *std::ranges::max_element(gains));
+  baselines.parameters.log_evidence += gain;
+  for (ScoredHypothesis& a : singles)
+    if (!a.fitted()) a.log_evidence += gain;
+  std::ranges::sort(singles, std::greater{}, &ScoredHypothesis::explained);
+}
+
 ScreenedCatalogue screen_catalogue(const RobotFit& robot, const InferenceOptions& options) {
   ScreenedCatalogue c;
   c.untestable = untestable(robot, options.withheld);

@@ -53,14 +53,16 @@ Inference infer(const Flights& flights, const sim::Randomisation& uncertain, Inf
       return std::move(*d);
   const RobotFit robot = question.fit_robot(flights, uncertain, options, reference);
   const VerdictRule& rule = options.rule = question.rule(robot, options.rule);
-  const Baselines baselines = weigh_baselines(question, robot, rule);
+  Baselines baselines = weigh_baselines(question, robot, rule);
 
   progress(0.3, "screening effects");
   const ScreenedCatalogue catalogue = screen_catalogue(robot, options);
 
   const bool go_on = progress(0.4, "fitting effects");
   const EffectFits fits(question, robot, baselines, options, threads);
-  EffectFits::Sets sets = fits.combine(fits.single_effects(catalogue, go_on), std::ref(progress));
+  std::vector<ScoredHypothesis> singles = fits.single_effects(catalogue, go_on);
+  raise_parameters(question, robot, threads, singles, baselines);
+  EffectFits::Sets sets = fits.combine(std::move(singles), std::ref(progress));
   std::vector<ScoredHypothesis> remainders = fits.with_remainders(sets.hypotheses, sets.scales);
   const Fitter fitter = robot.fitter().with_scales(sets.scales);
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,6 +18,12 @@ struct Background;
 struct Fit;
 class Fitter;
 class RobotFit;
+
+/// The further vehicles of magnitude_steps() for small magnitudes, which backgrounds have.
+struct NearSteps {
+  std::function<double(const std::string& effect)> sd;  ///< prior standard deviation of the background; empty: none
+  bool shapes = false;                                  ///< also the usual step, with one shape parameter moved
+};
 
 /// Prior of the law factor (Fit::law_factor): standard deviation of its logarithm about 0, and its largest value; its
 /// smallest is one over that.
@@ -43,9 +50,8 @@ class FitRules : public EvidenceRules {
   /// leads; `sd`: that of effects_discrepancy_sd.
   virtual Eigen::VectorXd next_effects(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit,
                                        const Eigen::VectorXd& there, const BasisCoefficients& sd) const = 0;
-  /// Priors of background magnitudes, by which magnitude_steps() adds vehicles: each magnitude once more at about two
-  /// standard deviations of its background, and the usual step with one shape parameter moved. Null: neither.
-  virtual const ModelDiscrepancy* near_steps(const ModelDiscrepancy& discrepancy) const = 0;
+  /// Small magnitudes may act otherwise than a large one.
+  virtual NearSteps near_steps(const ModelDiscrepancy& discrepancy) const = 0;
   /// Number of minor draws of the vehicle that are nuisances.
   virtual std::size_t minors(const sim::Randomisation& uncertain) const = 0;
   /// Background magnitudes that are fitted jointly with every hypothesis.

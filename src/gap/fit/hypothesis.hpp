@@ -32,6 +32,8 @@ struct Unknown {
   bool in_log = false;              ///< it changes the log, not the simulation (gap/replay/sensor_correction.hpp)
   /// Whether the prior is half-normal: a magnitude that cannot be negative.
   bool one_sided() const { return magnitude && low >= 0; }
+  /// Magnitudes of effects of sensors act linearly, except delays.
+  bool linear() const { return in_log && name != "delay_s"; }
   double value(double coordinate) const;  ///< within the bounds
   double coordinate(double of_value) const { return (of_value - centre) / scale; }
 };

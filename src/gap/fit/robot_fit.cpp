@@ -35,7 +35,6 @@ constexpr double kWidenings[] = {2, 4, 8, 16, 32, 64};
 /// Factor between law factors that are tried. Choice.
 constexpr double kLawStep = 2;
 
-constexpr const char* kDelay = "delay_s";
 constexpr const char* kDiverges =
     "the vehicle: its simulation of these flights diverges; accepted: a vehicle that flies what was flown";
 
@@ -147,9 +146,11 @@ std::vector<Background> RobotFit::session_changes(const SessionVariation& sessio
     if (const double sd = session.parameter_sd(n.id + "." + n.value); sd > 0)
       list.push_back({kSessionParameters, sd * basis.in_tests(sensor_errors_[i])});
   }
-  for (const MagnitudeColumn& m : magnitudes_)
-    if (const double sd = session.background_sd(m.effect); sd > 0)
-      list.push_back({kSessionOf + m.effect, sd * m.change});
+  for (const MagnitudeColumn& m : magnitudes_) {
+    const double sd = session.background_sd(m.effect) / std::sqrt(static_cast<double>(m.near.size()));
+    for (const BasisCoefficients& near : m.near)
+      if (sd > 0) list.push_back({kSessionOf + m.effect, sd * near});
+  }
   return list;
 }
 
@@ -437,13 +438,12 @@ void RobotFit::find_magnitudes() {
   find_linear_magnitudes();
 }
 
-/// Magnitudes of effects of sensors act linearly, except delays.
 void RobotFit::find_linear_magnitudes() {
   Fitter::LinearMagnitudes linear;
   for (const MagnitudeColumn& m : magnitudes_) {
     const Hypothesis h(uncertain_, {m.effect});
     const Unknown& u = h.unknowns()[static_cast<std::size_t>(h.shared() + m.unknown)];
-    if (u.in_log && u.name != kDelay) linear[{u.effect, u.name}] = m.change;
+    if (u.linear()) linear[{u.effect, u.name}] = m.change;
   }
   fitter_ = fitter_.with_linear_magnitudes(std::move(linear));
 }

@@ -139,16 +139,14 @@ constexpr double kMinNearReach = 0.05;
 }  // namespace
 
 std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, const VectorXd& at,
-                                           const std::vector<std::string>& withheld,
-                                           const ModelDiscrepancy* background) {
+                                           const std::vector<std::string>& withheld, const NearSteps& near) {
   std::vector<MagnitudeStep> steps;
   const model::Vehicle now = Hypothesis(uncertain, {}).vehicle(at).vehicle;
   for (const model::CatalogueEffect& e : model::catalogue_of(uncertain.nominal())) {
     const std::string id = e.info.id;
     if (std::ranges::count(withheld, id)) continue;
     const Hypothesis h(uncertain, {id});
-    const double sd = background ? std::max(background->background_sd(id), background->background_sd(id + kOfBoth)) : 0,
-                 reach = std::clamp(kNearSd * sd, kMinNearReach, kMagnitudeReach);
+    const double reach = std::clamp(near.sd ? kNearSd * near.sd(id) : 0, kMinNearReach, kMagnitudeReach);
     const Index first = at.size();
     VectorXd here = h.start(now);
     here.head(first) = at;
@@ -161,8 +159,7 @@ std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, 
       steps.push_back({{id, i - first, h.size() - first, one_sided, here[i]}, h.vehicle(there), {}, {}, reach, {}});
       for (const double sign : {1.0, -1.0}) {
         there[i] = here[i] + sign * reach;
-        // effects of sensors are linear, so they need no near steps
-        if (background && !u.in_log && (sign > 0 || !one_sided))
+        if (near.sd && !u.linear() && (sign > 0 || !one_sided))
           steps.back().near.push_back(h.vehicle(h.bounded(there)));
       }
       for (std::size_t n = 2; n <= kMaxSteps && one_sided; ++n) {
@@ -171,7 +168,7 @@ std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, 
         steps.back().further.push_back(h.vehicle(there));
       }
       there[i] = here[i] + kMagnitudeReach;
-      for (Index shape = first; background && shape < h.size(); ++shape) {
+      for (Index shape = first; near.shapes && shape < h.size(); ++shape) {
         if (h.unknowns()[static_cast<std::size_t>(shape)].magnitude) continue;
         VectorXd other = there;
         other[shape] = 1;

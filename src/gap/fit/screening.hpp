@@ -20,7 +20,7 @@ struct MagnitudeStep : Magnitude {
   std::vector<VehicleHypothesis> shaped;   ///< the same, each with one shape parameter a standard deviation up
   std::vector<VehicleHypothesis> further;  ///< two to kMaxSteps steps away; only if one_sided
   double near_reach;                       ///< two standard deviations of the background, from 0.05 to kMagnitudeReach
-  std::vector<VehicleHypothesis> near;     ///< near_reach away: above and, unless one_sided, below; none if in_log
+  std::vector<VehicleHypothesis> near;     ///< near_reach away: above and, unless one_sided, below; none if linear
 };
 /// Number of steps along a magnitude that cannot be negative. Choice.
 inline constexpr std::size_t kMaxSteps = 5;
@@ -30,11 +30,9 @@ inline constexpr double kMagnitudeReach = 0.4;
 inline constexpr double kNoChange = 1e-9;
 
 /// Steps for each effect but `withheld`, with shape parameters in mid-prior. `at`: [coordinate] parameters of the
-/// robot, [0, shared()). `background`: priors that set near_reach (FitRules::near_steps); null: no near and no shaped
-/// steps.
+/// robot, [0, shared()).
 std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, const Eigen::VectorXd& at,
-                                           const std::vector<std::string>& withheld,
-                                           const ModelDiscrepancy* background = nullptr);
+                                           const std::vector<std::string>& withheld, const NearSteps& near = {});
 
 /// How a magnitude changes the prediction, per unit of its coordinate; [group][basis] each. RobotFit makes it of a
 /// MagnitudeStep.

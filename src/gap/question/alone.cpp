@@ -176,6 +176,13 @@ VectorXd Alone::next_effects(const Fitter& /*fitter*/, const Hypothesis& /*hypot
   return there;
 }
 
+NearSteps Alone::near_steps(const ModelDiscrepancy& discrepancy) const {
+  return {[&discrepancy](const std::string& effect) {
+            return std::max(discrepancy.background_sd(effect), discrepancy.background_sd(effect + kOfBoth));
+          },
+          true};
+}
+
 std::size_t Alone::minors(const sim::Randomisation& uncertain) const { return uncertain.draws() - uncertain.majors(); }
 
 std::vector<Background> Alone::backgrounds(const RobotFit& robot, const ModelDiscrepancy& discrepancy) const {

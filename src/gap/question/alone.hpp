@@ -32,7 +32,7 @@ class Alone : public Question {
                                            const Fit& fit) const override;
   Eigen::VectorXd next_effects(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit,
                                const Eigen::VectorXd& there, const BasisCoefficients& sd) const override;
-  const ModelDiscrepancy* near_steps(const ModelDiscrepancy& discrepancy) const override { return &discrepancy; }
+  NearSteps near_steps(const ModelDiscrepancy& discrepancy) const override;
   /// All of them.
   std::size_t minors(const sim::Randomisation& uncertain) const override;
   /// RobotFit::background of all effects, with shapes.

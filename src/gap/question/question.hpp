@@ -7,6 +7,7 @@
 // the robot's own sessions (by_sessions()).
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,6 +31,13 @@ class Question : public FitRules {
   virtual VerdictRule rule(const RobotFit& robot, VerdictRule given) const = 0;
   /// Log evidence of the hypothesis none, without its prior.
   virtual double log_evidence_of_none(const RobotFit& robot) const = 0;
+  /// Log evidence that nothing appeared, but that what changes harmlessly follows other laws, which deviate from the
+  /// catalogue's as the law of this one effect does from it, as fitted; without its prior. Minus infinity: not of this
+  /// question.
+  virtual double log_evidence_of_other_laws(const RobotFit& /*robot*/, const Hypothesis& /*hypothesis*/,
+                                            const Fit& /*fit*/) const {
+    return -std::numeric_limits<double>::infinity();
+  }
   /// Fits a set of effects from `start` on, [coordinate]. `parameters`: their own fit, without effects.
   virtual Fit fit_set(const Fitter& fitter, const Hypothesis& hypothesis, const Eigen::VectorXd& start,
                       const Fit& parameters) const = 0;

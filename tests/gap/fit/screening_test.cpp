@@ -10,9 +10,10 @@ namespace {
 TEST(Screening, StepsAsFarAsVehiclesWithoutTheEffectGo) {
   ModelDiscrepancy discrepancy = read_model_discrepancy();
   discrepancy.background = {{"other", 0.001}, {"spring_hardening", 0.06}, {"ground_effect", 1}};
+  const NearSteps near_steps{[&](const std::string& effect) { return discrepancy.background_sd(effect); }, true};
   const sim::Randomisation priors = synthetic_priors();
   const Eigen::VectorXd at = Hypothesis(priors, {}).start();
-  for (const MagnitudeStep& s : magnitude_steps(priors, at, {"wind"}, &discrepancy)) {
+  for (const MagnitudeStep& s : magnitude_steps(priors, at, {"wind"}, near_steps)) {
     const auto near = [&](std::size_t i, const char* name) {
       return s.near.at(i).vehicle.effects.at(s.effect).at(name);
     };
