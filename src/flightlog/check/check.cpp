@@ -131,6 +131,7 @@ CheckReport check_flight(const FlightLog& log) {
                 report.findings);
   check_latencies(h, report.findings);
   check_space(log, report.findings);
+  check_range(log, report.findings);
   if (!h.inputs.empty()) {
     if (h.mocap.source == PoseSource::motion_capture) check_motion(log, report.findings);
     else check_estimate(h.mocap.source, report.findings);

@@ -196,11 +196,14 @@ void check_power(const FlightLog& log, Findings& findings) {
   const std::string seen = format("%.3g V in the middle, %.3g V nominal", battery, h.battery_nominal_V);
   // A lithium cell of nominally 3.7 V holds 3.0 to 4.2 V.
   const bool near = battery > 0.75 * h.battery_nominal_V && battery < 1.25 * h.battery_nominal_V;
-  findings.push_back({"battery",
-                      near ? Verdict::ok : Verdict::warning,
-                      near ? seen : seen + ", within 25 % expected: another number of cells, or another unit",
-                      {{"battery_V", battery}},
-                      near ? LogPlace{} : LogPlace{kPower}});
+  const std::optional<Finding> frozen = near ? frozen_battery(p) : std::nullopt;
+  if (frozen) findings.push_back(*frozen);
+  else
+    findings.push_back({"battery",
+                        near ? Verdict::ok : Verdict::warning,
+                        near ? seen : seen + ", within 25 % expected: another number of cells, or another unit",
+                        {{"battery_V", battery}},
+                        near ? LogPlace{} : LogPlace{kPower}});
 
   if (!h.currents || !log.header.inputs.empty()) return;  // the power of a motor needs its voltage
   const Column* const currents[] = {&p.left_current_A, &p.right_current_A};

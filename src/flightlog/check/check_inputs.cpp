@@ -122,6 +122,11 @@ void check_inputs_apart(const FlightLog& log, Findings& findings) {
       continue;
     }
     const Levels levels = levels_of(values);
+    if (has_level(levels.all))
+      if (std::optional<Finding> dropped = dropped_readings(check_of(name), values)) {
+        findings.push_back(*std::move(dropped));
+        continue;
+      }
     const std::string odd = change_of_scale(levels);
     const std::vector<std::pair<std::string, double>> figures = {{"middle", levels.all.middle},
                                                                  {"spread", levels.all.spread}};

@@ -34,6 +34,13 @@ void check_space(const FlightLog& log, Findings& findings);
 void check_beat(const FlightLog& log, Findings& findings);
 /// Compares the voltages with the declared frequency and with the logged inputs and phase of the beat.
 void check_command(const FlightLog& log, Findings& findings);
+/// Finds axes of the IMU that are clipped at its range.
+void check_range(const FlightLog& log, Findings& findings);
+/// Single samples of a column, such as the speed of a rotor, that drop to 0 or half of those around; none: fewer than
+/// three. `check`: name of the finding.
+std::optional<Finding> dropped_readings(const std::string& check, const Column& values);
+/// A voltage that no longer changes, or never did; none: it changes.
+std::optional<Finding> frozen_battery(const PowerStream& power);
 /// Checks that each declared input keeps its meaning over the flight; adds one finding for each, "input NAME".
 void check_inputs_apart(const FlightLog& log, Findings& findings);
 /// Compares the levels of each input between flights; changes the findings of check_inputs_apart().

@@ -105,6 +105,21 @@ TEST(CheckInputs, FindAScaleThatChangesInAFlight) {
   EXPECT_EQ(data_faults(logs[0], report, "a").size(), 1u);
 }
 
+TEST(CheckInputs, FindACounterThatMissesPulses) {
+  FlightLog log = inputs_log();
+  Column& motor = log.command.declared[0];
+  for (std::size_t i = 20; i < 26; i += 2) motor[i] *= 0.5;
+  EXPECT_EQ(of_input(check_flight(log), "motor").text.substr(0, 60),
+            "drops for one sample to 0 (0 times) or half (3 times): a cou");
+  EXPECT_TRUE(data_faults(log, "a").empty());
+  for (std::size_t i = 30; i + 20 < motor.size(); i += 30) motor[i] = 0;
+  EXPECT_EQ(data_faults(log, "a").size(), 1u) << "one in thirty";
+  // a command that goes to 0 and stays there does not drop for one sample
+  log = inputs_log();
+  for (std::size_t i = 100; i < 105; ++i) log.command.declared[0][i] = 0;
+  EXPECT_EQ(of_input(check_flight(log), "motor").verdict, Verdict::ok);
+}
+
 TEST(CheckInputs, FindADeadColumn) {
   std::vector<FlightLog> logs = flights(3);
   for (double& v : logs[1].command.declared[1]) v = 0.25;

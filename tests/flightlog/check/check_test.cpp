@@ -4,6 +4,7 @@
 
 #include <functional>
 
+#include "flightlog/check/data_faults.hpp"
 #include "flightlog/check/motion.hpp"
 #include "flightlog/check/synthetic_log.hpp"
 #include "flightlog/rotation.hpp"
@@ -85,7 +86,7 @@ TEST(Check, FindsNothingInGoodLogs) {
     EXPECT_EQ(report.count(flightlog::Verdict::warning), 0u) << describe(report);
     EXPECT_EQ(report.count(flightlog::Verdict::not_tested), 0u) << describe(report);
     EXPECT_EQ(report.streams.size(), 5u);
-    EXPECT_EQ(report.findings.size(), 30u);
+    EXPECT_EQ(report.findings.size(), 31u);
   }
 }
 
@@ -371,6 +372,43 @@ TEST(Check, TakesWhatRocksForNoOtherBeat) {
   const auto f = std::ranges::find(report.findings, "flapping frequency", &Finding::check);
   ASSERT_NE(f, report.findings.end());
   EXPECT_EQ(f->verdict, Verdict::ok) << f->text;
+}
+
+TEST(Check, NamesAxesThatAreClipped) {
+  const auto clip = [](FlightLog& log, double share) {
+    Column& z = log.imu.accel_z_m_s2;
+    Column sorted = z;
+    std::ranges::sort(sorted);
+    const double range = sorted[static_cast<std::size_t>((1 - share) * static_cast<double>(z.size() - 1))];
+    for (double& v : z) v = std::min(v, range);
+  };
+  EXPECT_TRUE(warns([&](FlightLog& log) { clip(log, 0.004); }, {"imu range: of accel_z_m_s2"}));
+  FlightLog log = synthetic_log();
+  clip(log, 0.004);
+  EXPECT_TRUE(data_faults(log, "flight").empty()) << "a few samples forbid nothing";
+  clip(log, 0.03);
+  const std::vector<DataFault> faults = data_faults(log, "flight");
+  ASSERT_EQ(faults.size(), 1u);
+  EXPECT_EQ(faults[0].file, "flight/imu.csv");
+  // readings of few digits repeat their largest value, too, but no more than those next to it
+  EXPECT_TRUE(warns(
+      [](FlightLog& rounded) {
+        for (Column* c : accel(rounded))
+          for (double& v : *c) v = 0.5 * std::round(2 * v);
+      },
+      {}));
+}
+
+TEST(Check, NamesABatteryThatFreezes) {
+  const auto freeze = [](FlightLog& log, double from) {
+    Column& v = log.power->battery_V;
+    for (std::size_t i = static_cast<std::size_t>(from * static_cast<double>(v.size())); i < v.size(); ++i)
+      v[i] = v[i - 1];
+  };
+  EXPECT_TRUE(warns([&](FlightLog& log) { freeze(log, 0.5); }, {"battery: frozen"}));
+  EXPECT_TRUE(warns([](FlightLog& log) { std::ranges::fill(log.power->battery_V, 7.4); },
+                    {"battery: all the time: not measured"}));
+  EXPECT_TRUE(warns([&](FlightLog& log) { freeze(log, 0.9); }, {})) << "2 s may be chance";
 }
 
 TEST(Check, NamesFaultsOfPowerAndWings) {
