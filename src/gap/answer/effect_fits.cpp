@@ -116,17 +116,25 @@ Baselines weigh_baselines(const Question& question, const RobotFit& robot, const
   return b;
 }
 
-void raise_parameters(const Question& question, const RobotFit& robot, int threads,
-                      std::vector<ScoredHypothesis>& singles, Baselines& baselines) {
-  std::vector<double> gains(singles.size(), 0);
+void raise_baselines(const Question& question, const RobotFit& robot, const VerdictRule& rule, int threads,
+                     std::vector<ScoredHypothesis>& singles, Baselines& baselines) {
+  std::vector<OtherLaws> of_laws(singles.size());
   io::parallel_for(singles.size(), threads, [&](std::size_t i) {
     if (singles[i].fitted())
-      gains[i] = question.log_evidence_of_other_laws(robot, Hypothesis(robot.uncertain(), singles[i].effects),
-                                                     singles[i].fit) -
-                 baselines.parameters.explained();
+      of_laws[i] = question.other_laws(robot, Hypothesis(robot.uncertain(), singles[i].effects), singles[i].fit);
   });
-  const double gain = gains.empty() ? 0 : std::max(0.0, *std::ranges::max_element(gains));
-  baselines.parameters.log_evidence += gain;
+  OtherLaws most;
+  for (const OtherLaws& laws : of_laws) {
+    most.log_evidence = std::max(most.log_evidence, laws.log_evidence);
+    most.log_evidence_of_harmless = std::max(most.log_evidence_of_harmless, laws.log_evidence_of_harmless);
+  }
+  const auto raise = [](ScoredHypothesis& a, double explained) {
+    const double gain = std::max(0.0, explained - a.explained());
+    a.log_evidence += gain;
+    return gain;
+  };
+  raise(baselines.unknown, most.log_evidence - rule.unknown.penalty_nats);
+  const double gain = raise(baselines.parameters, most.log_evidence_of_harmless);
   for (ScoredHypothesis& a : singles)
     if (!a.fitted()) a.log_evidence += gain;
   std::ranges::sort(singles, std::greater{}, &ScoredHypothesis::explained);

@@ -13,10 +13,11 @@ struct Baselines {
 };
 Baselines weigh_baselines(const Question& question, const RobotFit& robot, const VerdictRule& rule);
 
-/// Raises the parameters, and with them effects that are fitted only linearly, to what other laws of harmless changes
-/// explain (Question::log_evidence_of_other_laws). `singles`: each effect alone.
-void raise_parameters(const Question& question, const RobotFit& robot, int threads,
-                      std::vector<ScoredHypothesis>& singles, Baselines& baselines);
+/// Raises what has no effect to what deviations from all laws explain (Question::other_laws): the parameters, and with
+/// them effects that are fitted only linearly, by those of harmless changes; an unknown cause, which pays its penalty, by
+/// any. `singles`: each effect alone.
+void raise_baselines(const Question& question, const RobotFit& robot, const VerdictRule& rule, int threads,
+                     std::vector<ScoredHypothesis>& singles, Baselines& baselines);
 
 /// Effects of the catalogue by falling screened gain: the first options.max_finalists, and the others.
 struct ScreenedCatalogue {

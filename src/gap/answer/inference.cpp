@@ -61,7 +61,7 @@ Inference infer(const Flights& flights, const sim::Randomisation& uncertain, Inf
   const bool go_on = progress(0.4, "fitting effects");
   const EffectFits fits(question, robot, baselines, options, threads);
   std::vector<ScoredHypothesis> singles = fits.single_effects(catalogue, go_on);
-  raise_parameters(question, robot, threads, singles, baselines);
+  raise_baselines(question, robot, rule, threads, singles, baselines);
   EffectFits::Sets sets = fits.combine(std::move(singles), std::ref(progress));
   std::vector<ScoredHypothesis> remainders = fits.with_remainders(sets.hypotheses, sets.scales);
   const Fitter fitter = robot.fitter().with_scales(sets.scales);

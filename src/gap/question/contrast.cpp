@@ -253,42 +253,39 @@ double Contrast::log_evidence_of_none(const RobotFit& robot) const {
 namespace {
 
 /// Nats that deviations of t times those of a harmless change of standard magnitude cost (contrast.hpp).
-double cost_of_other_law(double t, const ScalePrior& magnitude, const SessionVariation& session) {
+double cost_of_other_law(double t, const SessionVariation& session) {
   // Step of the grid of log f. Choice.
   constexpr double kGrid = 0.1;
   double least = std::numeric_limits<double>::infinity();
-  for (double log_f = 0; log_f <= std::log(session.law_most); log_f += kGrid) {
-    const double z = t / std::exp(log_f);
-    least = std::min(least, 0.5 * std::pow(log_f / session.law_spread, 2) +
-                                (magnitude.freedom + 1) / 2 * std::log1p(z * z / magnitude.freedom));
-  }
+  for (double log_f = 0; log_f <= std::log(session.law_most); log_f += kGrid)
+    least = std::min(least, 0.5 * std::pow(log_f / session.law_spread, 2) + 0.5 * std::pow(t / std::exp(log_f), 2));
   return least;
 }
 
 }  // namespace
 
-double Contrast::log_evidence_of_other_laws(const RobotFit& robot, const Hypothesis& hypothesis, const Fit& fit) const {
+OtherLaws Contrast::other_laws(const RobotFit& robot, const Hypothesis& hypothesis, const Fit& fit) const {
   // Factors F that are tried, from the largest on. Choice: deviations of what sessions differ by are smaller than those
   // of an effect.
   constexpr double kFactors[] = {4, 2, 1, 0.5, 0.25, 0.125, 0.0625};
   const SessionVariation& session = robot.evidence().discrepancy().session;
   const std::string& effect = hypothesis.effects().front();
-  const ScalePrior magnitude = session.of_magnitude(kSessionOf + effect);
-  const double s = magnitude.centre * session.background_sd(effect);
+  const double s = session.of_magnitude(kSessionOf + effect).centre * session.background_sd(effect);
   double m2 = 0;
   for (Index i = hypothesis.shared(); i < hypothesis.size(); ++i)
     if (hypothesis.unknowns()[static_cast<std::size_t>(i)].magnitude) m2 += fit.at[i] * fit.at[i];
-  double best = -std::numeric_limits<double>::infinity();
-  if (!(s > 0)) return best;
+  OtherLaws best;
   const Regressors regressors = robot.fitter().unscaled_regressors(robot.parameters());
   for (const double factor : kFactors) {
     const double value = robot.evidence()
                              .weigh(robot.parameters().statistics, regressors, robot.fitter().all_flights(),
                                     robot.fitter().law_sd(hypothesis, fit, factor), robot.fitter().scales())
-                             .posterior.log_evidence -
-                         cost_of_other_law(factor * std::sqrt(m2) / s, magnitude, session);
-    if (value < best) break;
-    best = value;
+                             .posterior.log_evidence;
+    const double harmless =
+        s > 0 ? value - cost_of_other_law(factor * std::sqrt(m2) / s, session) : best.log_evidence_of_harmless;
+    if (value < best.log_evidence && harmless < best.log_evidence_of_harmless) break;
+    best.log_evidence = std::max(best.log_evidence, value);
+    best.log_evidence_of_harmless = std::max(best.log_evidence_of_harmless, harmless);
   }
   return best;
 }

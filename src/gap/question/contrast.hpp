@@ -61,12 +61,12 @@ class Contrast : public Question {
   VerdictRule rule(const RobotFit& robot, VerdictRule given) const override;
   /// Nothing at all changed since the references.
   double log_evidence_of_none(const RobotFit& robot) const override;
-  /// Harmless changes of magnitudes follow other laws than the catalogue's, too. Their deviations explain much of any
-  /// change: those of a fitted effect, without its magnitudes m, times a factor F. They are t = F |m| / s times those of
-  /// a harmless change of standard magnitude s. That a harmless change has such deviations, with a law factor f of its
-  /// own, at most LawPrior::most, and the degrees of freedom nu of its magnitude, costs, for the f that costs least,
-  ///   1/2 (log f / spread)^2 + (nu + 1) / 2 log(1 + t^2 / (f^2 nu))    nats
-  double log_evidence_of_other_laws(const RobotFit& robot, const Hypothesis& hypothesis, const Fit& fit) const override;
+  /// Changes follow other laws than the catalogue's. Their deviations, as those of a fitted effect without its magnitudes
+  /// m, times a factor F, explain much of any change. They are t = F |m| / s times those of a harmless change of standard
+  /// magnitude s. That a harmless change has them, with a law factor f of its own, at most LawPrior::most, costs, for the
+  /// f that costs least,
+  ///   1/2 (log f / spread)^2 + 1/2 (t / f)^2    nats
+  OtherLaws other_laws(const RobotFit& robot, const Hypothesis& hypothesis, const Fit& fit) const override;
   Fit fit_set(const Fitter& fitter, const Hypothesis& hypothesis, const Eigen::VectorXd& start,
               const Fit& parameters) const override;
   /// None: the parameters stay those of the references.

@@ -22,6 +22,13 @@ namespace flappy::gap {
 /// Number of further effects that are tried at a time, of a vehicle with wings. Choice.
 inline constexpr std::size_t kMaxFurther = 2;
 
+/// Log evidence of deviations from all laws, without an effect and its prior; minus infinity: not of this question.
+struct OtherLaws {
+  double log_evidence = -std::numeric_limits<double>::infinity();  ///< of anything that has them
+  /// Of a harmless change that follows another law, with what it costs that it is as large.
+  double log_evidence_of_harmless = -std::numeric_limits<double>::infinity();
+};
+
 class Question : public FitRules {
  public:
   /// The parameters, fitted to the flights; in a contrast, linearised around those of `reference`, else not used.
@@ -31,12 +38,9 @@ class Question : public FitRules {
   virtual VerdictRule rule(const RobotFit& robot, VerdictRule given) const = 0;
   /// Log evidence of the hypothesis none, without its prior.
   virtual double log_evidence_of_none(const RobotFit& robot) const = 0;
-  /// Log evidence that nothing appeared, but that what changes harmlessly follows other laws, which deviate from the
-  /// catalogue's as the law of this one effect does from it, as fitted; without its prior. Minus infinity: not of this
-  /// question.
-  virtual double log_evidence_of_other_laws(const RobotFit& /*robot*/, const Hypothesis& /*hypothesis*/,
-                                            const Fit& /*fit*/) const {
-    return -std::numeric_limits<double>::infinity();
+  /// What deviations explain that are proportional to those of the law of this one effect, as fitted.
+  virtual OtherLaws other_laws(const RobotFit& /*robot*/, const Hypothesis& /*hypothesis*/, const Fit& /*fit*/) const {
+    return {};
   }
   /// Fits a set of effects from `start` on, [coordinate]. `parameters`: their own fit, without effects.
   virtual Fit fit_set(const Fitter& fitter, const Hypothesis& hypothesis, const Eigen::VectorXd& start,

@@ -218,7 +218,7 @@ TEST(Contrast, NamesNoEffectForWhatOnlyItsLawExplains) {
   const Scales& scales = robot.fitter().scales();
   const double parameters = robot.weigh(robot.no_effects(), robot.parameters(), scales).posterior.log_evidence,
                all = robot.weigh(wind, fit, scales).posterior.log_evidence - parameters,
-               laws = question_of(flights).log_evidence_of_other_laws(robot, wind, fit) - parameters;
+               laws = question_of(flights).other_laws(robot, wind, fit).log_evidence - parameters;
   EXPECT_GT(all, 5);
   EXPECT_GT(laws, 0.5 * all);
 }
