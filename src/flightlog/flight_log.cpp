@@ -70,6 +70,15 @@ const std::vector<Field<WingsStream>> kWingsFields = {{"t_s", &WingsStream::t_s,
                                                       {"right_stroke_rad", &WingsStream::right_stroke_rad, 1e3},
                                                       {"right_rotation_rad", &WingsStream::right_rotation_rad, 1e3}};
 
+constexpr double kMax_N = 1e4, kMax_Nm = 1e4;
+const std::vector<Field<ForcesStream>> kForcesFields = {{"t_s", &ForcesStream::t_s, kLatest},
+                                                        {"force_x_N", &ForcesStream::force_x_N, kMax_N},
+                                                        {"force_y_N", &ForcesStream::force_y_N, kMax_N},
+                                                        {"force_z_N", &ForcesStream::force_z_N, kMax_N},
+                                                        {"moment_x_Nm", &ForcesStream::moment_x_Nm, kMax_Nm},
+                                                        {"moment_y_Nm", &ForcesStream::moment_y_Nm, kMax_Nm},
+                                                        {"moment_z_Nm", &ForcesStream::moment_z_Nm, kMax_Nm}};
+
 template <class Stream>
 std::optional<double> limit_in(const std::vector<Field<Stream>>& fields, const std::string& column) {
   const auto found = std::ranges::find(fields, column, &Field<Stream>::name);
@@ -147,7 +156,7 @@ FlownHeader parse_flown(const io::Table& flown) {
 FlightHeader parse_header(const io::Table& root) {
   root.schema(1);
   root.accept({"schema", "vehicle", "vehicle_sha256", "session", "flapping_Hz", "gravity_m_s2", "ambient", "command",
-               "mocap", "imu", "power", "wings", "attitude", "policy", "changes", "flown"});
+               "mocap", "imu", "power", "wings", "attitude", "policy", "changes", "flown", "rig"});
   FlightHeader h;
   h.vehicle = read_vehicle_name(root);
   h.session = root.string_or("session", "");
@@ -162,12 +171,21 @@ FlightHeader parse_header(const io::Table& root) {
   h.ambient = read_ambient(root.table("ambient"));
 
   const io::Range rate = positive(1e6), latency = non_negative(10);
-  const io::Table mocap = root.table("mocap");
-  h.mocap = {mocap.number("rate_hz", rate), mocap.number("latency_s", latency),
-             mocap.number("position_noise_m", non_negative(1)), mocap.number("attitude_noise_rad", non_negative(1))};
   const bool declared = !h.inputs.empty();
-  h.mocap.source = read_pose_source(mocap, declared);
-  if (!declared || root.has("imu")) h.imu = parse_imu_header(root.table("imu"), declared);
+  if (const auto rig = root.optional_table("rig")) {
+    for (const char* other : {"mocap", "imu", "attitude", "policy", "flown"})
+      if (root.has(other))
+        root.fail(other, "is of a robot that flies", "[rig] without it, or [" + std::string(other) + "] without [rig]");
+    if (declared) root.table("command").fail("inputs", "is given of a clamped robot", "the voltages of its motors");
+    h.rig = read_rig(*rig);
+    h.rig->rate_hz = rig->number("rate_hz", rate);
+  } else {
+    const io::Table mocap = root.table("mocap");
+    h.mocap = {mocap.number("rate_hz", rate), mocap.number("latency_s", latency),
+               mocap.number("position_noise_m", non_negative(1)), mocap.number("attitude_noise_rad", non_negative(1))};
+    h.mocap.source = read_pose_source(mocap, declared);
+    if (!declared || root.has("imu")) h.imu = parse_imu_header(root.table("imu"), declared);
+  }
   if (const auto power = root.optional_table("power")) h.power = parse_power_header(*power, declared);
   if (const auto wings = root.optional_table("wings"))
     h.wings = {wings->number("rate_hz", rate), wings->number("noise_rad", non_negative(1))};
@@ -224,11 +242,23 @@ std::string header_text(const FlightHeader& h) {
     line("inputs", "[" + list + "]");
   }
 
-  text += "\n[mocap]\n";
-  number("rate_hz", h.mocap.rate_hz);
-  number("latency_s", h.mocap.latency_s);
-  number("position_noise_m", h.mocap.position_noise_m);
-  number("attitude_noise_rad", h.mocap.attitude_noise_rad);
+  if (h.rig) {
+    text += "\n[rig]\n";
+    line("support", io::toml_string("clamped"));
+    number("rate_hz", h.rig->rate_hz);
+    number("latency_s", h.rig->latency_s);
+    line("position_m", array(h.rig->position_m));
+    line("attitude", array(h.rig->attitude));
+    number("force_noise_N", h.rig->force_noise_N);
+    number("moment_noise_Nm", h.rig->moment_noise_Nm);
+    if (h.rig->resonance_hz > 0) number("resonance_hz", h.rig->resonance_hz);
+  } else {
+    text += "\n[mocap]\n";
+    number("rate_hz", h.mocap.rate_hz);
+    number("latency_s", h.mocap.latency_s);
+    number("position_noise_m", h.mocap.position_noise_m);
+    number("attitude_noise_rad", h.mocap.attitude_noise_rad);
+  }
   if (h.mocap.source != PoseSource::motion_capture)
     line("source", io::toml_string(kPoseSources[static_cast<std::size_t>(h.mocap.source)]));
 
@@ -460,7 +490,9 @@ std::string command_text(const CommandStream& command, const std::vector<std::st
 // ---- the whole
 
 void require_overlap(const FlightLog& log, const fs::path& folder) {
-  std::vector<std::pair<std::string, const Column*>> streams = {{kCommand, &log.command.t_s}, {kMocap, &log.mocap.t_s}};
+  std::vector<std::pair<std::string, const Column*>> streams = {{kCommand, &log.command.t_s}};
+  if (log.forces) streams.emplace_back(kForces, &log.forces->t_s);
+  else streams.emplace_back(kMocap, &log.mocap.t_s);
   if (!log.imu.t_s.empty()) streams.emplace_back(kImu, &log.imu.t_s);
   if (log.power) streams.emplace_back(kPower, &log.power->t_s);
   if (log.wings) streams.emplace_back(kWings, &log.wings->t_s);
@@ -477,7 +509,9 @@ void require_overlap(const FlightLog& log, const fs::path& folder) {
 const std::string& text_of(const LogFiles& files, const std::string& name, const fs::path& folder) {
   const auto found = files.find(name);
   if (found == files.end())
-    refuse((folder / name).string(), "is missing", "a folder with flight.toml, command.csv, mocap.csv and imu.csv");
+    refuse((folder / name).string(), "is missing",
+           name == kForces ? "a folder with flight.toml, command.csv and forces.csv, as [rig] says"
+                           : "a folder with flight.toml, command.csv, mocap.csv and imu.csv");
   return found->second;
 }
 
@@ -526,7 +560,7 @@ double column_limit(const std::string& column) {
   for (const std::optional<double> limit :
        {limit_in(kCommandFields, column), limit_in(kInputFields, column), limit_in(kMocapFields, column),
         limit_in(kImuFields, column), limit_in(kPowerFields, column), limit_in(kAttitudeFields, column),
-        limit_in(kWingsFields, column)})
+        limit_in(kWingsFields, column), limit_in(kForcesFields, column)})
     if (limit) return *limit;
   return kInputLimit;
 }
@@ -617,6 +651,27 @@ bool read_currents(const io::Table& power, bool declared_inputs) {
   return has_part(power, "currents", declared_inputs);
 }
 
+RigHeader read_rig(const io::Table& rig) {
+  rig.choice_or("support", "clamped", {"clamped"});
+  RigHeader h;
+  h.latency_s = rig.number("latency_s", non_negative(10));
+  std::ranges::copy(rig.numbers("position_m", 3, {-1, 1}), h.position_m.begin());
+  std::ranges::copy(rig.numbers("attitude", 4, {-1, 1}), h.attitude.begin());
+  auto& [w, x, y, z] = h.attitude;
+  const double length = std::sqrt(w * w + x * x + y * y + z * z);
+  if (std::abs(length - 1) > kUnitTolerance)
+    rig.fail("attitude", "has length " + shortest_digits(length), "a quaternion w, x, y, z of length 1");
+  normalise(length, {&w, &x, &y, &z});
+  h.force_noise_N = rig.number("force_noise_N", non_negative(100));
+  h.moment_noise_Nm = rig.number("moment_noise_Nm", non_negative(100));
+  if (rig.has("resonance_hz")) h.resonance_hz = rig.number("resonance_hz", positive(1e6));
+  return h;
+}
+
+void require_flown(const FlightLog& log, const std::string& place) {
+  if (log.header.rig) refuse(place, "is of a clamped robot", "the log of a flight, without [rig]");
+}
+
 void require_voltages(const FlightLog& log, const std::string& place) {
   if (log.header.inputs.empty()) return;
   refuse(place, "is driven by " + io::joined(log.header.inputs),
@@ -631,7 +686,11 @@ FlightLog parse_flight_log(const LogFiles& files, const fs::path& folder) {
   const std::string& command = text_of(files, kCommand, folder);
   if (h.inputs.empty()) log.command = parse_command(command, folder / kCommand);
   else parse_declared(command, folder / kCommand, h.inputs, log.command.t_s, log.command.declared);
-  log.mocap = parse_turned(text_of(files, kMocap, folder), folder / kMocap, kMocapFields);
+  if (h.rig) text_of(files, kForces, folder);
+  else log.mocap = parse_turned(text_of(files, kMocap, folder), folder / kMocap, kMocapFields);
+  if (h.rig && files.contains(kMocap))
+    refuse((folder / kMocap).string(), "is there, but " + kHeader + " has [rig]", "forces.csv alone, or no [rig]");
+  log.forces = parse_optional(files, kForces, folder, h.rig.has_value(), kForcesFields);
   if (h.imu.rate_hz > 0) text_of(files, kImu, folder);
   log.imu = parse_optional(files, kImu, folder, h.imu.rate_hz > 0, imu_fields(h)).value_or(ImuStream{});
   log.power = parse_optional(files, kPower, folder, h.power.has_value(), power_fields(h));
@@ -651,9 +710,9 @@ FlightLog parse_flight_log(const LogFiles& files, const fs::path& folder) {
 
 LogFiles flight_log_files(const FlightLog& log) {
   const FlightHeader& h = log.header;
-  LogFiles files = {{kHeader, header_text(h)},
-                    {kCommand, command_text(log.command, h.inputs)},
-                    {kMocap, stream_text(log.mocap, kMocapFields)}};
+  LogFiles files = {{kHeader, header_text(h)}, {kCommand, command_text(log.command, h.inputs)}};
+  if (log.forces) files[kForces] = stream_text(*log.forces, kForcesFields);
+  else files[kMocap] = stream_text(log.mocap, kMocapFields);
   if (h.imu.rate_hz > 0) files[kImu] = stream_text(log.imu, imu_fields(h));
   if (log.power) files[kPower] = stream_text(*log.power, power_fields(h));
   if (log.wings) files[kWings] = stream_text(*log.wings, kWingsFields);

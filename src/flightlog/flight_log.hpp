@@ -8,6 +8,8 @@
 //   power.csv     optional, declared in [power]: t_s,battery_V,left_current_A,right_current_A
 //   attitude.csv  optional, declared in [attitude]: t_s,qw,qx,qy,qz, from a second estimator
 //   wings.csv     optional, [wings]: t_s,left_stroke_rad,left_rotation_rad,right_stroke_rad,right_rotation_rad
+//   forces.csv    only of a clamped robot, which [rig] declares, in place of mocap.csv and imu.csv:
+//                 t_s,force_x_N,force_y_N,force_z_N,moment_x_Nm,moment_y_Nm,moment_z_Nm
 //   policy.csv    optional, declared in [policy]: t_s and its numbers, for each inference of an exported policy
 //   truth.csv     only from a simulator: the full state; read_flight_log() never opens it
 //   joints.csv    only from a simulator, articulated wings: angles, rates, torques, power and work of all joints
@@ -102,6 +104,16 @@ struct AttitudeHeader {
   bool operator==(const AttitudeHeader&) const = default;
 };
 
+/// A stand that holds the torso, with a six-axis sensor: table [rig]. The log of such a robot has no motion.
+struct RigHeader {
+  double rate_hz = 0, latency_s = 0;
+  std::array<double, 3> position_m = {0, 0, 0};   ///< of the point about which moments are measured, in B
+  std::array<double, 4> attitude = {1, 0, 0, 0};  ///< w, x, y, z; turns the sensor's axes to B
+  double force_noise_N = 0, moment_noise_Nm = 0;
+  double resonance_hz = 0;  ///< lowest natural frequency of the robot on its sensor; 0: not known
+  bool operator==(const RigHeader&) const = default;
+};
+
 /// How exported C (flappy-export) flew, for its replay: table [flown]. Times are on the log's clock.
 struct FlownHeader {
   double start_s = 0;                               ///< flappy_controller_start()
@@ -133,6 +145,7 @@ struct FlightHeader {
   std::optional<PowerHeader> power;
   std::optional<WingsHeader> wings;
   std::optional<AttitudeHeader> attitude;
+  std::optional<RigHeader> rig;  ///< the robot was clamped: rates of mocap and imu are 0
   /// Columns of policy.csv: "observation_" or "action_" and a name of contract.json. Empty: there is none.
   std::vector<std::string> policy;
   model::Changes changes;  ///< what was done to the robot on purpose before this flight
@@ -185,6 +198,12 @@ struct AttitudeStream {
   bool operator==(const AttitudeStream&) const = default;
 };
 
+/// What a clamped robot exerts on its sensor, in the axes of the sensor.
+struct ForcesStream {
+  Column t_s, force_x_N, force_y_N, force_z_N, moment_x_Nm, moment_y_Nm, moment_z_Nm;
+  bool operator==(const ForcesStream&) const = default;
+};
+
 /// What an exported policy got and gave, before any limit; t_s is the time of the inference.
 struct PolicyStream {
   Column t_s;
@@ -200,16 +219,17 @@ struct FlightLog {
   std::optional<PowerStream> power;  ///< this and the next three: only where the header declares them
   std::optional<WingsStream> wings;
   std::optional<AttitudeStream> attitude;
+  std::optional<ForcesStream> forces;  ///< of a clamped robot, whose mocap and imu are empty
   std::optional<PolicyStream> policy;
   bool operator==(const FlightLog&) const = default;
 };
 
 namespace log_file {
 inline const std::string kHeader = "flight.toml", kCommand = "command.csv", kMocap = "mocap.csv", kImu = "imu.csv",
-                         kPower = "power.csv", kWings = "wings.csv", kAttitude = "attitude.csv", kPolicy = "policy.csv",
-                         kTruth = "truth.csv", kJoints = "joints.csv";
-inline const std::vector<std::string> kAll = {kHeader, kCommand,  kMocap,  kImu,   kPower,
-                                              kWings,  kAttitude, kPolicy, kTruth, kJoints};
+                         kPower = "power.csv", kWings = "wings.csv", kAttitude = "attitude.csv", kForces = "forces.csv",
+                         kPolicy = "policy.csv", kTruth = "truth.csv", kJoints = "joints.csv";
+inline const std::vector<std::string> kAll = {kHeader,   kCommand, kMocap,  kImu,   kPower, kWings,
+                                              kAttitude, kForces,  kPolicy, kTruth, kJoints};
 }  // namespace log_file
 
 /// Columns of truth.csv: pose, motion and wings of the flapper, and the bias of its gyro.
@@ -249,6 +269,8 @@ LogAmbient read_ambient(const io::Table& ambient);
 
 /// Keys of flight.toml and of mappings: [command] inputs, [policy] numbers, flapping_Hz, [mocap] source, [imu] gyro, [power] currents.
 std::vector<std::string> read_inputs(const io::Table& command);
+/// Table [rig] without its rate.
+RigHeader read_rig(const io::Table& rig);
 std::vector<std::string> read_policy_numbers(const io::Table& policy);
 double read_flapping(const io::Table& root, const std::vector<std::string>& inputs);
 PoseSource read_pose_source(const io::Table& mocap, bool declared_inputs);
@@ -268,6 +290,9 @@ FlightLog parse_flight_log(const LogFiles& files, const std::filesystem::path& f
 
 /// InputError "place: ..." where the log has declared inputs. A log with voltages always has an IMU with a gyro.
 void require_voltages(const FlightLog& log, const std::string& place);
+
+/// InputError "place: ..." for the log of a clamped robot.
+void require_flown(const FlightLog& log, const std::string& place);
 
 /// The folder itself if it is a flight log, else the flight logs in it by name; none: empty.
 std::vector<std::filesystem::path> flights_in(const std::filesystem::path& folder);

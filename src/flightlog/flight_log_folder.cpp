@@ -93,7 +93,7 @@ void check_each_once(const std::vector<std::string>& folders) {
 FlightLog read_flight_log(const fs::path& folder) {
   std::error_code error;
   LogFiles files;
-  const std::vector<std::string> optional = {kImu, kPower, kWings, kAttitude, kPolicy};
+  const std::vector<std::string> optional = {kImu, kPower, kWings, kAttitude, kForces, kPolicy};
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
     if (!name.ends_with(".csv") || name == kTruth || name == kJoints) continue;
@@ -106,7 +106,8 @@ FlightLog read_flight_log(const fs::path& folder) {
   if (error) refuse(folder, "cannot be read: " + error.message(), "");
   if (const std::vector<fs::path> inside = flights_in(folder); !inside.empty() && inside.front() != folder)
     refuse(folder, "is no flight, but a folder of " + std::to_string(inside.size()), (folder / "*").string());
-  for (const auto& name : {kHeader, kCommand, kMocap}) files[name] = io::read_text(folder / name);
+  for (const auto& name : {kHeader, kCommand}) files[name] = io::read_text(folder / name);
+  if (!files.contains(kForces) || fs::exists(folder / kMocap, error)) files[kMocap] = io::read_text(folder / kMocap);
   FlightLog log = parse_flight_log(files, folder);
   const auto warn = [&](const char* table, const std::string& name) {
     io::log(io::LogLevel::warning,

@@ -107,6 +107,10 @@ LogOptions read_log(const io::Table& root, double control_hz) {
                  t->number("current_noise_A", noise)};
   if (const auto t = root.optional_table("log.wings"))
     log.wings = {t->number("rate_hz", rate), t->number("noise_rad", io::non_negative(1))};
+  if (const auto t = root.optional_table("log.rig")) {
+    log.rig = flightlog::read_rig(*t);
+    log.rig->rate_hz = control_hz;
+  }
   return log;
 }
 
@@ -150,6 +154,7 @@ class Reader {
     if (c_.vehicle.beat_averaged) refuse_wings();
     if (!c_.vehicle.contact.empty() && !c_.fleet.task.says_contact) c_.fleet.task.constants.contact_ends = 0;
     if (c_.vehicle.jointed) refuse_motors();
+    if (c_.log.rig && !c_.welded) root_.fail("log.rig", "is of a robot on a stand", "[flight] support = \"welded\"");
     if (c_.welded && c_.fleet.task.start.settled)
       root_.fail("flight.support",
                  "is \"welded\", but task " + io::toml_string(c_.fleet.task.name) + " starts from hover", "\"task\"");
@@ -249,7 +254,7 @@ class Reader {
       if (task.parts >> static_cast<int>(part) & 1)
         root_.fail("task", io::toml_string(task.name) + " observes wings or their phase" + but,
                    "a task of other parts");
-    for (const char* key : {"log.power", "log.wings"})
+    for (const char* key : {"log.power", "log.wings", "log.rig"})
       if (root_.has(key)) root_.fail(key, "is asked for" + but, "no such log");
     c_.fleet.task.input_unit = "1";
   }
@@ -262,6 +267,7 @@ class Reader {
                  "a task whose actions are of the wing beat");
     if (root_.has("log.power"))
       root_.fail("log.power", "is asked for" + but, "no such log; joints.csv has their muscles'");
+    if (root_.has("log.rig")) root_.fail("log.rig", "is asked for" + but, "no such log");
     c_.fleet.task.input_unit = "1";
   }
 

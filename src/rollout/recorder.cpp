@@ -1,5 +1,6 @@
 #include "rollout/recorder.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -131,7 +132,8 @@ struct Recorder<T>::Storage {
   std::vector<flightlog::Column> truth = std::vector<flightlog::Column>(kTruthNames.size());
   std::vector<flightlog::Column> joints;  // empty without articulated wings
   TickSampler power{0}, wings{0};
-  sim::FlapperState state;  // at the last control tick
+  sim::HeldImpulse given{};  // to the stand, until the last control tick
+  sim::FlapperState state;   // at the last control tick
   double held_V[2] = {0, 0};
   struct {
     sim::Block<T> block;
@@ -158,8 +160,13 @@ struct Recorder<T>::Storage {
     for (const sim::Wall& w : o.batch.world.walls) h.ambient.walls.push_back({w.x_m, w.y_m, w.normal_x, w.normal_y});
     for (const sim::Shape& s : o.batch.world.shapes) flightlog::add_solid(s, h.ambient);
     const flight::MocapSensor& m = o.sensors.mocap;
-    h.mocap = {m.rate_hz, m.latency_s, m.position_noise_m, m.attitude_noise_rad};
-    h.imu = imu_header(o.sensors.imu);
+    h.rig = config.log.rig;
+    if (h.rig) {
+      log.forces.emplace();
+    } else {
+      h.mocap = {m.rate_hz, m.latency_s, m.position_noise_m, m.attitude_noise_rad};
+      h.imu = imu_header(o.sensors.imu);
+    }
     h.power = config.log.power;
     h.wings = config.log.wings;
     h.changes = config.changes;
@@ -176,6 +183,7 @@ struct Recorder<T>::Storage {
       sim::storage_of(f.batch()).keep_effects(0);
       sim::storage_of(f.batch()).put_effect_rows(i, vehicle);
     }
+    if (h.rig) given = f.batch().stand_impulse(i);
     look();
     add_truth(time_s(sim::storage_of(f.batch()).steps));
     if (config.actor) declare_policy(o.task);
@@ -363,6 +371,32 @@ struct Recorder<T>::Storage {
     w.right_rotation_rad.push_back(seen(state.rotation_rad[1], 3));
   }
 
+  /// Means over the control period, in the axes of the sensor and about its place, stamped half-way.
+  void add_forces(double begin_s, double end_s) {
+    const flightlog::RigHeader& rig = *log.header.rig;
+    const sim::HeldImpulse now = fleet.batch().stand_impulse(flapper), before = std::exchange(given, now);
+    const Eigen::Quaterniond to_B(rig.attitude[0], rig.attitude[1], rig.attitude[2], rig.attitude[3]);
+    Eigen::Vector3d force, moment;
+    for (int i = 0; i < 3; ++i) {
+      force[i] = (now.force_N_s[i] - before.force_N_s[i]) / (end_s - begin_s);
+      moment[i] = (now.moment_Nm_s[i] - before.moment_Nm_s[i]) / (end_s - begin_s);
+    }
+    moment = to_B.conjugate() * (moment - Eigen::Vector3d(rig.position_m.data()).cross(force));
+    force = to_B.conjugate() * force;
+    flightlog::ForcesStream& f = *log.forces;
+    const auto n = static_cast<std::uint32_t>(6 * f.t_s.size());
+    const auto noisy = [&](double value, double sd, std::uint32_t k) {
+      return value + sd * normal(sim::Stream::force_sensor, n + k);
+    };
+    f.t_s.push_back(tidy((begin_s + end_s) / 2 + rig.latency_s));
+    f.force_x_N.push_back(noisy(force.x(), rig.force_noise_N, 0));
+    f.force_y_N.push_back(noisy(force.y(), rig.force_noise_N, 1));
+    f.force_z_N.push_back(noisy(force.z(), rig.force_noise_N, 2));
+    f.moment_x_Nm.push_back(noisy(moment.x(), rig.moment_noise_Nm, 3));
+    f.moment_y_Nm.push_back(noisy(moment.y(), rig.moment_noise_Nm, 4));
+    f.moment_z_Nm.push_back(noisy(moment.z(), rig.moment_noise_Nm, 5));
+  }
+
   void record() {
     const std::int64_t end = sim::storage_of(fleet.batch()).steps;
     const std::int64_t begin = end - std::lround(fleet.period_s() * step_hz);
@@ -384,6 +418,7 @@ struct Recorder<T>::Storage {
 
     look();
     add_truth(time_s(end));
+    if (log.forces) return add_forces(time_s(begin), time_s(end));
     for (const auto& s : fleet.imu_samples(flapper)) {
       flightlog::ImuStream& imu = log.imu;
       imu.t_s.push_back(tidy(s.arrival_s));
@@ -410,7 +445,9 @@ struct Recorder<T>::Storage {
 
   /// Whether every stream has at least two samples and no gap that a log may not have, and all overlap in time.
   bool complete() const {
-    std::vector<const flightlog::Column*> times = {&log.command.t_s, &log.mocap.t_s, &log.imu.t_s};
+    std::vector<const flightlog::Column*> times = {&log.command.t_s};
+    if (log.forces) times.push_back(&log.forces->t_s);
+    else times.insert(times.end(), {&log.mocap.t_s, &log.imu.t_s});
     if (log.power) times.push_back(&log.power->t_s);
     if (log.wings) times.push_back(&log.wings->t_s);
     double from = 0, to = 1e300;

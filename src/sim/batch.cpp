@@ -409,6 +409,25 @@ HeldImpulse Batch<T>::held_impulse(std::size_t i) const {
 }
 
 template <class T>
+HeldImpulse Batch<T>::stand_impulse(std::size_t i) const {
+  const auto [block, lane] = storage_->at(i);
+  const auto p = get<Parameters<double>>(block.parameters, lane);
+  const auto x = get<State<double>>(block.state, lane);
+  const Vec3<double> rest{0, 0, 0};
+  Vec3<double> momentum = rest, spin = rest;
+  const auto add = [&](const auto& side, const model::WingPose<double>& pose) {
+    const model::WingInertia<double> wing = model::wing_inertia(side, pose);
+    momentum = momentum + pose.momentum;
+    spin = spin + (pose.beta_rate * wing.stroke_spin + pose.theta_rate * wing.rotation_spin +
+                   model::cross(side.shoulder_m, pose.momentum));
+  };
+  add(p.left, model::place_wing<+1>(p.left, x.left, rest));
+  add(p.right, model::place_wing<-1>(p.right, x.right, rest));
+  const Vec3<double> force = x.impulse_N_s - momentum, moment = x.angular_impulse_Nm_s - spin;
+  return {{force.x, force.y, force.z}, {moment.x, moment.y, moment.z}};
+}
+
+template <class T>
 double Batch<T>::energy_J(std::size_t i) const {
   const int lane = storage_->at(i).lane;
   if (storage_->jointed) return storage_->jointed->work_of(i)[0];

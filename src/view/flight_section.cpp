@@ -311,8 +311,10 @@ void check_count(std::size_t flights) {
 Section flight_section(const std::vector<fs::path>& folders, const FlightOptions& options, Packing& packing) {
   check_count(folders.size());
   std::vector<ShownFlight> flights;
-  for (const fs::path& folder : folders)
+  for (const fs::path& folder : folders) {
     flights.push_back({name_among(folders, folder), folder, flightlog::read_flight_log(folder)});
+    flightlog::require_flown(flights.back().log, folder);
+  }
   return flight_section(std::move(flights), options, packing);
 }
 

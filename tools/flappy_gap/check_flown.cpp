@@ -183,6 +183,7 @@ Json check_flown(const std::string& exported, const std::vector<std::string>& fo
   bool all = true;
   for (const std::string& folder : folders) {
     const flightlog::FlightLog log = flightlog::read_flight_log(folder);
+    flightlog::require_flown(log, folder);
     const auto& header = log.header.flown;
     if (header) {
       const auto compare = [&](const char* what, std::optional<std::uint32_t> flew, std::uint32_t is) {

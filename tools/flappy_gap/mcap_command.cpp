@@ -126,6 +126,7 @@ Json run_mcap(const McapCommand& command) {
     io::refuse(command.flight, "is no flight of " + command.diagnosis.string(), io::joined(all));
   }
   const flightlog::FlightLog log = flightlog::read_flight_log(command.flight);
+  flightlog::require_flown(log, command.flight);
   const auto flight = std::make_shared<const ResetPrediction>(Recording(command.flight, log, d.declared));
   VehicleHypothesis declared{d.declared, 0}, corrected{d.corrected, 0};
   if (reference)  // the verdict's effects appeared after the reference flights

@@ -90,6 +90,7 @@ Json run(const Request& request) {
   flightlog::check_each_once(request.flights);
   for (const fs::path folder : request.flights) {
     const flightlog::FlightLog log = flightlog::read_flight_log(folder);
+    flightlog::require_flown(log, folder);
     transitions.add(folder, log, model::read_vehicle(vehicle_path(request, folder, log.header)));
   }
   const TransitionReport r = transitions.run();

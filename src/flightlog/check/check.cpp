@@ -70,6 +70,7 @@ void check_latencies(const FlightHeader& h, Findings& findings) {
   look("mocap.latency_s", h.mocap.latency_s);
   look("imu.latency_s", h.imu.latency_s);
   if (h.power) look("power.latency_s", h.power->latency_s);
+  if (h.rig) look("rig.latency_s", h.rig->latency_s);
   if (h.attitude) look("attitude.latency_s", h.attitude->latency_s);
   if (wrong.empty()) findings.push_back({"latencies", Verdict::ok, "declared ones are plausible", {}});
   else findings.push_back({"latencies", Verdict::warning, wrong + ": at most 0.1 s expected: milliseconds?", {}});
@@ -121,11 +122,22 @@ CheckReport check_flight(const FlightLog& log) {
     check_stream(report.streams.back(), h.flapping_Hz, report.findings);
   };
   add("command", log.command.t_s, std::nullopt);
-  add("mocap", log.mocap.t_s, h.mocap.rate_hz);
+  if (h.rig) add("forces", log.forces->t_s, h.rig->rate_hz);
+  else add("mocap", log.mocap.t_s, h.mocap.rate_hz);
   if (h.imu.rate_hz > 0) add("imu", log.imu.t_s, h.imu.rate_hz);
   if (log.power) add("power", log.power->t_s, h.power->rate_hz);
   if (log.wings) add("wings", log.wings->t_s, h.wings->rate_hz);
   if (log.attitude) add("attitude", log.attitude->t_s, h.attitude->rate_hz);
+  if (h.rig) {
+    const ForcesStream& f = *log.forces;
+    check_repeats("forces", {&f.force_x_N, &f.force_y_N, &f.force_z_N, &f.moment_x_Nm, &f.moment_y_Nm, &f.moment_z_Nm},
+                  h.rig->force_noise_N, report.findings);
+    check_rig(log, report.findings);
+    check_command(log, report.findings);
+    check_power(log, report.findings);
+    check_wings(log, report.findings);
+    return report;
+  }
   const MocapStream& m = log.mocap;
   check_repeats("mocap", {&m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz}, h.mocap.position_noise_m,
                 report.findings);

@@ -13,7 +13,8 @@ namespace flappy::flightlog {
 inline constexpr double kSigmas = 4;
 
 using io::format;
-using log_file::kAttitude, log_file::kCommand, log_file::kImu, log_file::kMocap, log_file::kPower, log_file::kWings;
+using log_file::kAttitude, log_file::kCommand, log_file::kImu, log_file::kMocap, log_file::kPower, log_file::kWings,
+    log_file::kForces;
 
 using Findings = std::vector<Finding>;
 
@@ -50,6 +51,8 @@ void compare_correlations(const std::vector<const FlightLog*>& logs, const std::
 /// Middle of the window after that at `middle_s`; windows last `span_s` and adjoin. A gap of more than a thousand
 /// windows is skipped in one step, so the work does not grow with it.
 double next_window(const Column& t_s, double middle_s, double span_s);
+/// Compares the force of a clamped robot with its voltages, and the sensor's resonance with the beat.
+void check_rig(const FlightLog& log, Findings& findings);
 void check_power(const FlightLog& log, Findings& findings);
 void check_wings(const FlightLog& log, Findings& findings);
 

@@ -30,8 +30,9 @@ std::vector<DeclaredStream> streams_of(const FlightLog& log) {
   const MocapStream& m = log.mocap;
   const ImuStream& s = log.imu;
   const FlightHeader& h = log.header;
-  std::vector<DeclaredStream> list = {{kCommand, &log.command.t_s, command_rate_hz(log.command.t_s), {}},
-                                      {kMocap, &m.t_s, h.mocap.rate_hz, {}}};
+  std::vector<DeclaredStream> list = {{kCommand, &log.command.t_s, command_rate_hz(log.command.t_s), {}}};
+  if (log.forces) list.push_back({kForces, &log.forces->t_s, h.rig->rate_hz, {}});
+  else list.push_back({kMocap, &m.t_s, h.mocap.rate_hz, {}});
   // an estimate may be logged more often than it is made, and rounded
   if (h.mocap.position_noise_m > 0 && h.mocap.source == PoseSource::motion_capture)
     list[1].measured = {&m.x_m, &m.y_m, &m.z_m, &m.qw, &m.qx, &m.qy, &m.qz};
@@ -88,8 +89,8 @@ std::vector<DataFault> missing(const std::vector<DeclaredStream>& streams) {
   return faults;
 }
 
-std::vector<DataFault> too_short(std::vector<DeclaredStream> streams, double flapping_Hz, bool voltages) {
-  streams.erase(streams.begin() + (voltages ? 3 : 2), streams.end());
+std::vector<DataFault> too_short(std::vector<DeclaredStream> streams, double flapping_Hz, bool with_imu) {
+  streams.erase(streams.begin() + (with_imu ? 3 : 2), streams.end());
   const double least_s = std::max(flapping_Hz > 0 ? kMinBeats / flapping_Hz : 0, kMinTime_s);
   const auto& last = *std::ranges::max_element(streams, {}, &DeclaredStream::begin_s);
   const auto& first = *std::ranges::min_element(streams, {}, &DeclaredStream::end_s);
@@ -161,7 +162,7 @@ std::vector<DataFault> data_faults(const FlightLog& log, const CheckReport& repo
   const std::vector<DeclaredStream> streams = streams_of(log);
   // With missing samples, no further check is meaningful.
   std::vector<DataFault> faults = missing(streams);
-  if (faults.empty()) faults = too_short(streams, log.header.flapping_Hz, log.header.inputs.empty());
+  if (faults.empty()) faults = too_short(streams, log.header.flapping_Hz, log.header.inputs.empty() && !log.header.rig);
   if (faults.empty()) {
     faults = wrong_clocks(log, report);
     const bool clocks_off = !faults.empty();  // then currents are compared with the wrong voltages

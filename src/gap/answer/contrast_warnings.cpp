@@ -47,6 +47,7 @@ void check_same_streams(const std::vector<flightlog::FlightLog>& logs, const std
     };
     check("power.csv", logs[0].power.has_value(), logs[f].power.has_value());
     check("wings.csv", logs[0].wings.has_value(), logs[f].wings.has_value());
+    check("forces.csv", logs[0].header.rig.has_value(), logs[f].header.rig.has_value());
     check("imu.csv", logs[0].header.imu.rate_hz > 0, logs[f].header.imu.rate_hz > 0);
   }
 }

@@ -307,10 +307,13 @@ Diagnosed diagnose(const DiagnosisRequest& request,
 
 void fly_closed_loop(const DiagnosisRequest& request, Diagnosed& d) {
   if (!d.corrected || request.vehicle.beat_averaged || !request.settings.reference.empty()) return;
+  FlightList flown;
+  for (const auto& flight : d.flights.tests)
+    if (!flight->recording()->clamped()) flown.push_back(flight);
   ClosedLoopOptions options;
   options.own_path = !request.settings.manoeuvre.empty();
   options.threads = request.settings.threads;
-  d.result.closed_loop = predict_closed_loop(d.flights.tests, request.vehicle, *d.corrected, request.pilot, options);
+  d.result.closed_loop = predict_closed_loop(flown, request.vehicle, *d.corrected, request.pilot, options);
 }
 
 void propose_experiment(const DiagnosisRequest& request, Diagnosed& d) {

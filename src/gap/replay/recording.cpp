@@ -7,6 +7,7 @@
 #include "flightlog/log_world.hpp"
 #include "flightlog/readings.hpp"
 #include "io/statistics.hpp"
+#include "model/derive.hpp"
 #include "sim/replay.hpp"
 
 namespace flappy::gap {
@@ -55,10 +56,14 @@ Recording::Recording(const std::filesystem::path& folder, flightlog::FlightLog f
     : name(io::folder_name(folder)),
       least_z_m(flight_log.header.ambient.ground_z_m + nominal.extent.below_m + kMinClearance_m),
       density_ratio(density_over(nominal, flight_log.header, folder)),
-      log(flightlog::on_its_clocks(std::move(flight_log))),
-      smoother(log, folder),
-      begin_s(std::max(smoother.begin_s(), log.command.t_s.front()) + kMargin_s),
-      last_s(std::min(smoother.end_s(), log.command.t_s.back()) - kMargin_s) {
+      mass_kg(model::total_mass_kg(nominal)),
+      inertia_kg_m2(nominal.torso.inertia_kg_m2.xx, nominal.torso.inertia_kg_m2.yy, nominal.torso.inertia_kg_m2.zz),
+      log(flightlog::on_its_clocks(std::move(flight_log))) {
+  if (!log.header.rig) smoother.emplace(log, folder);
+  const double from_s = smoother ? smoother->begin_s() : log.forces->t_s.front() - log.header.rig->latency_s,
+               to_s = smoother ? smoother->end_s() : log.forces->t_s.back() - log.header.rig->latency_s;
+  begin_s = std::max(from_s, log.command.t_s.front()) + kMargin_s;
+  last_s = std::min(to_s, log.command.t_s.back()) - kMargin_s;
   prepare(folder.string());
 }
 
@@ -66,18 +71,22 @@ Recording::Recording(const Recording& other, flightlog::FlightLog flight_log)
     : name(other.name),
       least_z_m(other.least_z_m),
       density_ratio(other.density_ratio),
+      mass_kg(other.mass_kg),
+      inertia_kg_m2(other.inertia_kg_m2),
       log(std::move(flight_log)),
-      smoother(log, other.name),
       begin_s(other.begin_s),
       last_s(other.last_s),
       beats(other.beats),
       first_beat_(other.first_beat_) {
+  if (!log.header.rig) smoother.emplace(log, other.name);
   prepare(name);
 }
 
 void Recording::prepare(const std::string& place) {
   world = flightlog::world_of(log.header);
-  lay_grid();
+  if (clamped()) lay_clamped_grid();
+  else lay_grid();
+  if (steps.empty() && clamped()) throw io::InputError(place + ": forces.csv and command.csv share less than 0.1 s");
   if (steps.empty()) throw io::InputError(place + ": no interval of the IMU has motion capture around it");
   read_voltages();
   find_phase();
@@ -85,14 +94,15 @@ void Recording::prepare(const std::string& place) {
 }
 
 void Recording::lay_grid() {
-  const std::vector<double>& bounds = smoother.bounds_s();
+  const flightlog::Smoother& smoothed = *smoother;
+  const std::vector<double>& bounds = smoothed.bounds_s();
   const double usual_s = 1 / log.header.imu.rate_hz;
   const auto first =
       static_cast<std::size_t>(std::ranges::lower_bound(bounds, begin_s - kPredictionStep_s / 2) - bounds.begin());
   if (first >= bounds.size() || bounds[first] >= last_s) return;
   begin_s = bounds[first];
   double now_s = begin_s;
-  torso.push_back(torso_at(smoother.at(std::max(begin_s, smoother.begin_s()))));
+  torso.push_back(torso_at(smoothed.at(std::max(begin_s, smoothed.begin_s()))));
   const std::vector<std::pair<double, double>> undriven = undriven_s();
   for (std::size_t k = first + 1; k < bounds.size() && bounds[k] <= last_s + kPredictionStep_s / 2; ++k) {
     // a gap of the IMU is divided into usual intervals, so that the torso is reset often enough
@@ -102,19 +112,62 @@ void Recording::lay_grid() {
       if (n == 0) continue;
       const double from_s = now_s;
       now_s += n * kPredictionStep_s;
-      const double at_s = std::clamp(now_s, smoother.begin_s(), smoother.end_s());
+      const double at_s = std::clamp(now_s, smoothed.begin_s(), smoothed.end_s());
       steps.push_back(n);
       end_s.push_back(now_s);
-      torso.push_back(torso_at(smoother.at(at_s)));
-      force_m_s2.push_back(smoother.mean_force_m_s2(from_s, now_s));
+      torso.push_back(torso_at(smoothed.at(at_s)));
+      force_m_s2.push_back(smoothed.mean_force_m_s2(from_s, now_s));
       const bool flies = torso.back().position_m[2] > least_z_m;
       const bool driven =
           std::ranges::none_of(undriven, [&](const auto& span) { return span.first < now_s && from_s < span.second; });
       // hypotheses share the grid; with another delay of motion capture, the record may cover less of it
-      const bool recorded = now_s > smoother.begin_s() && from_s < smoother.end_s() &&
-                            smoother.covers(std::max(from_s, smoother.begin_s()), at_s);
+      const bool recorded = now_s > smoothed.begin_s() && from_s < smoothed.end_s() &&
+                            smoothed.covers(std::max(from_s, smoothed.begin_s()), at_s);
       valid.push_back(recorded && flies && driven ? 1 : 0);
     }
+  }
+}
+
+/// Bounds half-way between the samples of the sensor, so that each sample is in the middle of its interval.
+void Recording::lay_clamped_grid() {
+  const flightlog::Column& t_s = log.forces->t_s;
+  const double late_s = log.header.rig->latency_s, usual_s = 1 / log.header.rig->rate_hz;
+  const auto bound_s = [&](std::size_t i) { return (t_s[i - 1] + t_s[i]) / 2 - late_s; };
+  std::size_t i = 1;
+  while (i < t_s.size() && bound_s(i) < begin_s) ++i;
+  if (i >= t_s.size()) return;
+  begin_s = bound_s(i);
+  double now_s = begin_s;
+  torso.emplace_back();
+  const std::vector<std::pair<double, double>> undriven = undriven_s();
+  for (; i + 1 < t_s.size() && bound_s(i + 1) <= last_s; ++i) {
+    const int n = static_cast<int>(std::lround((bound_s(i + 1) - now_s) / kPredictionStep_s));
+    if (n == 0) continue;
+    const double from_s = now_s;
+    now_s += n * kPredictionStep_s;
+    steps.push_back(n);
+    end_s.push_back(now_s);
+    torso.emplace_back();
+    samples_.push_back(i);
+    const bool driven =
+        std::ranges::none_of(undriven, [&](const auto& span) { return span.first < now_s && from_s < span.second; });
+    // a gap of the sensor makes a long interval, whose mean its one sample is not
+    valid.push_back(driven && n * kPredictionStep_s < 1.5 * usual_s + kPredictionStep_s ? 1 : 0);
+  }
+  take_loads();
+}
+
+/// Forces and moments of the samples, in B and about the torso origin.
+void Recording::take_loads() {
+  const flightlog::ForcesStream& f = *log.forces;
+  const flightlog::RigHeader& rig = *log.header.rig;
+  const Eigen::Quaterniond to_B(rig.attitude[0], rig.attitude[1], rig.attitude[2], rig.attitude[3]);
+  const Vector3d at(rig.position_m.data());
+  for (const std::size_t i : samples_) {
+    const Vector3d force = to_B * Vector3d(f.force_x_N[i], f.force_y_N[i], f.force_z_N[i]);
+    const Vector3d moment = to_B * Vector3d(f.moment_x_Nm[i], f.moment_y_Nm[i], f.moment_z_Nm[i]) + at.cross(force);
+    force_m_s2.push_back(force / mass_kg);
+    turn_rad_s2.push_back(moment.cwiseQuotient(inertia_kg_m2));
   }
 }
 

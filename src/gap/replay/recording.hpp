@@ -1,5 +1,6 @@
 // A recorded flight of a vehicle with wings and motors, prepared for replay: motor voltages, motion of the torso at the
-// bounds of the IMU's intervals, measured force in each interval. ResetPrediction replays it.
+// bounds of the IMU's intervals, measured force in each interval. ResetPrediction replays it. In the log of a clamped
+// robot the torso rests at the origin, upright, and the intervals are those of the sensor of its stand.
 #pragma once
 
 #include <filesystem>
@@ -44,8 +45,10 @@ struct Recording {
   /// Battery voltage at the start over the nominal voltage, which commands refer to; 1 if no voltage is logged, or if
   /// it is less than 1.02. The vehicle's model predicts how it falls from there.
   double full = 1;
+  double mass_kg = 0;             ///< of the robot, by the vehicle file
+  Eigen::Vector3d inertia_kg_m2;  ///< moments of inertia of the torso, by the vehicle file
   flightlog::FlightLog log;
-  flightlog::Smoother smoother;
+  std::optional<flightlog::Smoother> smoother;  ///< none: the robot was clamped
   sim::World world;
 
   // The grid: intervals of the IMU, each rounded to whole physics steps of kPredictionStep_s. A gap of the IMU is cut
@@ -58,9 +61,14 @@ struct Recording {
   /// kSpinUpBeats before, and the torso is above least_z_m. What wings.csv and power.csv lack is left to
   /// ResetPrediction.
   std::vector<char> valid;
-  std::vector<TorsoAt> torso;               ///< [bound of an interval] one more than intervals
-  std::vector<Eigen::Vector3d> force_m_s2;  ///< [interval] mean specific force at the IMU, bias included, in B
-  std::vector<double> left_V, right_V;      ///< [physics step] commanded voltage times `full`
+  std::vector<TorsoAt> torso;  ///< [bound of an interval] one more than intervals
+  /// [interval] Mean specific force at the IMU, bias included, in B. Of a clamped robot: the force on its stand, zeroed at
+  /// rest, over the robot's mass.
+  std::vector<Eigen::Vector3d> force_m_s2;
+  /// [interval] Of a clamped robot: the moment on its stand about the torso origin, in B, over the moments of inertia of
+  /// the torso.
+  std::vector<Eigen::Vector3d> turn_rad_s2;
+  std::vector<double> left_V, right_V;  ///< [physics step] commanded voltage times `full`
 
   std::vector<double> beat;  ///< [interval] its middle, in beats since beat 0 began (beat_at)
   /// Number of beats, counted by the phase of the commands. The grid may begin within beat 0, which is cut off then.
@@ -74,6 +82,7 @@ struct Recording {
   /// were undone. Its times are those of regular clocks already (flightlog::on_its_clocks).
   Recording(const Recording& other, flightlog::FlightLog flight_log);
 
+  bool clamped() const { return !smoother; }
   double interval_s(std::size_t k) const { return steps[k] * kPredictionStep_s; }
   std::size_t intervals() const { return steps.size(); }
   /// Time in beats since beat 0 began; its fraction is the phase of the beat. Negative before.
@@ -82,10 +91,13 @@ struct Recording {
  private:
   void prepare(const std::string& place);
   void lay_grid();
+  void lay_clamped_grid();
+  void take_loads();
   std::vector<std::pair<double, double>> undriven_s() const;
   void read_voltages();
   void find_phase();
   void read_regimes();
+  std::vector<std::size_t> samples_;             ///< [interval] sample of forces.csv of a clamped robot
   std::vector<double> phase_t_s_, phase_beats_;  ///< unwrapped phase of the commands; empty: not logged
   double phase_offset_ = 0, phase_hz_ = 0;       ///< fitted to the voltages where no phase is logged
   double first_beat_ = 0;                        ///< number, counted by the command's phase, of the beat that is beat 0

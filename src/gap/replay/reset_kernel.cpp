@@ -61,6 +61,37 @@ void reset_block(sim::Block<Flown>& block, const TorsoAt* from, const TorsoAt& t
   }
 }
 
+/// Angular momentum of a wing and its leading edge about the torso origin, which rests.
+template <class T>
+FLAPPY_INLINE Vec3<T> angular_momentum(const WingPose<T>& g, const WingInertia<T>& i, const Vec3<T>& shoulder) {
+  return g.beta_rate * i.stroke_spin + g.theta_rate * i.rotation_spin + cross(shoulder, g.momentum);
+}
+
+void clamped_block(sim::Block<Flown>& block, double interval_s, ClampedBlockState& kept, ResetBlockState& rows) {
+  const Vec3<V> none{all(0), all(0), all(0)};
+  for (int first = 0; first < sim::kLanes<Flown>; first += kWidth<Flown>) {
+    const auto p = sim::load_rows<Parameters<V>>(block.parameters, first);
+    auto x = sim::load_rows<State<V>>(block.state, first);
+    const WingPose<V> left = place_wing<+1>(p.left, x.left, none), right = place_wing<-1>(p.right, x.right, none);
+    const Vec3<V> momentum = left.momentum + right.momentum,
+                  spin = angular_momentum(left, wing_inertia(p.left, left), p.left.shoulder_m) +
+                         angular_momentum(right, wing_inertia(p.right, right), p.right.shoulder_m);
+    if (interval_s > 0) {
+      const V per_interval(1 / interval_s);
+      store(per_interval * (x.impulse_N_s - (momentum - load(kept.momentum_kg_m_s, first))), rows.rows + kSpecificForce,
+            first);
+      store(per_interval * (x.angular_impulse_Nm_s - (spin - load(kept.angular_momentum_kg_m2_s, first))),
+            rows.rows + kAngularAcceleration, first);
+      x.left.stroke_rad.store(rows.rows[kStroke] + first);
+      x.right.stroke_rad.store(rows.rows[kStroke + 1] + first);
+    }
+    store(momentum, kept.momentum_kg_m_s, first);
+    store(spin, kept.angular_momentum_kg_m2_s, first);
+    x.impulse_N_s = none, x.angular_impulse_Nm_s = none;
+    sim::store_rows(x, block.state, first);
+  }
+}
+
 void project_block(const Flown* sample, const double* weights, int count, std::size_t width, Flown* rows) {
   const std::size_t n = width * sim::kLanes<Flown>;
   for (int c = 0; c < count; ++c, rows += n) {
@@ -74,6 +105,8 @@ void project_block(const Flown* sample, const double* weights, int count, std::s
 
 extern const ResetBlock reset_block_kernel;
 const ResetBlock reset_block_kernel = reset_block;
+extern const ClampedBlock clamped_block_kernel;
+const ClampedBlock clamped_block_kernel = clamped_block;
 extern const ProjectBlock project_block_kernel;
 const ProjectBlock project_block_kernel = project_block;
 

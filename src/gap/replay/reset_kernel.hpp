@@ -38,6 +38,19 @@ struct ResetBlockState {
 using ResetBlock = void (*)(sim::Block<Flown>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
                             const double imu_position_m[3], double gravity_m_s2, ResetBlockState& kept);
 
+/// Loads of the wings on a held torso since the last call, and the momentum that its wings had then.
+struct ClampedBlockState {
+  alignas(64) Flown momentum_kg_m_s[3][kVehicles];           ///< [axis][lane] of the wings, in B
+  alignas(64) Flown angular_momentum_kg_m2_s[3][kVehicles];  ///< about the torso origin
+};
+
+/// Computes the rows of an interval of vehicles that are welded to a stand: the mean force and moment of the wings on
+/// the torso, N and Nm in B about the torso origin, in the places of specific force and angular acceleration, and the
+/// strokes. By momentum: what the air gave to the wings less what they gained. Weights are left out: a sensor is zeroed at
+/// rest, and a wing's weight moves its moment by 1e-5 Nm. `interval_s` 0: the start, without rows.
+using ClampedBlock = void (*)(sim::Block<Flown>& block, double interval_s, ClampedBlockState& kept,
+                              ResetBlockState& rows);
+
 /// Adds a sample, times each weight, to the rows of a beat: the sums of BeatProjection for all lanes. `sample`:
 /// [signal][lane], `width` signals; `weights`: [coefficient], `count` of them; `rows`: [coefficient][signal][lane].
 using ProjectBlock = void (*)(const Flown* sample, const double* weights, int count, std::size_t width, Flown* rows);

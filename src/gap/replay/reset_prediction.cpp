@@ -12,6 +12,7 @@
 
 namespace flappy::gap {
 FLAPPY_KERNELS(ResetBlock, reset_block_kernel);
+FLAPPY_KERNELS(ClampedBlock, clamped_block_kernel);
 FLAPPY_KERNELS(ProjectBlock, project_block_kernel);
 
 namespace {
@@ -70,6 +71,7 @@ ResetPrediction::ResetPrediction(Recording recording) : recording_(std::move(rec
   for (std::size_t k = 0; k < r.intervals(); ++k) {
     double* s = &samples[k * kSignals];
     for (int i = 0; i < 3; ++i) s[kSpecificForceX + i] = r.force_m_s2[k][i];
+    for (int i = 0; r.clamped() && i < 3; ++i) s[kAngularAccelerationX + i] = r.turn_rad_s2[k][i];
     if (!has_wings_) continue;
     const auto strokes = flightlog::strokes_at(*r.log.wings, r.log.header.wings->rate_hz, r.end_s[k]);
     if (std::isfinite(strokes[0])) s[kStrokeLeft] = strokes[0], s[kStrokeRight] = strokes[1];
@@ -78,7 +80,7 @@ ResetPrediction::ResetPrediction(Recording recording) : recording_(std::move(rec
   if (has_wings_) wings_ = BeatProjection(r.beat, seen, r.beats, first);
   lay_power(first);
   measured_ = rows_of(samples);
-  for (std::size_t k = 0; k < r.intervals(); ++k)
+  for (std::size_t k = 0; !r.clamped() && k < r.intervals(); ++k)
     for (std::size_t i = 0; i < 3; ++i)
       samples[k * kSignals + kAngularAccelerationX + i] =
           (r.torso[k + 1].body_rate_rad_s[i] - r.torso[k].body_rate_rad_s[i]) / r.interval_s(k);
@@ -92,7 +94,12 @@ ResetPrediction::ResetPrediction(Recording recording) : recording_(std::move(rec
     for (std::size_t i = 0; i < power.size(); i += kMetered) power[i] -= r.full * r.log.header.power->battery_nominal_V;
     put_power(power, signal_);
   }
-  compare_streams();
+  if (r.clamped()) {
+    compared_.assign(r.beats, 0);
+    for (std::size_t j = 0; j < r.beats; ++j) smoothed_.push_back(imu_.covers(j) ? 1 : 0);
+  } else {
+    compare_streams();
+  }
 }
 
 /// Places power.csv on the grid. A sample at the time of a new voltage shows the new one, so it is predicted from the
@@ -153,7 +160,7 @@ void ResetPrediction::compare_streams() {
     smoothed_.push_back(whole ? 1 : 0);
     path_m_s2_.col(static_cast<Eigen::Index>(j)) = streams[j].path_m_s2;
     attitude_.emplace_back(imu_.covers(j)
-                               ? recording_.smoother.at(recording_.regimes[j].t_s).attitude.toRotationMatrix()
+                               ? recording_.smoother->at(recording_.regimes[j].t_s).attitude.toRotationMatrix()
                                : Eigen::Matrix3d::Identity());
   }
   smooth_forces(measured_, path_m_s2_);
@@ -206,6 +213,11 @@ Rows ResetPrediction::declared_noise(std::uint64_t seed) const {
   for (std::size_t k = 0; k < recording_.intervals(); ++k) {
     double* s = &samples[k * kSignals];
     for (int i = 0; i < 3; ++i) {
+      if (h.rig) {
+        s[kSpecificForceX + i] = h.rig->force_noise_N * normal(random) / recording_.mass_kg;
+        s[kAngularAccelerationX + i] = h.rig->moment_noise_Nm * normal(random) / recording_.inertia_kg_m2[i];
+        continue;
+      }
       // the simulation was reset to a rate that has the noise of the sample before
       const double rate = h.imu.gyro_noise_rad_s * normal(random);
       s[kAngularAccelerationX + i] = (rate - before[i]) / recording_.interval_s(k);
@@ -222,6 +234,7 @@ Rows ResetPrediction::declared_noise(std::uint64_t seed) const {
                                  h.power->current_noise_A * normal(random)});
     put_power(power, rows);
   }
+  if (h.rig) return rows;
   put_streams(stream_noise(recording_, seed, false), rows);
   const std::vector<StreamRow> streams = stream_noise(recording_, seed, true);
   for (std::size_t j = 0; j < recording_.beats; ++j)
@@ -249,6 +262,7 @@ struct ResetPrediction::Replay {
 ResetPrediction::Replay ResetPrediction::replay(const std::vector<const VehicleHypothesis*>& vehicles) const {
   const Recording& r = recording_;
   const ResetBlock reset = *reset_block_kernels[sim::place_of("")];
+  const ClampedBlock clamped = *clamped_block_kernels[sim::place_of("")];
   const auto driven = [&](std::size_t i) {
     model::Vehicle vehicle = vehicles[std::min(i, vehicles.size() - 1)]->vehicle;
     apply(r.log.header.changes, vehicle);
@@ -261,8 +275,9 @@ ResetPrediction::Replay ResetPrediction::replay(const std::vector<const VehicleH
   std::vector<ShiftedVoltage> shifted;
   for (std::size_t i = 0; i < kVehicles; ++i) {
     batch.set_vehicle(i, driven(i));
-    batch.reset(i, {});
-    shifted.emplace_back(vehicles[std::min(i, vehicles.size() - 1)]->lag_s / kPredictionStep_s);
+    batch.reset(i, {}, r.clamped() ? sim::Start::welded : sim::Start::flying);
+    // the lag is that of the sensors of a flight
+    shifted.emplace_back(r.clamped() ? 0 : vehicles[std::min(i, vehicles.size() - 1)]->lag_s / kPredictionStep_s);
   }
   auto& storage = sim::storage_of(batch);
   sim::Block<Flown>& block = storage.blocks[0];
@@ -270,7 +285,9 @@ ResetPrediction::Replay ResetPrediction::replay(const std::vector<const VehicleH
   plan.steps_per_update = 1;
   ResetBlockState kept;
   const double* imu_m = r.log.header.imu.position_m.data();
-  reset(block, nullptr, r.torso[0], 1, imu_m, r.world.gravity_m_s2, kept);
+  ClampedBlockState momenta;
+  if (r.clamped()) clamped(block, 0, momenta, kept);
+  else reset(block, nullptr, r.torso[0], 1, imu_m, r.world.gravity_m_s2, kept);
 
   const int longest = *std::ranges::max_element(r.steps);
   std::vector<Flown> voltages_V(static_cast<std::size_t>(longest) * 2 * kVehicles);
@@ -289,7 +306,16 @@ ResetPrediction::Replay ResetPrediction::replay(const std::vector<const VehicleH
     in_force.voltages_V = voltages_V.data();
     if (r.log.power) in_force.meter = meter.data() + kMeter;
     storage.kernel(block, in_force, plan, 0, r.steps[k], {});
-    reset(block, &r.torso[k], r.torso[k + 1], r.interval_s(k), imu_m, r.world.gravity_m_s2, kept);
+    if (r.clamped()) {
+      clamped(block, r.interval_s(k), momenta, kept);
+      for (int i = 0; i < 3; ++i)
+        for (std::size_t lane = 0; lane < kVehicles; ++lane) {
+          kept.rows[kSpecificForce + i][lane] /= static_cast<Flown>(r.mass_kg);
+          kept.rows[kAngularAcceleration + i][lane] /= static_cast<Flown>(r.inertia_kg_m2[i]);
+        }
+    } else {
+      reset(block, &r.torso[k], r.torso[k + 1], r.interval_s(k), imu_m, r.world.gravity_m_s2, kept);
+    }
     std::copy_n(&kept.rows[0][0], kSample, &result.samples[k * kSample]);
     for (; metered < power_step_.size() && power_step_[metered] + 1 < step; ++metered) {
       const double late = power_late_[metered];
@@ -323,7 +349,7 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const VehicleHypoth
     Rows& rows = result[lane];
     rows.resize(r.beats * kRowsPerBeat);
     put_channels(together, r.beats, kSignals, kVehicles, lane, 0, rows);
-    smooth_forces(rows, none);
+    if (!r.clamped()) smooth_forces(rows, none);
     if (r.log.power) put_channels(metered_together, r.beats, kMetered, kVehicles, lane, kBattery, rows);
   }
   return result;
@@ -334,7 +360,7 @@ std::vector<ImuResidual> ResetPrediction::imu_residuals(const VehicleHypothesis&
   const Replay seen = replay({&vehicle});
   std::vector<ImuResidual> list;
   for (std::size_t k = 0; !seen.diverged[0] && k < r.intervals(); ++k) {
-    const auto sample = r.smoother.imu_sample(r.end_s[k] - r.interval_s(k) / 2);
+    const auto sample = r.smoother->imu_sample(r.end_s[k] - r.interval_s(k) / 2);
     if (!sample || !r.valid[k] || r.beat[k] < kSpinUpBeats) continue;
     if (!list.empty() && list.back().sample == *sample) continue;  // a gap of the IMU, cut into pieces
     ImuResidual rest{*sample, r.force_m_s2[k], Eigen::Vector3d::Zero()};
@@ -460,6 +486,7 @@ void ResetPrediction::forget() const {
 }
 
 std::shared_ptr<const PredictedFlight> ResetPrediction::corrected(const EffectValues& given) const {
+  if (recording_.clamped()) return {std::shared_ptr<const PredictedFlight>(), this};  // it has none of these sensors
   EffectValues sensors = given;
   for (const std::string& id : recording_.log.header.changes.without) sensors.erase(id);
   {

@@ -70,7 +70,7 @@ std::vector<StreamRow> differences(const Recording& r, const std::vector<double>
     row.valid = true;
     row.path_m_s2 = (mean(j + kSpan, 0) - 2 * mean(j, 0) + mean(j - kSpan, 0)) / (span_s * span_s);
     // in W, where an accumulated drift stays constant while the body turns
-    row.rotate_rad_s = r.smoother.at(r.regimes[j].t_s).attitude.conjugate() *
+    row.rotate_rad_s = r.smoother->at(r.regimes[j].t_s).attitude.conjugate() *
                        Vector3d((mean(j + kSpan, 3) - mean(j - kSpan, 3)) / (2 * span_s));
     sum += row.rotate_rad_s;
     n += 1;
@@ -83,11 +83,11 @@ std::vector<StreamRow> differences(const Recording& r, const std::vector<double>
 }  // namespace
 
 std::vector<StreamRow> stream_rows(const Recording& r) {
-  const Vector3d bias = r.smoother.gyro_bias_rad_s((r.begin_s + r.last_s) / 2);
+  const Vector3d bias = r.smoother->gyro_bias_rad_s((r.begin_s + r.last_s) / 2);
   std::vector<Vector3d> turn;
   double from_s = r.begin_s;
   for (std::size_t k = 0; k < r.intervals(); ++k) {
-    turn.push_back(r.smoother.mean_rate_rad_s(from_s, r.end_s[k]) * r.interval_s(k) - bias * r.interval_s(k));
+    turn.push_back(r.smoother->mean_rate_rad_s(from_s, r.end_s[k]) * r.interval_s(k) - bias * r.interval_s(k));
     from_s = r.end_s[k];
   }
   const Reckoned x = reckon(r, r.force_m_s2, turn, r.world.gravity_m_s2);
@@ -95,12 +95,13 @@ std::vector<StreamRow> stream_rows(const Recording& r) {
   std::vector<double> pose_s, samples;
   for (const flightlog::PoseReading& seen : flightlog::pose_readings(r.log)) {
     const double t_s = seen.t_s;
-    if (t_s < x.t_s.front() || t_s >= x.t_s.back() || t_s < r.smoother.begin_s() || t_s > r.smoother.end_s()) continue;
+    if (t_s < x.t_s.front() || t_s >= x.t_s.back() || t_s < r.smoother->begin_s() || t_s > r.smoother->end_s())
+      continue;
     const std::size_t k = flightlog::last_not_after(x.t_s, t_s);
     const double dt = t_s - x.t_s[k], share = dt / (x.t_s[k + 1] - x.t_s[k]);
     const Vector3d a = (x.velocity_m_s[k + 1] - x.velocity_m_s[k]) / (x.t_s[k + 1] - x.t_s[k]);
     const Quaterniond reckoned = x.attitude[k].slerp(share, x.attitude[k + 1]);
-    const Vector3d path = seen.position_m + r.smoother.at(t_s).attitude * arm -
+    const Vector3d path = seen.position_m + r.smoother->at(t_s).attitude * arm -
                           (x.position_m[k] + dt * x.velocity_m_s[k] + dt * dt / 2 * a);
     const Vector3d off = flightlog::logarithm(seen.attitude() * reckoned.conjugate());
     pose_s.push_back(t_s);

@@ -53,7 +53,7 @@ TEST(Recording, KnowsNoMotionWhereThereIsNoPose) {
     ASSERT_EQ(r.intervals(), whole.intervals());
     int unknown = 0;
     for (std::size_t k = 0; k < r.intervals(); ++k) {
-      const bool known = r.end_s[k] > r.smoother.begin_s() && r.end_s[k] - r.interval_s(k) < r.smoother.end_s();
+      const bool known = r.end_s[k] > r.smoother->begin_s() && r.end_s[k] - r.interval_s(k) < r.smoother->end_s();
       unknown += known ? 0 : 1;
       if (!known) EXPECT_FALSE(r.valid[k]) << moved_s << " s: " << r.end_s[k];
     }

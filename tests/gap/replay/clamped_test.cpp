@@ -1,0 +1,106 @@
+// Replays of a clamped robot, against a simulation of another kind: its torso weighs tons and flies freely, so that it
+// shows what the wings do to it by Newton's law.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "flappy/batch.hpp"
+#include "flappy/vehicle_file.hpp"
+#include "flightlog/check/data_faults.hpp"
+#include "gap/replay/reset_prediction.hpp"
+#include "model/derive.hpp"
+
+namespace flappy::gap {
+namespace {
+
+constexpr double kTons = 1e5, kDuration_s = 1.5;
+constexpr int kStepsPerSample = 5;
+
+model::Vehicle vehicle() { return model::read_vehicle(FLAPPY_SOURCE_DIR "/configs/vehicles/hummingbird_nominal.toml"); }
+
+/// Strokes of both sides, and a difference, a bias and a split cycle that change.
+std::pair<double, double> volts(double t_s, double flapping_Hz) {
+  const double phase = 2 * std::numbers::pi * flapping_Hz * t_s, amplitude = 9 + std::sin(4 * t_s);
+  return {(amplitude + 0.5) * std::cos(phase) + 0.3,
+          (amplitude - 0.5) * std::cos(phase) + 0.3 + 0.4 * std::sin(2 * phase)};
+}
+
+/// `heavy`: simulated in single steps; forces of the wings, from its motion, are means over the samples' intervals.
+flightlog::FlightLog clamped_log(const model::Vehicle& nominal) {
+  model::Vehicle heavy = nominal;
+  heavy.torso.mass_kg *= kTons;
+  heavy.torso.com_m = {0, 0, 0};
+  const double inertia = kTons * nominal.torso.inertia_kg_m2.xx;
+  heavy.torso.inertia_kg_m2 = {inertia, inertia, inertia, 0, 0, 0};
+  heavy.driver.hold_s = kPredictionStep_s;
+  sim::World world;
+  world.gravity_m_s2 = 0;
+  sim::Batch<double> batch(1, heavy, {kPredictionStep_s, 1, world, {}});
+  batch.reset(0, {});
+  flightlog::FlightLog log;
+  log.header.vehicle = "hummingbird_nominal.toml";
+  log.header.flapping_Hz = nominal.driver.flapping_Hz;
+  log.header.gravity_m_s2 = 0;
+  log.header.rig = {1 / (kStepsPerSample * kPredictionStep_s), 0, {0.01, 0, -0.02}, {0, 1, 0, 0}, 1e-3, 1e-5};
+  auto& f = log.forces.emplace();
+  sim::FlapperState before = batch.state(0);
+  const int steps = static_cast<int>(std::lround(kDuration_s / kPredictionStep_s));
+  for (int n = 0; n < steps; ++n) {
+    const double t_s = n * kPredictionStep_s;
+    const auto [left, right] = volts(t_s, log.header.flapping_Hz);
+    log.command.t_s.push_back(t_s), log.command.left_voltage_V.push_back(left),
+        log.command.right_voltage_V.push_back(right);
+    batch.set_voltages(0, left, right);
+    batch.step(1);
+    if ((n + 1) % kStepsPerSample != 0) continue;
+    const sim::FlapperState now = batch.state(0);
+    const double dt = kStepsPerSample * kPredictionStep_s;
+    Eigen::Vector3d force, moment;
+    for (int i = 0; i < 3; ++i) {
+      force[i] = heavy.torso.mass_kg * (now.velocity_m_s[i] - before.velocity_m_s[i]) / dt;
+      moment[i] = inertia * (now.body_rate_rad_s[i] - before.body_rate_rad_s[i]) / dt;
+    }
+    before = now;
+    // the sensor's y and z point to the other side, and it sits off the origin
+    const Eigen::Vector3d about = moment - Eigen::Vector3d(log.header.rig->position_m.data()).cross(force);
+    f.t_s.push_back(t_s + kPredictionStep_s - dt / 2);
+    f.force_x_N.push_back(force.x()), f.force_y_N.push_back(-force.y()), f.force_z_N.push_back(-force.z());
+    f.moment_x_Nm.push_back(about.x()), f.moment_y_Nm.push_back(-about.y()), f.moment_z_Nm.push_back(-about.z());
+  }
+  return log;
+}
+
+TEST(Clamped, PredictsWhatTheWingsDoToTheStand) {
+  const model::Vehicle nominal = vehicle();
+  const ResetPrediction flight(Recording("stand", clamped_log(nominal), nominal));
+  EXPECT_GT(flight.beats(), 40u);
+  const VehicleHypothesis robot{nominal, 0};
+  const Rows predicted = flight.predict({&robot})[0];
+  ASSERT_FALSE(predicted.empty());
+  for (const int channel : {kAngularAccelerationX, kAngularAccelerationY, kAngularAccelerationZ, kSpecificForceX,
+                            kSpecificForceY, kSpecificForceZ}) {
+    double rest = 0, signal = 0;
+    for (std::size_t j = 0; j < flight.beats(); ++j) {
+      if (!flight.covers(j, channel)) continue;
+      for (std::size_t c = 0; c < kCoefficients; ++c) {
+        const std::size_t i = row_of_mean(j, channel) + c;
+        rest += std::pow(flight.measured()[i] - predicted[i], 2), signal += std::pow(flight.measured()[i], 2);
+      }
+    }
+    EXPECT_GT(signal, 0) << channel_name(channel);
+    EXPECT_LT(std::sqrt(rest / signal), 0.01) << channel_name(channel);
+  }
+  EXPECT_FALSE(flight.covers(30, kPathX));
+  EXPECT_FALSE(flight.covers(30, kStrokeLeft)) << "not filmed";
+  EXPECT_TRUE(flight.covers(30, kSpecificForceZ));
+}
+
+TEST(Clamped, IsCheckedByItsForces) {
+  const model::Vehicle nominal = vehicle();
+  const flightlog::FlightLog log = clamped_log(nominal);
+  EXPECT_EQ(flightlog::data_faults(log, "stand").size(), 1u) << "1.5 s are too short, and nothing else is wrong";
+}
+
+}  // namespace
+}  // namespace flappy::gap
