@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "flightlog/import/clock.hpp"
+#include "flightlog/import/recorded_units.hpp"
 #include "flightlog/import/sources.hpp"
 #include "flightlog/stream_statistics.hpp"
 #include "io/log.hpp"
@@ -72,6 +73,33 @@ const std::vector<double>& field_of(const Channel& channel, const io::Table& tab
   return field_of(channel, table, key, fields.front());
 }
 
+/// The name of the field that a channel has of those that the mapping gives.
+const std::string& given_name(const Channel& channel, const FieldNames& fields) {
+  const auto found = std::ranges::find_if(fields, [&](const std::string& field) { return channel.column(field); });
+  return found == fields.end() ? fields.front() : *found;
+}
+
+/// The factor from a field to its column: as the mapping says, else by the unit that the recording says.
+double scale_of(const Channel& channel, const io::Table& columns, const ColumnMapping& c) {
+  if (c.scale) return *c.scale;
+  const std::string& field = given_name(channel, c.fields);
+  const std::string unit = channel.unit(field);
+  const std::string_view quantity = quantity_of(c.column);
+  if (unit.empty() || quantity.empty()) return 1;
+  const auto known = recorded_unit(unit);
+  if (!known || known->suffix != quantity)
+    columns.fail(c.column, "\"" + field + "\" is in " + io::shortened(unit),
+                 known ? "a field of another unit" : "its factor to SI as scale." + c.column);
+  return known->factor;
+}
+
+/// The unit of the times in ns: as the mapping says, else as the recording does, else a second.
+double time_unit_ns(const Channel& channel, const StreamMapping& s) {
+  if (s.time_unit_ns) return *s.time_unit_ns;
+  const auto unit = recorded_unit(channel.unit(s.time_fields.front()));
+  return 1e9 * (unit && unit->suffix == "_s" ? unit->factor : 1);
+}
+
 /// The unit ("s", "ms", "us" or "ns") in which `value` lies between `least_s` and `most_s`; empty where no unit fits.
 std::string unit_for(double value, double least_s, double most_s) {
   for (const auto& [unit, seconds] :
@@ -90,26 +118,32 @@ void require_unit(const Channel& channel, const StreamMapping& s) {
   constexpr double kLatest_s = 4.1e9;                    // the year 2100
   constexpr double kLongest_s = 10, kShortest_s = 1e-6;  // mean interval of samples
   constexpr double kTail = 0.05;                         // share of the times at either end that is ignored
-  std::vector<double> times = field_of(channel, s.table, "time_field", s.time_field);
+  std::vector<double> times = field_of(channel, s.table, "time_field", s.time_fields.front());
   std::erase_if(times, [](double t) { return !std::isfinite(t); });
-  if (times.size() < 2) return;
+  if (times.size() < 2 || s.time_fields.size() > 1) return;
   const double low = io::quantile(times, kTail), middle = std::abs(io::median(times)),
                high = io::quantile(times, 1 - kTail);
   const double step = (high - low) / ((1 - 2 * kTail) * static_cast<double>(times.size() - 1)),
-               unit_s = 1e-9 * s.time_unit_ns;
+               unit_s = 1e-9 * time_unit_ns(channel, s);
   if (middle * unit_s > kLatest_s)
-    refuse_unit(s, "times of \"" + s.time_field + "\" reach " + io::format("%.3g", middle * unit_s) + " s",
+    refuse_unit(s, "times of \"" + s.time_fields.front() + "\" reach " + io::format("%.3g", middle * unit_s) + " s",
                 unit_for(middle, 0, kLatest_s));
   if (step > 0 && ((step * unit_s > kLongest_s && !is_optional(s)) || step * unit_s < kShortest_s))
-    refuse_unit(s, "samples are " + io::format("%.2g", step * unit_s) + " s apart by \"" + s.time_field + "\"",
+    refuse_unit(s, "samples are " + io::format("%.2g", step * unit_s) + " s apart by \"" + s.time_fields.front() + "\"",
                 unit_for(step, 2e-5, 1));
 }
 
 std::vector<std::int64_t> field_times(const Channel& channel, const StreamMapping& s) {
+  const double unit_ns = time_unit_ns(channel, s);
   std::vector<std::int64_t> times;
-  for (const double t : field_of(channel, s.table, "time_field", s.time_field)) {
-    const double t_ns = t * s.time_unit_ns;
-    times.push_back(std::abs(t_ns) < kLatest_ns ? std::llround(t_ns) : kNoTime);
+  for (const std::string& field : s.time_fields) {  // each rounded alone: a date has no place for ns beside it
+    const std::vector<double>& part = field_of(channel, s.table, "time_field", field);
+    times.resize(part.size());
+    for (std::size_t i = 0; i < part.size(); ++i) {
+      const double t_ns = part[i] * unit_ns;
+      if (!(std::abs(t_ns) < kLatest_ns)) times[i] = kNoTime;
+      else if (times[i] != kNoTime) times[i] += std::llround(t_ns);
+    }
   }
   return times;
 }
@@ -486,17 +520,19 @@ Stream read_stream(const Channels& channels, const StreamMapping& mapping, const
   for (const ColumnMapping& c : mapping.columns) {
     const io::Table columns = mapping.table.table("columns");
     Column column;
-    if (c.channel == mapping.channel) {
+    const bool own_channel = c.channel == mapping.channel;
+    const Channel& other = own_channel ? channel : channel_of(channels, mapping, c.channel, "from");
+    if (own_channel) {
       column = field_of(channel, columns, c.column, c.fields);
     } else {
-      const Channel& other = channel_of(channels, mapping, c.channel, "from");
       const std::vector<double>& values = field_of(other, columns, c.column, c.fields);
       for (const std::size_t row : last_rows(own.t_ns, timed(other, mapping, clocks).t_ns))
         column.push_back(row < values.size() ? values[row] : std::numeric_limits<double>::quiet_NaN());
     }
+    const double scale = scale_of(other, columns, c);
     for (std::size_t i = 0; i < column.size(); ++i) {
       if (is_not_measured(column[i]) && !s.not_measured[i]) s.not_measured[i] = &c;
-      column[i] = c.scale * column[i] + c.offset;
+      column[i] = scale * column[i] + c.offset;
     }
     s.columns[c.column] = std::move(column);
   }
@@ -623,7 +659,7 @@ std::string report_text(const ImportReport& report) {
 
 Imported import_recording(const std::vector<std::filesystem::path>& files, const Mapping& mapping,
                           const std::filesystem::path& out) {
-  Channels channels(mapping.wanted());
+  Channels channels(mapping.wanted(), mapping.wanted_times());
   std::vector<std::string> warnings;
   const auto log_warnings = [&] {
     for (const std::string& warning : warnings) io::log(io::LogLevel::warning, warning);

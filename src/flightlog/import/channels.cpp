@@ -47,24 +47,38 @@ std::vector<std::string> Channel::fields() const {
   return list;
 }
 
-const std::set<std::string>* Channels::wanted_fields(const std::string& channel) const {
-  auto wanted = wanted_.find(channel);
-  if (wanted == wanted_.end() && channel.ends_with(kFirst))
-    wanted = wanted_.find(channel.substr(0, channel.size() - kFirst.size()));
-  if (wanted == wanted_.end()) wanted = wanted_.find(kOnlyChannel);
-  return wanted == wanted_.end() ? nullptr : &wanted->second;
+std::string Channel::unit(std::string_view field) const {
+  const auto found = units_.find(field);
+  return found == units_.end() ? "" : found->second;
+}
+
+const std::set<std::string>* Channels::of_channel(const Wanted& wanted, const std::string& channel) {
+  auto found = wanted.find(channel);
+  if (found == wanted.end() && channel.ends_with(kFirst))
+    found = wanted.find(channel.substr(0, channel.size() - kFirst.size()));
+  if (found == wanted.end()) found = wanted.find(kOnlyChannel);
+  return found == wanted.end() ? nullptr : &found->second;
+}
+
+bool Channels::wants_time(const std::string& channel, const std::string& field) const {
+  const auto* fields = of_channel(times_, channel);
+  return fields && fields->contains(field);
+}
+
+void Channels::add_unit(const std::string& channel, const std::string& field, const std::string& unit) {
+  if (!unit.empty()) channels_.at(channel).add_unit(field, unit);
 }
 
 bool Channels::wants(const std::string& channel, const std::string& field) const {
-  const auto* fields = wanted_fields(channel);
+  const auto* fields = wanted(channel);
   return wanted_.empty() || (fields && (fields->empty() || fields->contains(field)));
 }
 
 void Channels::add(const std::string& channel, const std::vector<std::string>& fields) {
   auto found = channels_.find(channel);
   if (found == channels_.end()) {
-    const auto* wanted = wanted_fields(channel);
-    found = channels_.emplace(channel, Channel(wanted ? *wanted : std::set<std::string>())).first;
+    const auto* kept = wanted(channel);
+    found = channels_.emplace(channel, Channel(kept ? *kept : std::set<std::string>())).first;
   }
   for (const std::string& field : fields)
     if (!field.empty()) found->second.add(field);

@@ -48,6 +48,9 @@ class Channel {
   const std::vector<std::int64_t>& stamp_ns() const { return stamp_ns_; }
   /// One value for each row, NaN where the row lacks it; null where the field is unknown or not wanted.
   const std::vector<double>* column(std::string_view field) const;
+  /// What the recording says of a field's unit; empty where it says nothing.
+  std::string unit(std::string_view field) const;
+  void add_unit(const std::string& field, const std::string& unit) { units_[field] = unit; }
   /// Names of all fields, wanted or not.
   std::vector<std::string> fields() const;
 
@@ -58,17 +61,23 @@ class Channel {
   std::set<std::string> wanted_;
   std::vector<std::int64_t> received_ns_, stamp_ns_;
   std::map<std::string, std::size_t, std::less<>> slots_;
+  std::map<std::string, std::string, std::less<>> units_;
   std::vector<std::vector<double>> columns_;
   std::vector<std::pair<std::string, std::size_t>> order_;  ///< fields and slots of the last row; the next is alike
 };
 
 class Channels {
  public:
-  /// Keeps only wanted channels and fields; nothing given: all.
-  explicit Channels(Wanted wanted = {}) : wanted_(std::move(wanted)) {}
+  /// Keeps only wanted channels and fields; nothing given: all. `times` are those of them that are times.
+  explicit Channels(Wanted wanted = {}, Wanted times = {}) : wanted_(std::move(wanted)), times_(std::move(times)) {}
 
-  bool wants(const std::string& channel) const { return wanted_.empty() || wanted_fields(channel) != nullptr; }
+  bool wants(const std::string& channel) const { return wanted_.empty() || wanted(channel) != nullptr; }
   bool wants(const std::string& channel, const std::string& field) const;
+  /// The wanted fields of a channel: null where it is not wanted, empty where all are.
+  const std::set<std::string>* wanted(const std::string& channel) const { return of_channel(wanted_, channel); }
+  bool wants_time(const std::string& channel, const std::string& field) const;
+  /// Says the unit of a field of a channel that is known already; empty: not said.
+  void add_unit(const std::string& channel, const std::string& field, const std::string& unit);
   /// Registers a channel and its fields even if no row of it ever comes. Empty field names are ignored.
   void add(const std::string& channel, const std::vector<std::string>& fields = {});
   void add(const std::string& channel, std::int64_t received_ns, std::int64_t stamp_ns, const Row& row);
@@ -77,10 +86,9 @@ class Channels {
   std::vector<std::string> names() const;
 
  private:
-  /// Null where the channel is not wanted; empty where all its fields are.
-  const std::set<std::string>* wanted_fields(const std::string& channel) const;
+  static const std::set<std::string>* of_channel(const Wanted& wanted, const std::string& channel);
 
-  Wanted wanted_;
+  Wanted wanted_, times_;
   std::map<std::string, Channel> channels_;
 };
 

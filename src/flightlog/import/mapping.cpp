@@ -105,7 +105,7 @@ void read_columns(const StreamKeys& keys, StreamMapping& stream) {
       continue;
     }
     ColumnMapping column{name, stream.channel, read_field(columns, name)};
-    if (scale) column.scale = scale->number_or(name, 1);
+    if (scale && scale->has(name)) column.scale = scale->number(name);
     if (offset) column.offset = offset->number_or(name, 0);
     if (from) column.channel = from->string_or(name, stream.channel);
     stream.columns.push_back(std::move(column));
@@ -140,9 +140,12 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
   const std::string time = table.choice_or("time", "stamp", {"stamp", "received", "field"});
   s.time = time == "stamp" ? TimeOf::stamp : time == "received" ? TimeOf::received : TimeOf::field;
   if (s.time == TimeOf::field) {
-    s.time_field = table.string("time_field");
+    s.time_fields = read_field(table, "time_field");
+    if (s.time_fields.size() > 2)
+      table.fail("time_field", "has more than two fields", "a field, or one of the date and one of the time of day");
+    const bool said = table.has("time_unit");
     const std::string unit = table.choice_or("time_unit", "s", {"s", "ms", "us", "ns"});
-    s.time_unit_ns = unit == "s" ? 1e9 : unit == "ms" ? 1e6 : unit == "us" ? 1e3 : 1;
+    if (said) s.time_unit_ns = unit == "s" ? 1e9 : unit == "ms" ? 1e6 : unit == "us" ? 1e3 : 1;
   } else {
     for (const char* key : {"time_field", "time_unit"})
       if (table.has(key)) table.fail(key, "is given with time = \"" + time + "\"", "time = \"field\"");
@@ -204,15 +207,24 @@ Wanted Mapping::wanted() const {
   Wanted wanted;
   for (const StreamMapping& s : streams) {
     std::set<std::string>& own = wanted[s.channel];
-    if (!s.time_field.empty()) own.insert(s.time_field);
+    own.insert(s.time_fields.begin(), s.time_fields.end());
     if (!s.sequence.empty()) own.insert(s.sequence);
     own.insert(s.flown_fields.begin(), s.flown_fields.end());
     for (const ColumnMapping& c : s.columns) {
       wanted[c.channel].insert(c.fields.begin(), c.fields.end());
-      if (!s.time_field.empty()) wanted[c.channel].insert(s.time_field);
+      wanted[c.channel].insert(s.time_fields.begin(), s.time_fields.end());
     }
   }
   return wanted;
+}
+
+Wanted Mapping::wanted_times() const {
+  Wanted times;
+  for (const StreamMapping& s : streams) {
+    times[s.channel].insert(s.time_fields.begin(), s.time_fields.end());
+    for (const ColumnMapping& c : s.columns) times[c.channel].insert(s.time_fields.begin(), s.time_fields.end());
+  }
+  return times;
 }
 
 Mapping read_mapping(const std::filesystem::path& path, const std::vector<std::string>& overrides) {

@@ -20,15 +20,16 @@
 //   channel = "/wing_input"                  # a topic; of a CSV, its file's stem; "*": the only channel
 //   inputs = ["left_flap", "tail"]           # optional: columns in place of voltages; then [imu], flapping_Hz optional
 //   time = "stamp"                           # default; "received", or "field"
-//   time_field = "timestamp"                 # the field of the time, with time = "field"
-//   time_unit = "us"                         # its unit: "s" (default), "ms", "us", "ns"
+//   time_field = "timestamp"                 # the field of the time, with time = "field"; or two: ["date", "time"]
+//   time_unit = "us"                         # its unit: "s", "ms", "us", "ns"; default: as the table says, else "s"
 //   clock = "robot"                          # the clock of the stamps; "receiver" (default): of times of receipt
 //   late_s = 0.02                            # default; late: delayed by more than this beyond the stream's least
 //   sequence = "tick"                        # optional: field that counts samples; else the rate gives the lost ones
 //   [command.columns]                        # the field for each column of command.csv
 //   left_voltage_V = "left_voltage_v"
 //   right_voltage_V = "right_voltage_v"
-//   [command.scale]                          # optional, like [command.offset]: column = scale x field + offset
+//   [command.scale]                          # optional, like [command.offset]: column = scale x field + offset;
+//                                            # default: by the unit that a table's row of units says, else 1
 //   left_voltage_V = 7.4
 //   [command.offset]
 //   left_voltage_V = 0.0
@@ -94,15 +95,16 @@ using FieldNames = std::vector<std::string>;
 struct ColumnMapping {
   std::string column, channel;
   FieldNames fields;
-  double scale = 1, offset = 0;
+  std::optional<double> scale;  ///< none: by the unit that the recording says, else 1
+  double offset = 0;
 };
 
 struct StreamMapping {
   std::string name, channel;  ///< "imu", "/imu"
   TimeOf time = TimeOf::stamp;
-  std::string time_field;
-  double time_unit_ns = 1e9;
-  std::string clock;  ///< kReceiver, or a name in Mapping::offsets_s or of a clock to measure
+  FieldNames time_fields;              ///< with TimeOf::field: one, or two whose sum is the time: date and time of day
+  std::optional<double> time_unit_ns;  ///< none: as the recording says, else 1e9
+  std::string clock;                   ///< kReceiver, or a name in Mapping::offsets_s or of a clock to measure
   double late_s = 0.02;
   std::string sequence;  ///< empty: none
   std::vector<ColumnMapping> columns;
@@ -125,6 +127,7 @@ struct Mapping {
   std::vector<StreamMapping> streams;       ///< command, mocap, and imu, power, wings, attitude and policy where mapped
 
   Wanted wanted() const;
+  Wanted wanted_times() const;  ///< those of them that are times
 };
 
 /// InputError "file:line:column: key: ..." for a file that is no valid mapping.

@@ -26,7 +26,7 @@ TEST(Channels, KeepRowsWhoseFieldsComeAndGo) {
 }
 
 TEST(Channels, KeepWhatIsWanted) {
-  Channels channels({{"/a", {"x"}}, {"b", {"y"}}});
+  Channels channels(Wanted{{"/a", {"x"}}, {"b", {"y"}}});
   channels.add("/a", 1, 1, {{"x", 1}, {"y", 2}});
   channels.add("/other", 1, 1, {{"x", 1}});
   channels.add("b[0]", 1, 1, {{"x", 1}, {"y", 2}});

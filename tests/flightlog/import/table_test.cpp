@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
 
 #include "refusal.hpp"
 
@@ -117,25 +118,99 @@ TEST(Table, RefusesWhatIsNone) {
   EXPECT_EQ(refusal(""), "f.csv: is empty; accepted: a line of column names, then rows of numbers");
   EXPECT_EQ(refusal("# nothing\n\n"), "f.csv: holds no table; accepted: a line of column names, then rows of numbers");
   EXPECT_EQ(refusal("0.5,9\n0.75,1\n"), "f.csv:1:1: holds numbers; accepted: a line of column names before them");
-  EXPECT_EQ(refusal("t,x,x\n0.5,9,1\n"), "f.csv:1:1: x: column name is given twice");
+  EXPECT_EQ(refusal("t,x,x\n0.5,9,1\n"), "f.csv:1:1: x: column name is given twice; accepted: \"x 1\", \"x 2\"");
+  EXPECT_EQ(refusal("go\n,a,b\nt,x,x\n0.5,9,1\n0.6,9,1\n"),
+            "f.csv:3:1: x: column name is given twice; accepted: \"a x\", \"b x\"");
   EXPECT_EQ(refusal("t,x\n0.5,9,1\n0.75,1,2\n"),
             "f.csv:2:1: 3 cells for 2 names, and no row is otherwise; accepted: rows of as many cells");
 }
 
-TEST(Table, NamesTheLineOfNamesBelowAHead) {
-  const auto refusal = [](const std::string& text) { return test::refusal([&] { read(text); }); };
-  // as Motive exports a rigid body; the last column has no name
-  EXPECT_EQ(
-      refusal("Format Version,1.23,Take Name,hover\r\n\r\n,Type,Rigid Body\r\n,ID,1\r\nt,x,\r\n0,0.5,1\r\n1,0.6,1\r\n"),
-      "f.csv:3:1: 3 cells for 4 names, and no row is otherwise; accepted: names in the first line, as made by: tail "
-      "-n +5 FILE");
-  // as QTM does: some lines of the head have as many cells as the first, and rows end with a tab
-  EXPECT_EQ(
-      refusal("FRAMES\t4\nCAMERAS\t8\nFrame\tt\tx\n1\t0.0\t5\t\n2\t0.1\t6\t\n3\t0.2\t7\t\n"),
-      "f.csv:3:1: 3 cells for 2 names, and most rows are otherwise; accepted: names in the first line, as made by: "
-      "tail -n +3 FILE");
-  // some rows of another width are left out, as ever
+TEST(Table, SkipsWhatStandsAboveTheNames) {
+  expect_rows("Recorded by hand\nRoom 3, at noon\n\nt,x\n0.5,9\n0.75,-2e-3\n");
+  expect_rows("Rate,100\nSubject,bird\nt,x\n0.5,9\n0.75,-2e-3\n");
+  expect_rows(
+      "FRAMES\t4\nCAMERAS\t8\nWHEN\t2026-05-04, "
+      "10:15:00\t12.5\nNAMES\tbird\nFrame\tt\tx\n1\t0.5\t9\t\n2\t0.75\t-2e-3\t\n");
+  expect_rows(
+      "Version,1.23,Take,hover,Rate,100\r\n\r\n,Type,Body\r\n,Name,bird\r\n,ID,1\r\nFrame,t,x,\r\n0,0.5,9,\r\n1,0.75,-"
+      "2e-3,\r\n");
+  // some rows of another width are left out, as ever, and do not become names
   EXPECT_EQ(read("t,x\n0.5,9\n0.75,1\na,b,c\n1,2,3\n").t, (std::vector<double>{0.5, 0.75}));
+  EXPECT_EQ(read("t,x\n0.5,9\nERR,overflow\n0.75,1\n0.8,1\n").x, (std::vector<double>{9, kInfinity, 1, 1}));
+}
+
+/// A channel of all fields, or of those that are wanted, some of them times.
+Channels whole(const std::string& text, const std::set<std::string>& fields = {}, Lines* warnings = nullptr) {
+  Channels channels({{"f", fields}}, {{"f", {"day", "clock"}}});
+  Lines ignored;
+  read_table(text, "f.csv", "f", channels, warnings ? *warnings : ignored);
+  return channels;
+}
+
+TEST(Table, TellsColumnsOfOneNameApart) {
+  const std::string text =
+      "Take,3\n\n,,bird,,,,box,,\n,,Rotation,,Position,,Position,,\nFrame,t,X,Y,X,Y,X,Y,\n1,0.5,1,2,3,4,5,6,\n2,0.6,1,"
+      "2,3,4,5,6,\n";
+  const std::set<std::string> said = {"t", "Rotation X", "X 2", "box Y", "bird Position Y"};
+  const Channels channels = whole(text, said);
+  const Channel& f = *channels.find("f");
+  EXPECT_EQ(f.column("t")->at(0), 0.5);
+  EXPECT_EQ(f.column("Rotation X")->at(0), 1);
+  EXPECT_EQ(f.column("X 2")->at(0), 3);
+  EXPECT_EQ(f.column("bird Position Y")->at(0), 4);
+  EXPECT_EQ(f.column("box Y")->at(0), 6);
+  // what is offered is each column's own
+  EXPECT_EQ(whole(text).find("f")->fields(),
+            (Lines{"Frame", "Rotation X", "Rotation Y", "bird Position X", "bird Position Y", "box X", "box Y", "t"}));
+  EXPECT_EQ(test::refusal([&] { whole(text, {"Position X"}); }),
+            "f.csv:5:1: Position X: column name is given twice; accepted: \"bird Position X\", \"box X\"");
+  // a name that looks like a place is a name
+  EXPECT_EQ(whole("x,x,x 2\n1,2,3\n", {"x 2"}).find("f")->column("x 2")->at(0), 3);
+}
+
+TEST(Table, TakesARowOfUnits) {
+  expect_rows("t,x\ns,mm\n0.5,9\n0.75,-2e-3\n");
+  expect_rows("Objects\n100\n,,bird,\nFrame,t,x,\n,s,mm,\n1,0.5,9,\n2,0.75,-2e-3,\n");
+  EXPECT_EQ(whole("t,x\ns,[mm]\n0.5,9\n", {"t", "x"}).find("f")->unit("x"), "[mm]");
+  EXPECT_EQ(whole("t,x\n0.5,9\n", {"t", "x"}).find("f")->unit("x"), "");
+}
+
+TEST(Table, ReadsListsInCells) {
+  const std::string text = "t,p,q\n0.5,\"[0.1, -0.2]\",[1 2 3]\n0.6,,\"(4; 5.5; 6)\"\n0.7,\"[0.3]\",7\n";
+  Lines warnings;
+  const Channels channels = whole(text, {"t", "p[1]", "q[2]"}, &warnings);
+  const std::vector<double>& p = *channels.find("f")->column("p[1]");
+  EXPECT_EQ(p[0], -0.2);
+  EXPECT_TRUE(std::isnan(p[1]));
+  EXPECT_EQ(p[2], kInfinity);
+  EXPECT_EQ(*channels.find("f")->column("q[2]"), (std::vector<double>{3, 6, kInfinity}));
+  EXPECT_EQ(warnings, (Lines{"f.csv: p[1]: 1 of 3 cells are no numbers, in line 4: \"[0.3]\"",
+                             "f.csv: q[2]: 1 of 3 cells are no numbers, in line 4: \"7\""}));
+  EXPECT_EQ(whole("t,p[0]\n0.5,3\n", {"p[0]"}).find("f")->column("p[0]")->at(0), 3);  // a name, not an element
+}
+
+TEST(Table, ReadsDatesAndTimesOfDayWhereATimeIsWanted) {
+  const auto days = [](const std::string& cell) {
+    return whole("day;x\n" + cell + ";1\n", {"day", "x"}).find("f")->column("day")->at(0);
+  };
+  // 2026-05-04 is 20,577 days after 1970-01-01 (date -u -d 2026-05-04 +%s)
+  constexpr double kMidnight = 1777852800;
+  EXPECT_EQ(days("2026-05-04"), kMidnight);
+  EXPECT_EQ(days("2026-05-04T10:15:00"), kMidnight + 36900);
+  EXPECT_EQ(days("2026-05-04 10:15:00.25"), kMidnight + 36900.25);
+  EXPECT_EQ(days("2026-05-04T10:15:00,5Z"), kMidnight + 36900.5);
+  EXPECT_EQ(days("2026-05-04T10:15+02:00"), kMidnight + 36900 - 7200);
+  EXPECT_EQ(days("2026-05-04 10:15:00 -0330"), kMidnight + 36900 + 12600);
+  EXPECT_EQ(days("10:15:00.125"), 36900.125);
+  EXPECT_EQ(days("1777852800.5"), kMidnight + 0.5);
+  for (const char* none : {"2026-13-04", "2026-02-30", "2026-05-04T10", "2026-05-04T10:61", "2026-05-04T10:15+2",
+                           "04.05.2026", "10:15:00 AM"})
+    EXPECT_EQ(days(none), kInfinity) << none;
+  // two columns; and where no time is wanted, a date is no number
+  const Channels two = whole("day clock x\n2026-05-04 10:15:00.5 1\n", {"day", "clock", "x"});
+  EXPECT_EQ(two.find("f")->column("day")->at(0), kMidnight);
+  EXPECT_EQ(two.find("f")->column("clock")->at(0), 36900.5);
+  EXPECT_EQ(whole("t,x\n1,2026-05-04\n", {"x"}).find("f")->column("x")->at(0), kInfinity);
 }
 
 }  // namespace
