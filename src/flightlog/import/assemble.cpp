@@ -10,6 +10,7 @@
 #include "flightlog/import/clock.hpp"
 #include "flightlog/import/recorded_units.hpp"
 #include "flightlog/import/sources.hpp"
+#include "flightlog/rotation.hpp"
 #include "flightlog/stream_statistics.hpp"
 #include "io/log.hpp"
 #include "io/statistics.hpp"
@@ -71,6 +72,29 @@ const std::vector<double>& field_of(const Channel& channel, const io::Table& tab
   for (const std::string& field : fields)
     if (const auto* found = channel.column(field)) return *found;
   return field_of(channel, table, key, fields.front());
+}
+
+/// The field of a column that a body of an export has. InputError for a body that is not there, and where the file does
+/// not say which way its axes point, or what its rotations are.
+const std::vector<double>& field_of_body(const Channel& channel, const StreamMapping& s, const std::string& field) {
+  const Capture* capture = channel.capture();
+  if (!capture) s.table.fail("body", "is given for a table that no motion-capture program wrote", "columns");
+  if (std::ranges::find(capture->bodies, s.body) == capture->bodies.end())
+    s.table.fail("body",
+                 "\"" + s.body + "\" is no rigid body of the recording" +
+                     (std::ranges::find(capture->markers, s.body) == capture->markers.end() ? "" : ", but a marker"),
+                 listed(capture->bodies) + io::did_you_mean(s.body, capture->bodies));
+  const std::string which = capture->program + "'s files do not say which axis ";
+  if (!capture->says_up && !s.says_world)
+    s.table.fail("world", "is missing: " + which + "is up", "\"y_up\" (the program's default), \"enu\" (z up)");
+  if (!capture->says_up && !s.says_axes)
+    s.table.fail("frame", "is missing: " + which + "of the body is forward",
+                 "\"fur\" (x forward, y up), \"luf\" (z forward, y up), \"flu\" (x forward, z up), \"frd\"");
+  if (const auto* found = channel.column(field)) return *found;
+  if (s.rotation.empty())
+    s.table.fail("rotation", "is missing: the file does not say what the three numbers of its rotation are",
+                 "\"vector\" (axis times angle), or axes of angles in turn, as \"xyz\"");
+  s.table.fail("rotation", "is given, but the file says what its rotation is", "no rotation");
 }
 
 /// The name of the field that a channel has of those that the mapping gives.
@@ -253,11 +277,43 @@ std::vector<std::size_t> last_rows(const std::vector<std::int64_t>& times, const
 
 struct Quaternion {
   double w, x, y, z;
-  Quaternion operator*(const Quaternion& q) const {
+  constexpr Quaternion operator*(const Quaternion& q) const {
     return {w * q.w - x * q.x - y * q.y - z * q.z, w * q.x + x * q.w + y * q.z - z * q.y,
             w * q.y - x * q.z + y * q.w + z * q.x, w * q.z + x * q.y - y * q.x + z * q.w};
   }
 };
+
+constexpr double kHalfRoot = std::numbers::sqrt2 / 2;
+
+/// Turns the axes of a recording's world to those of W.
+constexpr Quaternion turn_of(World world) {
+  switch (world) {
+    case World::ned:
+      return {0, kHalfRoot, kHalfRoot, 0};  // north, east, down to east, north, up
+    case World::ned_x_north:
+      return {0, -1, 0, 0};  // to north, west, up
+    case World::y_up:
+      return {kHalfRoot, kHalfRoot, 0, 0};  // about x
+    case World::enu:
+      break;
+  }
+  return {1, 0, 0, 0};
+}
+
+/// Turns the axes of B to those of a recording's body.
+constexpr Quaternion turn_of(Axes axes) {
+  switch (axes) {
+    case Axes::frd:
+      return {0, 1, 0, 0};  // forward, left, up to forward, right, down
+    case Axes::fur:
+      return {kHalfRoot, -kHalfRoot, 0, 0};  // about x
+    case Axes::luf:
+      return {0.5, -0.5, -0.5, -0.5};  // x to z, y to x, z to y
+    case Axes::flu:
+      break;
+  }
+  return {1, 0, 0, 0};
+}
 
 struct Stream {
   const StreamMapping& mapping;
@@ -267,28 +323,23 @@ struct Stream {
   StreamReport report;
 
   void turn() {
-    if (mapping.frd)
+    if (mapping.axes == Axes::frd)
       for (const char* name : {"gyro_y_rad_s", "gyro_z_rad_s", "accel_y_m_s2", "accel_z_m_s2"})
         if (const auto c = columns.find(name); c != columns.end())
           for (double& value : c->second) value = -value;
-    const bool down = mapping.world != World::enu, x_north = mapping.world == World::ned_x_north;
-    if (!columns.contains("qw") || (!mapping.frd && !down)) return;
-    const bool placed = columns.contains("x_m");
-    Column &x = columns["x_m"], &y = columns["y_m"], &z = columns["z_m"];
+    if (!columns.contains("qw") || (mapping.axes == Axes::flu && mapping.world == World::enu)) return;
+    const Quaternion world = turn_of(mapping.world), axes = turn_of(mapping.axes);
     Column &qw = columns["qw"], &qx = columns["qx"], &qy = columns["qy"], &qz = columns["qz"];
-    constexpr double kHalf = std::numbers::sqrt2 / 2;
-    constexpr Quaternion kFromNed{0, kHalf, kHalf, 0};  // north, east, down to east, north, up
-    constexpr Quaternion kToXNorth{0, -1, 0, 0};        // to north, west, up
-    constexpr Quaternion kFromFlu{0, 1, 0, 0};          // forward, left, up to forward, right, down
     for (std::size_t i = 0; i < qw.size(); ++i) {
-      Quaternion q{qw[i], qx[i], qy[i], qz[i]};
-      if (down) q = (x_north ? kToXNorth : kFromNed) * q;
-      if (mapping.frd) q = q * kFromFlu;
+      const Quaternion q = world * Quaternion{qw[i], qx[i], qy[i], qz[i]} * axes;
       qw[i] = q.w, qx[i] = q.x, qy[i] = q.y, qz[i] = q.z;
-      if (!down || !placed) continue;
-      if (x_north) y[i] = -y[i];
-      else std::swap(x[i], y[i]);
-      z[i] = -z[i];
+    }
+    if (!columns.contains("x_m")) return;
+    Column &x = columns["x_m"], &y = columns["y_m"], &z = columns["z_m"];
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      if (mapping.world == World::ned) std::swap(x[i], y[i]), z[i] = -z[i];
+      if (mapping.world == World::ned_x_north) y[i] = -y[i], z[i] = -z[i];
+      if (mapping.world == World::y_up) std::swap(y[i], z[i]), y[i] = -y[i];
     }
   }
 };
@@ -340,6 +391,21 @@ void turn_angles(Stream& s) {
     const Quaternion q = about(yaw[i], 0, 0, 1) * about(pitch[i], 0, 1, 0) * about(roll[i], 1, 0, 0);
     s.columns["qw"].push_back(q.w), s.columns["qx"].push_back(q.x);
     s.columns["qy"].push_back(q.y), s.columns["qz"].push_back(q.z);
+  }
+}
+
+/// Replaces three numbers of the rotation of a body by the quaternion, as the mapping says what they are.
+void turn_rotations(Stream& s) {
+  if (!s.columns.contains("rx_rad")) return;
+  const auto rx = s.columns.extract("rx_rad"), ry = s.columns.extract("ry_rad"), rz = s.columns.extract("rz_rad");
+  for (std::size_t i = 0; i < s.t_ns.size(); ++i) {
+    const Eigen::Vector3d r(rx.mapped()[i], ry.mapped()[i], rz.mapped()[i]);
+    Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+    if (s.mapping.rotation == "vector") q = exponential(r);
+    else
+      for (const char axis : s.mapping.rotation) q = q * exponential(r[axis - 'x'] * Eigen::Vector3d::Unit(axis - 'x'));
+    s.columns["qw"].push_back(q.w()), s.columns["qx"].push_back(q.x());
+    s.columns["qy"].push_back(q.y()), s.columns["qz"].push_back(q.z());
   }
 }
 
@@ -518,8 +584,12 @@ Stream read_stream(const Channels& channels, const StreamMapping& mapping, const
   s.report.stream = mapping.name;
   s.report.channel = mapping.channel;
   for (const ColumnMapping& c : mapping.columns) {
-    const io::Table columns = mapping.table.table("columns");
     Column column;
+    if (!mapping.body.empty()) {
+      s.columns[c.column] = field_of_body(channel, mapping, c.fields.front());
+      continue;
+    }
+    const io::Table columns = mapping.table.table("columns");
     const bool own_channel = c.channel == mapping.channel;
     const Channel& other = own_channel ? channel : channel_of(channels, mapping, c.channel, "from");
     if (own_channel) {
@@ -539,12 +609,56 @@ Stream read_stream(const Channels& channels, const StreamMapping& mapping, const
   if (mapping.time != TimeOf::received) count_delays(s, channel, clocks.quickest(mapping));
   derive_pitch(s, gravity_m_s2);
   turn_angles(s);
+  turn_rotations(s);
   const std::string& counted = mapping.sequence;
   tidy(s, counted.empty() ? nullptr : &field_of(channel, mapping.table, "sequence", counted), span, shared);
   if (s.t_ns.size() < 2 && !is_optional(mapping))
     mapping.table.fail("channel", "\"" + mapping.channel + "\" has " + usable(s.report), "at least 2 usable ones");
   s.turn();
   return s;
+}
+
+Eigen::Quaterniond attitude_of(const Columns& c, std::size_t i) {
+  return {c.at("qw")[i], c.at("qx")[i], c.at("qy")[i], c.at("qz")[i]};
+}
+
+Eigen::Quaterniond eigen_of(const Quaternion& q) { return {q.w, q.x, q.y, q.z}; }
+
+/// The angle, rad, from z of W to the mean specific force of the IMU, turned to W by the attitude `q` of each pose.
+template <typename Attitude>
+double tilt_of_force(const Stream& mocap, const Stream& imu, const Attitude& q) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  const std::vector<std::size_t> rows = last_rows(imu.t_ns, mocap.t_ns);
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    if (rows[i] < mocap.t_ns.size())
+      sum += q(rows[i]) * Eigen::Vector3d(imu.columns.at("accel_x_m_s2")[i], imu.columns.at("accel_y_m_s2")[i],
+                                          imu.columns.at("accel_z_m_s2")[i]);
+  return std::atan2(sum.head<2>().norm(), sum.z());
+}
+
+/// InputError where the axes that the mapping gives a body of an export contradict gravity: over a flight, the specific
+/// force in W is on average up, but for the change of speed by the flight's time.
+void require_up(const Stream& mocap, const Stream& imu) {
+  constexpr double kMaxTilt_rad = std::numbers::pi / 4;  // beyond, another axis is nearer to up
+  const double tilt_rad = tilt_of_force(mocap, imu, [&](std::size_t i) { return attitude_of(mocap.columns, i); });
+  if (tilt_rad < kMaxTilt_rad) return;
+  const Eigen::Quaterniond world = eigen_of(turn_of(mocap.mapping.world)), axes = eigen_of(turn_of(mocap.mapping.axes));
+  std::vector<std::string> fitting;
+  for (const auto& [world_name, w] : {std::pair("enu", World::enu), std::pair("y_up", World::y_up)})
+    for (const auto& [axes_name, a] : {std::pair("flu", Axes::flu), std::pair("frd", Axes::frd),
+                                       std::pair("fur", Axes::fur), std::pair("luf", Axes::luf)}) {
+      const auto turned = [&](std::size_t i) {
+        return eigen_of(turn_of(w)) * world.conjugate() * attitude_of(mocap.columns, i) * axes.conjugate() *
+               eigen_of(turn_of(a));
+      };
+      if (tilt_of_force(mocap, imu, turned) < kMaxTilt_rad)
+        fitting.push_back(std::string("world = \"") + world_name + "\" with frame = \"" + axes_name + "\"");
+    }
+  mocap.mapping.table.fail(
+      mocap.mapping.says_world ? "world" : "channel",
+      "the mean force on the IMU points " + io::format("%.0f", tilt_rad * 180 / std::numbers::pi) +
+          " degrees away from up",
+      "axes of the recording; by the IMU fit " + (fitting.empty() ? "none" : io::joined(fitting, " or ")));
 }
 
 void put(FlightLog& log, Stream& s, std::int64_t start_ns) {
@@ -618,6 +732,9 @@ Imported assemble(const Channels& channels, const Mapping& mapping) {
     else if (s.name == "policy") out.log.header.policy.clear();
     else out.log.header.attitude.reset();
   }
+  const auto imu = std::ranges::find(streams, "imu", [](const Stream& s) { return s.mapping.name; });
+  for (const Stream& s : streams)
+    if (!s.mapping.body.empty() && imu != streams.end()) require_up(s, *imu);
   out.report.clocks = clocks.reports();
   if (mapping.from_first) {
     out.report.start_ns = streams.front().t_ns.front();

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -36,6 +37,13 @@ inline const std::string kOnlyChannel = "*";
 /// The wanted fields of each channel; an empty set: all its fields.
 using Wanted = std::map<std::string, std::set<std::string>>;
 
+/// What an export of a motion-capture system says of itself.
+struct Capture {
+  std::string program;
+  bool says_up;  ///< whether z is up in it unless its user chose otherwise
+  std::vector<std::string> bodies, markers;
+};
+
 class Channel {
  public:
   /// Keeps the `wanted` fields; none given: all fields.
@@ -51,6 +59,9 @@ class Channel {
   /// What the recording says of a field's unit; empty where it says nothing.
   std::string unit(std::string_view field) const;
   void add_unit(const std::string& field, const std::string& unit) { units_[field] = unit; }
+  /// Null where the channel is of no motion-capture system.
+  const Capture* capture() const { return capture_ ? &*capture_ : nullptr; }
+  void describe(Capture capture) { capture_ = std::move(capture); }
   /// Names of all fields, wanted or not.
   std::vector<std::string> fields() const;
 
@@ -62,6 +73,7 @@ class Channel {
   std::vector<std::int64_t> received_ns_, stamp_ns_;
   std::map<std::string, std::size_t, std::less<>> slots_;
   std::map<std::string, std::string, std::less<>> units_;
+  std::optional<Capture> capture_;
   std::vector<std::vector<double>> columns_;
   std::vector<std::pair<std::string, std::size_t>> order_;  ///< fields and slots of the last row; the next is alike
 };
@@ -81,6 +93,8 @@ class Channels {
   /// Registers a channel and its fields even if no row of it ever comes. Empty field names are ignored.
   void add(const std::string& channel, const std::vector<std::string>& fields = {});
   void add(const std::string& channel, std::int64_t received_ns, std::int64_t stamp_ns, const Row& row);
+  /// Describes a channel that is known already.
+  void describe(const std::string& channel, Capture capture) { channels_.at(channel).describe(std::move(capture)); }
   /// The channel `name`, else `name`[0]; kOnlyChannel finds a recording's only channel. Null where there is none.
   const Channel* find(const std::string& name) const;
   std::vector<std::string> names() const;

@@ -52,6 +52,7 @@ const std::vector<StreamKeys> kStreams = {
     {"policy", {}, {}, {"numbers"}, false, false, false},
 };
 const Names kAngles = {"roll_rad", "pitch_rad", "yaw_rad"};
+const Names kRotations = {"vector", "xyz", "xzy", "yxz", "yzx", "zxy", "zyx"};
 /// In place of the pitch: acceleration in W, without gravity.
 const Names kAcceleration = {"acceleration_x_m_s2", "acceleration_y_m_s2", "acceleration_z_m_s2"};
 
@@ -72,6 +73,10 @@ StreamKeys narrowed(StreamKeys keys, const io::Table& table, bool declared_input
     keys.has_frame = keys.has_world = false;
     return keys;
   }
+  if (keys.name == "mocap" && table.has("body")) {
+    keys.columns.clear();
+    return keys;
+  }
   const auto columns = table.optional_table("columns");
   if (columns && std::ranges::any_of(kAngles, [&](const std::string& name) { return columns->has(name); })) {
     std::erase_if(keys.columns, [](const std::string& name) { return name.starts_with('q'); });
@@ -86,6 +91,19 @@ FieldNames read_field(const io::Table& table, const std::string& key) {
   FieldNames names = table.strings(key);
   if (names.empty()) table.fail(key, "is empty", "names of fields");
   return names;
+}
+
+/// The columns of a rigid body, whose fields the program's reader names.
+void read_body(StreamMapping& stream) {
+  const io::Table& table = stream.table;
+  stream.body = table.string("body");
+  if (table.has("rotation")) stream.rotation = table.choice("rotation", kRotations);
+  Names columns = {"x_m", "y_m", "z_m"};
+  for (const char* name : {"qw", "qx", "qy", "qz"})
+    if (stream.rotation.empty()) columns.emplace_back(name);
+  for (const char* name : {"rx_rad", "ry_rad", "rz_rad"})
+    if (!stream.rotation.empty()) columns.emplace_back(name);
+  for (const std::string& name : columns) stream.columns.push_back({name, stream.channel, {stream.body + "." + name}});
 }
 
 void read_columns(const StreamKeys& keys, StreamMapping& stream) {
@@ -127,7 +145,7 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
   if (keys.has_world) accepted.emplace_back("world");
   if (keys.has_rate) accepted.emplace_back("rate_hz");
   if (keys.name == "command") accepted.insert(accepted.end(), {"inputs", "flown"});
-  if (keys.name == "mocap") accepted.emplace_back("source");
+  if (keys.name == "mocap") accepted.insert(accepted.end(), {"source", "body", "rotation"});
   if (keys.name == "imu") accepted.emplace_back("gyro");
   if (keys.name == "power") accepted.emplace_back("currents");
   table.accept(accepted);
@@ -156,13 +174,32 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
                "\"" + kReceiver + "\", or time = \"stamp\"");
   s.late_s = table.number_or("late_s", s.late_s, positive(1e3));
   s.sequence = table.string_or("sequence", "");
-  if (keys.has_frame) s.frd = table.choice_or("frame", "flu", {"flu", "frd"}) == "frd";
+  const bool captured = keys.name == "mocap";
+  if (keys.has_frame) {
+    s.says_axes = table.has("frame");
+    const std::string axes =
+        table.choice_or("frame", "flu", captured ? Names{"flu", "frd", "fur", "luf"} : Names{"flu", "frd"});
+    s.axes = axes == "flu" ? Axes::flu : axes == "frd" ? Axes::frd : axes == "fur" ? Axes::fur : Axes::luf;
+  }
   if (keys.has_world) {
-    const std::string world = table.choice_or("world", "enu", {"enu", "ned", "ned_x_north"});
-    s.world = world == "enu" ? World::enu : world == "ned" ? World::ned : World::ned_x_north;
+    s.says_world = table.has("world");
+    Names worlds = {"enu", "ned", "ned_x_north"};
+    if (captured) worlds.emplace_back("y_up");
+    const std::string world = table.choice_or("world", "enu", worlds);
+    s.world = world == "enu"    ? World::enu
+              : world == "ned"  ? World::ned
+              : world == "y_up" ? World::y_up
+                                : World::ned_x_north;
   }
   s.measures_rate = keys.has_rate && !table.has("rate_hz");
-  read_columns(keys, s);
+  if (captured && table.has("body")) {
+    for (const char* key : {"columns", "scale", "offset", "from"})
+      if (table.has(key)) table.fail(key, "is given with body", "one of the two");
+    read_body(s);
+  } else {
+    if (captured && table.has("rotation")) table.fail("rotation", "is given without body", "body");
+    read_columns(keys, s);
+  }
   return s;
 }
 

@@ -43,7 +43,12 @@
 //   [mocap]                                  # keys as above; roll_rad, pitch_rad, yaw_rad may replace qw to qz
 //   world = "enu"                            # frame of position and attitude. "ned" is turned to east, north, up,
 //                                            # "ned_x_north" to north, west, up
-//   frame = "flu"                            # default; or "frd": frame of the body; turned to x forward, y left, z up
+//                                            # "y_up" (y up) to x, -z, y
+//   frame = "flu"                            # default; or "frd": frame of the body; turned to x forward, y left, z up.
+//                                            # Of mocap also "fur" (y up, z right), "luf" (x left, y up, z forward)
+//   body = "robot"                           # in place of columns: a rigid body of an export of Motive, QTM, Vicon
+//   rotation = "vector"                      # what three numbers of its rotation are, where the file does not say:
+//                                            # axis times angle, or angles about axes of the body in turn, as "xyz"
 //   rate_hz = 200                            # optional in every stream; measured if missing
 //   latency_s = 0.0                          # time used less measured instant; 0 if the stamp is that instant
 //   position_noise_m = 1e-4
@@ -88,7 +93,9 @@
 namespace flappy::flightlog {
 
 enum class TimeOf { stamp, received, field };
-enum class World { enu, ned, ned_x_north };
+enum class World { enu, ned, ned_x_north, y_up };
+/// Axes of a body: forward-left-up, forward-right-down, forward-up-right, left-up-forward.
+enum class Axes { flu, frd, fur, luf };
 
 /// Names that a field may have: the first of them that a recording has counts.
 using FieldNames = std::vector<std::string>;
@@ -109,7 +116,11 @@ struct StreamMapping {
   std::string sequence;  ///< empty: none
   std::vector<ColumnMapping> columns;
   World world = World::enu;
-  bool frd = false, measures_rate = false;
+  Axes axes = Axes::flu;
+  bool says_world = false, says_axes = false, measures_rate = false;
+  std::string body;  ///< of an export of motion capture, in place of columns; empty: none
+  std::string
+      rotation;  ///< what three numbers of its rotation are: "vector", or axes of angles, as "xyz"; empty: not said
   FieldNames flown_fields;  ///< command stream only: what is above flown_above in flight; empty: the whole log
   double flown_above = 0;
   io::Table table;  ///< the stream's table in the file, for error messages

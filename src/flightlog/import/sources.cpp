@@ -131,9 +131,7 @@ void read_bytes(const fs::path& file, const fs::path& plain, std::string_view by
   if (is_ulog(bytes)) return read_ulog(bytes, file.string(), channels, warnings);
   if (is_usdlog(bytes)) return read_usdlog(bytes, file.string(), channels, warnings);
   require_text(file, plain.extension().string(), bytes);
-  const std::string channel = plain.stem().string();
-  if (channels.wants(channel)) read_table(bytes, file.string(), channel, channels, warnings);
-  else channels.add(channel);
+  read_table(bytes, file.string(), plain.stem().string(), channels, warnings);
 }
 
 }  // namespace

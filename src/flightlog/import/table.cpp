@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 
+#include "flightlog/import/mocap_export.hpp"
 #include "flightlog/import/table_head.hpp"
 #include "flightlog/import/text_cells.hpp"
 #include "io/config.hpp"
@@ -25,13 +26,16 @@ struct LeftOut {
 
 class TableReader {
  public:
-  TableReader(std::string_view text, std::string name, std::string channel, Channels& channels)
+  /// `above` lines of the file stand before the text.
+  TableReader(std::string_view text, std::size_t above, std::string name, std::string channel, Channels& channels)
       : text_(text),
+        above_(above),
         name_(std::move(name)),
         channel_(std::move(channel)),
         channels_(channels),
-        head_(head_of(text, name_)),
-        labels_(head_.columns) {
+        head_(is_qtm(text) ? qtm_head(text, name_) : head_of(text, name_, above)),
+        labels_(head_.columns),
+        export_(mocap_export_of(text, head_, name_)) {
     std::vector<std::string> fields;
     for (std::size_t k = 0; k < head_.columns.size(); ++k) {
       fields.push_back(labels_.own(k));
@@ -41,13 +45,14 @@ class TableReader {
     const std::set<std::string>* wanted = channels_.wanted(channel_);
     const std::set<std::string> all(fields.begin(), fields.end());
     for (const std::string& field : wanted && !wanted->empty() ? *wanted : all) want(field);
-    not_numbers_.resize(row_.size());
+    if (export_) want_bodies(wanted);
+    not_numbers_.resize(cells_.size());
   }
 
   void read(std::vector<std::string>& warnings) {
     constexpr std::size_t kMaxLinesOfARow = 50;
     RowSplitter splitter(head_.separator);
-    Lines lines(text_);
+    Lines lines(text_, above_);
     std::vector<Line> row;  // lines of the current row: several if a quoted cell contains line ends
     for (auto line = lines.next(); line; line = lines.next()) {
       if (line->number <= head_.end || is_blank(line->text)) continue;
@@ -103,6 +108,23 @@ class TableReader {
     channels_.add_unit(channel_, field, head_.columns[columns.front()].unit);
   }
 
+  /// The bodies and markers of which a field is wanted; all are registered.
+  void want_bodies(const std::set<std::string>* wanted) {
+    Capture capture{export_->program, export_->says_up, {}, {}};
+    for (std::size_t i = 0; i < export_->bodies.size(); ++i) {
+      const MocapBody& body = export_->bodies[i];
+      (body.kind == MocapBody::Rotation::none ? capture.markers : capture.bodies).push_back(body.name);
+      const std::vector<std::string> fields = fields_of(body);
+      channels_.add(channel_, fields);
+      if (wanted && !wanted->empty() &&
+          std::ranges::none_of(fields, [&](const std::string& field) { return wanted->contains(field); }))
+        continue;
+      bodies_.emplace_back(i, row_.size());
+      for (const std::string& field : fields) row_.push_back({field, 0});
+    }
+    channels_.describe(channel_, std::move(capture));
+  }
+
   /// InputError where no row has the cells of the names.
   void refuse_other_widths() const {
     if (rows_ > 0 || other_width_.count == 0) return;
@@ -132,7 +154,7 @@ class TableReader {
       return other_width_.add(line, std::to_string(width) + (width == 1 ? " cell for " : " cells for ") +
                                         std::to_string(named_) + " names");
     ++rows_;
-    for (std::size_t k = 0; k < row_.size(); ++k) {
+    for (std::size_t k = 0; k < cells_.size(); ++k) {
       const auto& [column, element, is_time] = cells_[k];
       const std::string& cell = cells[column];
       points_ |= !element && cell.find('.') != std::string::npos;
@@ -140,7 +162,8 @@ class TableReader {
       if (is_time && std::isinf(row_[k].value)) row_[k].value = to_time_s(cell).value_or(kNoNumber);
       if (std::isinf(row_[k].value)) not_numbers_[k].add(line, cell);
     }
-    channels_.add(channel_, kNoTime, kNoTime, row_);
+    for (const auto& [body, at] : bodies_) export_->read(body, cells, &row_[at]);
+    channels_.add(channel_, kNoTime, export_ ? export_->stamp_ns(cells, rows_ - 1) : kNoTime, row_);
   }
 
   void warn(std::vector<std::string>& warnings) const {
@@ -151,22 +174,27 @@ class TableReader {
     if (other_width_.count > 0)
       say(std::to_string(other_width_.count) + " of " + std::to_string(rows_ + other_width_.count) + " rows left out" +
           first(other_width_) + ": " + other_width_.first);
+    if (export_ && export_->frames > 0 && export_->frames != rows_)
+      say("the head says " + std::to_string(export_->frames) + " frames; " + std::to_string(rows_) + " are there");
     if (comments_.count > 0)
       say(std::to_string(comments_.count) + " comments among the rows left out" + first(comments_));
-    for (std::size_t k = 0; k < row_.size(); ++k)
+    for (std::size_t k = 0; k < not_numbers_.size(); ++k)
       if (const LeftOut& left = not_numbers_[k]; left.count > 0)
         say(row_[k].name + ": " + std::to_string(left.count) + " of " + std::to_string(rows_) +
             " cells are no numbers" + first(left) + ": \"" + left.first.substr(0, 40) + "\"");
   }
 
   std::string_view text_;
+  std::size_t above_;
   std::string name_, channel_;
   Channels& channels_;
   TableHead head_;
   ColumnLabels labels_;
-  Row row_;                        ///< wanted cells of the current row
-  std::vector<WantedCell> cells_;  ///< where each of them stands
-  std::size_t named_ = 0;          ///< number of columns up to the last that has a name
+  std::optional<MocapExport> export_;
+  Row row_;                                                  ///< wanted cells of the current row
+  std::vector<std::pair<std::size_t, std::size_t>> bodies_;  ///< wanted bodies of export_, and where they begin in row_
+  std::vector<WantedCell> cells_;                            ///< where each of them stands
+  std::size_t named_ = 0;                                    ///< number of columns up to the last that has a name
   std::size_t rows_ = 0;
   bool points_ = false;             ///< whether a cell had a point: then a comma is no decimal comma
   LeftOut other_width_, comments_;  ///< other_width_ includes rows with quotes that are never closed
@@ -179,7 +207,12 @@ void read_table(std::string_view text, const std::string& name, const std::strin
                 std::vector<std::string>& warnings) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-  TableReader(text, name, channel, channels).read(warnings);
+  const std::vector<TextBlock> blocks = blocks_of(text);
+  for (const TextBlock& block : blocks) {
+    const std::string own = blocks.size() > 1 ? channel + "/" + block.title : channel;
+    if (channels.wants(own)) TableReader(block.text, block.line, name, own, channels).read(warnings);
+    else channels.add(own);
+  }
 }
 
 }  // namespace flappy::flightlog

@@ -17,8 +17,9 @@
 
 namespace flappy::flightlog {
 
-/// Adds a table's rows to `channel`, without times of receipt and stamps. `name` is the file in messages. Warns of rows
-/// whose number of cells differs from the names, of comments among rows, and of cells that are no numbers. InputError
+/// Adds a table's rows to `channel`, without times of receipt, and stamps alone of exports of motion capture
+/// (mocap_export.hpp), whose bodies and markers are fields; a file of several blocks has a channel `channel`/TITLE for each. `name` is the
+/// file in messages. Warns of rows /// whose number of cells differs from the names, of comments among rows, and of cells that are no numbers. InputError
 /// without names, for a wanted name given twice, or where no row has a cell for each name.
 void read_table(std::string_view text, const std::string& name, const std::string& channel, Channels& channels,
                 std::vector<std::string>& warnings);

@@ -38,8 +38,8 @@ bool fits(const Cells& row, const Cells& names) {
 
 class HeadFinder {
  public:
-  explicit HeadFinder(std::string_view text) {
-    Lines lines(text);
+  HeadFinder(std::string_view text, std::size_t above) {
+    Lines lines(text, above);
     while (const auto line = lines.next()) {
       if (is_blank(line->text) || is_comment(line->text)) continue;
       lines_.push_back(*line);
@@ -142,8 +142,8 @@ std::string_view comment_above(std::string_view text) {
 
 }  // namespace
 
-TableHead head_of(std::string_view text, const std::string& name) {
-  const HeadFinder finder(text);
+TableHead head_of(std::string_view text, const std::string& name, std::size_t above) {
+  const HeadFinder finder(text, above);
   if (finder.empty())
     throw io::InputError(name + ": " + (text.empty() ? "is empty" : "holds no table") +
                          "; accepted: a line of column names, then rows of numbers");

@@ -27,8 +27,8 @@ struct TableHead {
   std::vector<TableColumn> columns;
 };
 
-/// InputError for a table without names. `name` is the file in messages.
-TableHead head_of(std::string_view text, const std::string& name);
+/// InputError for a table without names. `name` is the file in messages, `above` the number of its lines before the text.
+TableHead head_of(std::string_view text, const std::string& name, std::size_t above = 0);
 
 /// How the columns of a table may be called: "X", or, where several have that name, with groups that tell them apart,
 /// "Position X", "robot Position X", or by its place among them, "X 2".

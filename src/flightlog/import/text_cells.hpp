@@ -52,12 +52,13 @@ struct Line {
 
 class Lines {
  public:
-  explicit Lines(std::string_view text) : rest_(text) {}
+  /// `above` lines stand before the text.
+  explicit Lines(std::string_view text, std::size_t above = 0) : rest_(text), number_(above) {}
   std::optional<Line> next();
 
  private:
   std::string_view rest_;
-  std::size_t number_ = 0;
+  std::size_t number_;
 };
 
 bool is_blank(std::string_view line);

@@ -1,12 +1,16 @@
 // Tables of other programs as they come, from file and mapping to the log.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <fstream>
+#include <numbers>
 
 #include "flightlog/import/assemble.hpp"
 #include "flightlog/import/sources.hpp"
+#include "flightlog/rotation.hpp"
 #include "io/temporary_folder.hpp"
+#include "io/text.hpp"
 #include "refusal.hpp"
 
 namespace flappy::flightlog::exports_test {
@@ -116,6 +120,247 @@ TEST(Exports, ElementsOfListsAreFields) {
                             .log.mocap;
   EXPECT_EQ(m.z_m, (Column{3.5, 3.5, 3.5}));
   EXPECT_EQ(m.qw, (Column{1, 1, 1}));
+}
+
+// ---- one motion in the shapes of all vendors
+
+/// Where the robot is at frame `i`: p in W, and its attitude, turned about all three axes.
+struct Pose {
+  Eigen::Vector3d p;
+  Eigen::Quaterniond q;
+};
+Pose pose(int i) {
+  const double t = 0.01 * i;
+  return {{0.5 + t, -0.25 + 2 * t, 1 - t}, exponential({0.4, -0.3 + t, 0.9 + 3 * t})};
+}
+constexpr int kFrames = 20, kLost = 7;
+
+std::string numbers(const char* separator, std::initializer_list<double> values, int digits = 9) {
+  std::string text;
+  for (const double v : values) text += separator + io::format("%.*f", digits, v);
+  return text;
+}
+
+/// Motive: a row of metadata, rows of type, name, id, (parent,) use and axis; y up; two bodies and markers.
+std::string motive(const std::string& version, const std::string& rotation, const std::string& unit,
+                   bool z_up = false) {
+  const bool quaternion = rotation == "Quaternion";
+  std::string text = "Format Version," + version +
+                     ",Take Name,hover,Take Notes,,Capture Frame Rate,100.000000,Export Frame Rate,100.000000,Total "
+                     "Exported Frames,20,Rotation Type," +
+                     rotation + ",Length Units," + unit + ",Coordinate Space,Global\r\n\r\n";
+  const int turns = quaternion ? 4 : 3;
+  Lines rows = {",Type", ",Name", ",ID", ",", "Frame,Time (Seconds)"};
+  if (version == "1.25") rows.insert(rows.begin() + 3, ",Parent");
+  if (version == "1.24")
+    for (std::string& row : rows) row += &row == &rows.back() ? ",TimeCode" : ",";
+  const auto column = [&](const char* type, const char* name, const char* use, const char* axis) {
+    const Lines cells =
+        version == "1.25" ? Lines{type, name, "9F:1", "", use, axis} : Lines{type, name, "\"1\"", use, axis};
+    for (std::size_t k = 0; k < rows.size(); ++k) rows[k] += "," + cells[k];
+  };
+  for (const char* name : {"box", "robot"}) {
+    for (int k = 0; k < turns; ++k) column("Rigid Body", name, "Rotation", std::array{"X", "Y", "Z", "W"}[k]);
+    for (const char* axis : {"X", "Y", "Z"}) column("Rigid Body", name, "Position", axis);
+    column("Rigid Body", name, "Mean Marker Error", "");
+  }
+  for (const char* type : {"Rigid Body Marker", "Marker"})
+    for (const char* axis : {"X", "Y", "Z"}) column(type, "robot:Marker 001", "Position", axis);
+  for (const std::string& row : rows) text += row + "\r\n";
+  const double metre = unit == "Meters" ? 1 : 1000;
+  for (int i = 0; i < kFrames; ++i) {
+    const Pose at = pose(i);
+    // of W with z up: x, z, -y with y up
+    const Eigen::Quaterniond up(std::sqrt(0.5), -std::sqrt(0.5), 0, 0);
+    const Eigen::Vector3d p = metre * (z_up ? at.p : up * at.p);
+    const Eigen::Quaterniond q = z_up ? at.q : up * at.q * up.conjugate();  // its body has y up, too
+    const Eigen::Vector3d angles = q.toRotationMatrix().eulerAngles(0, 1, 2) * 180 / std::numbers::pi;
+    text += std::to_string(i) + numbers(",", {0.01 * i}, 6) + (version == "1.24" ? ",10:15:00:00.00" : "");
+    text += quaternion ? ",0,0,0,1,0,0,0,0.1" : ",0,0,0,0,0,0,0.1";
+    if (i == kLost) text += quaternion ? ",,,,,,,," : ",,,,,,,";
+    else if (quaternion) text += numbers(",", {q.x(), q.y(), q.z(), q.w(), p.x(), p.y(), p.z(), 0.1});
+    else text += numbers(",", {angles[0], angles[1], angles[2], p.x(), p.y(), p.z(), 0.1});
+    text += ",9,9,9" + numbers(",", {p.x(), p.y(), p.z()}) + "\r\n";
+  }
+  return text;
+}
+
+/// QTM, 6D: keys, names, rows that end with a tab; mm, degrees, the matrix by columns.
+std::string qtm(bool names, bool zeros) {
+  std::string text =
+      "FILE_VERSION\t2.0.0\nNO_OF_FRAMES\t20\nNO_OF_CAMERAS\t8\nNO_OF_BODIES\t2\nFREQUENCY\t100\nNO_OF_"
+      "ANALOG\t0\nDESCRIPTION\t--\nTIME_STAMP\t2026-05-04, "
+      "10:15:00.000\t1234.5\nDATA_INCLUDED\t6D\nBODY_NAMES\tbox\trobot\n";
+  const std::string rest =
+      "\tY\tZ\tRoll\tPitch\tYaw\tResidual\tRot[0]\tRot[1]\tRot[2]\tRot[3]\tRot[4]\tRot[5]\tRot[6]\tRot[7]\tRot[8]";
+  if (names) text += "Frame\tTime\tbox X" + rest + "\trobot X" + rest + "\n";
+  for (int i = 0; i < kFrames; ++i) {
+    const Pose at = pose(i);
+    const Eigen::Matrix3d r = at.q.toRotationMatrix();
+    if (names) text += std::to_string(i + 1) + numbers("\t", {0.01 * i}, 5) + "\t";
+    text += "0.000\t0.000\t0.000\t0\t0\t0\t0\t0\t0\t0\t0\t0\t0\t0\t0\t0";
+    if (i == kLost)
+      for (int k = 0; k < 16; ++k) text += zeros ? "\t0.000" : "\t";
+    else
+      text += numbers("\t", {1e3 * at.p.x(), 1e3 * at.p.y(), 1e3 * at.p.z(), 1, 2, 3, 0.4, r(0, 0), r(1, 0), r(2, 0),
+                             r(0, 1), r(1, 1), r(2, 1), r(0, 2), r(1, 2), r(2, 2)});
+    text += "\t\n";
+  }
+  return text;
+}
+
+/// Vicon: title, rate, names, axes, units; `kind` is "Quaternion", or "" for three numbers, in `unit`, by vector or by angles.
+std::string vicon(const std::string& title, const std::string& kind, const std::string& unit, bool vector = true) {
+  const bool quaternion = kind == "Quaternion";
+  const std::string axes = quaternion ? "RX,RY,RZ,RW,TX,TY,TZ" : "RX,RY,RZ,TX,TY,TZ";
+  const std::string units = (quaternion ? ",,," : unit + "," + unit + "," + unit) + ",mm,mm,mm";
+  const std::string more = quaternion ? ",,,,,,," : ",,,,,,";
+  std::string text = title + "\n100\n,,";
+  for (const char* name : {"box", "robot"})
+    text += "Global Angle " + (kind.empty() ? "" : "(" + kind + ") ") + name + ":" + name +
+            (name[0] == 'b' ? more : more.substr(1));
+  text += "\nFrame,Sub Frame," + axes + "," + axes + "\n,," + units + "," + units + "\n";
+  for (int i = 0; i < kFrames; ++i) {
+    const Pose at = pose(i);
+    const double one = unit == "deg" ? 180 / std::numbers::pi : 1;
+    const Eigen::Vector3d r =
+        one * (vector ? logarithm(at.q) : Eigen::Vector3d(at.q.toRotationMatrix().eulerAngles(0, 1, 2)));
+    text += std::to_string(i) + ",0" + (quaternion ? ",0,0,0,1,1,2,3" : ",0,0,0,1,2,3");
+    if (i == kLost) text += more;
+    else if (quaternion) text += numbers(",", {at.q.x(), at.q.y(), at.q.z(), at.q.w()});
+    else text += numbers(",", {r.x(), r.y(), r.z()});
+    if (i != kLost) text += numbers(",", {1e3 * at.p.x(), 1e3 * at.p.y(), 1e3 * at.p.z()});
+    text += "\n";
+  }
+  return text;
+}
+
+std::string stream(const std::string& more, const std::string& channel = "take") {
+  return "[mocap]\nchannel = \"" + channel + "\"\n" + kNoise + more;
+}
+
+/// The motion, without the frame that was lost, as files round it.
+void expect_motion(const Imported& imported, double tolerance = 1e-8) {
+  const MocapStream& m = imported.log.mocap;
+  ASSERT_EQ(m.t_s.size(), kFrames - 1u);
+  EXPECT_NEAR(imported.log.header.mocap.rate_hz, 100, 1e-9);
+  for (int i = 0, k = 0; i < kFrames; ++i) {
+    if (i == kLost) continue;
+    const Pose at = pose(i);
+    EXPECT_NEAR(m.t_s[k], 0.01 * i, 1e-12);
+    EXPECT_LT((Eigen::Vector3d(m.x_m[k], m.y_m[k], m.z_m[k]) - at.p).norm(), tolerance) << i;
+    EXPECT_LT(at.q.angularDistance(Eigen::Quaterniond(m.qw[k], m.qx[k], m.qy[k], m.qz[k])), tolerance) << i;
+    ++k;
+  }
+}
+
+void expect_motion_of(const std::string& name, const std::string& text, const std::string& mapping,
+                      const std::string& channel = "take") {
+  SCOPED_TRACE(text.substr(0, 200) + mapping);
+  Recording r;
+  r.add(name, text);
+  expect_motion(r.import(stream(mapping, channel)));
+  EXPECT_EQ(r.warnings, Lines());
+}
+
+const std::string kYUp = "body = \"robot\"\nworld = \"y_up\"\nframe = \"fur\"\n";
+
+TEST(Exports, OfMotiveGiveTheMotion) {
+  for (const char* version : {"1.10", "1.23", "1.24", "1.25"})
+    for (const char* rotation : {"Quaternion", "XYZ"})
+      for (const char* unit : {"Meters", "Millimeters"})
+        expect_motion_of("take.csv", motive(version, rotation, unit), kYUp);
+  expect_motion_of("take.csv", motive("1.23", "Quaternion", "Meters", true),
+                   "body = \"robot\"\nworld = \"enu\"\nframe = \"flu\"\n");
+}
+
+TEST(Exports, OfQtmGiveTheMotion) {
+  for (const bool names : {true, false})
+    for (const bool zeros : {true, false}) expect_motion_of("take.tsv", qtm(names, zeros), "body = \"robot\"\n");
+}
+
+TEST(Exports, OfViconGiveTheMotion) {
+  for (const char* title : {"Objects", "Segments"}) {
+    expect_motion_of("take.csv", vicon(title, "Quaternion", ""), "body = \"robot\"\n");
+    expect_motion_of("take.csv", vicon(title, "", "rad"), "body = \"robot\"\nrotation = \"vector\"\n");
+    expect_motion_of("take.csv", vicon(title, "", "deg"), "body = \"robot\"\nrotation = \"vector\"\n");
+    expect_motion_of("take.csv", vicon(title, "", "deg", false), "body = \"robot\"\nrotation = \"xyz\"\n");
+  }
+  // several blocks, each a channel
+  const std::string devices = "Devices\n1000\n,,Force,,\nFrame,Sub Frame,Fx,Fy\n,,N,N\n1,0,2,3\n1,1,2,3\n1,2,2,3\n\n";
+  expect_motion_of("take.csv", devices + vicon("Objects", "Quaternion", ""), "body = \"robot\"\n", "take/Objects");
+}
+
+TEST(Exports, SayWhatAMappingLacks) {
+  Recording r;
+  r.add("take.csv", motive("1.23", "Quaternion", "Meters"));
+  EXPECT_EQ(r.refusal(stream("body = \"robt\"\n")),
+            "m.toml:16:8: mocap.body: \"robt\" is no rigid body of the recording; accepted: box, robot; did you mean "
+            "\"robot\"?");
+  EXPECT_EQ(r.refusal(stream("body = \"robot:Marker 001\"\n")),
+            "m.toml:16:8: mocap.body: \"robot:Marker 001\" is no rigid body of the recording, but a marker; accepted: "
+            "box, robot");
+  EXPECT_EQ(r.refusal(stream("body = \"robot\"\n")),
+            "m.toml:11:1: mocap.world: is missing: Motive's files do not say which axis is up; accepted: \"y_up\" (the "
+            "program's default), \"enu\" (z up)");
+  EXPECT_EQ(r.refusal(stream("body = \"robot\"\nworld = \"y_up\"\n")),
+            "m.toml:11:1: mocap.frame: is missing: Motive's files do not say which axis of the body is forward; "
+            "accepted: \"fur\" (x forward, y up), \"luf\" (z forward, y up), \"flu\" (x forward, z up), \"frd\"");
+  EXPECT_EQ(r.refusal(stream(kYUp + "rotation = \"xyz\"\n")),
+            "m.toml:19:12: mocap.rotation: is given, but the file says what its rotation is; accepted: no rotation");
+  EXPECT_EQ(r.refusal(stream(kYUp + kPose)),
+            "m.toml:19:11: mocap.columns: is given with body; accepted: one of the two");
+  EXPECT_EQ(r.refusal("[mocap]\nchannel = \"motors\"\ntime = \"field\"\ntime_field = \"t\"\n" + kNoise + kYUp),
+            "m.toml:18:8: mocap.body: is given for a table that no motion-capture program wrote; accepted: columns");
+  Recording v;
+  v.add("take.csv", vicon("Objects", "", "rad"));
+  EXPECT_EQ(v.refusal(stream("body = \"robot\"\n")),
+            "m.toml:11:1: mocap.rotation: is missing: the file does not say what the three numbers of its rotation "
+            "are; accepted: \"vector\" (axis times angle), or axes of angles in turn, as \"xyz\"");
+}
+
+TEST(Exports, ThatWereCutOffAreWarnedOf) {
+  Recording r;
+  std::string text = motive("1.23", "Quaternion", "Meters");
+  text.resize(text.rfind("\r\n15,") + 2);
+  r.add("take.csv", text);
+  EXPECT_EQ(r.import(stream(kYUp)).log.mocap.t_s.size(), 14u);
+  ASSERT_EQ(r.warnings.size(), 1u);
+  EXPECT_TRUE(r.warnings[0].ends_with("take.csv: the head says 20 frames; 15 are there")) << r.warnings[0];
+  Recording local;
+  text.replace(text.find("Space,Global"), 12, "Space,Local");
+  local.add("take.csv", text);
+  EXPECT_EQ(local.refusal(stream(kYUp)), "take.csv:1:1: Coordinate Space is Local; accepted: an export with Global");
+}
+
+/// Axes of the mapping that contradict an IMU on board.
+TEST(Exports, AreHeldAgainstGravity) {
+  Recording r;
+  r.add("take.csv", motive("1.23", "Quaternion", "Meters"));
+  std::string imu = "t,x,y,z\n";
+  for (int i = 0; i < kFrames; ++i) {
+    const Eigen::Vector3d f = pose(i).q.conjugate() * Eigen::Vector3d(0, 0, 9.81);
+    imu += numbers("", {0.01 * i}) + numbers(",", {f.x(), f.y(), f.z()}) + "\n";
+  }
+  r.add("imu.csv", imu);
+  const std::string with =
+      "[imu]\nchannel = \"imu\"\ntime = \"field\"\ntime_field = \"t\"\nlatency_s = 0.0\nbandwidth_hz = "
+      "80.0\nposition_m = [0.0, 0.0, 0.0]\naccel_noise_m_s2 = 0.3\ngyro = false\ncolumns = { accel_x_m_s2 = \"x\", "
+      "accel_y_m_s2 = \"y\", accel_z_m_s2 = \"z\" }\n";
+  expect_motion(r.import(stream(kYUp) + with));
+  const std::string line = r.refusal(stream("body = \"robot\"\nworld = \"enu\"\nframe = \"fur\"\n") + with);
+  EXPECT_NE(line.find("m.toml:17:9: mocap.world: the mean force on the IMU points "), std::string::npos) << line;
+  EXPECT_NE(line.find("world = \"y_up\" with frame = \"fur\""), std::string::npos) << line;
+}
+
+/// As raw tables, too, by the names of their columns.
+TEST(Exports, AreTablesWithAHead) {
+  Recording r;
+  r.add("take.csv", motive("1.23", "Quaternion", "Meters", true));
+  expect_motion(
+      r.import(stream("time = \"field\"\ntime_field = \"Time (Seconds)\"\ncolumns = { x_m = \"robot Position X\", y_m "
+                      "= \"robot Position Y\", z_m = \"robot Position Z\", qw = \"W 2\", qx = \"robot Rotation X\", qy "
+                      "= \"robot Rotation Y\", qz = \"robot Rotation Z\" }\n")));
 }
 
 }  // namespace
