@@ -1,6 +1,7 @@
 #include "flightlog/import/assemble.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -8,6 +9,7 @@
 #include <numeric>
 
 #include "flightlog/import/clock.hpp"
+#include "flightlog/import/marker_pose.hpp"
 #include "flightlog/import/recorded_units.hpp"
 #include "flightlog/import/sources.hpp"
 #include "flightlog/rotation.hpp"
@@ -95,6 +97,19 @@ const std::vector<double>& field_of_body(const Channel& channel, const StreamMap
     s.table.fail("rotation", "is missing: the file does not say what the three numbers of its rotation are",
                  "\"vector\" (axis times angle), or axes of angles in turn, as \"xyz\"");
   s.table.fail("rotation", "is given, but the file says what its rotation is", "no rotation");
+}
+
+/// The field of a marker. InputError for a marker that is not there, and where the file does not say which axis is up.
+const std::vector<double>& field_of_marker(const Channel& channel, const StreamMapping& s, const std::string& field) {
+  const Capture* capture = channel.capture();
+  if (capture && !capture->says_up && !s.says_world)
+    s.table.fail("world", "is missing: " + capture->program + "'s files do not say which axis is up",
+                 "\"y_up\" (the program's default), \"enu\" (z up)");
+  if (const auto* found = channel.column(field)) return *found;
+  const std::string name = field.substr(0, field.rfind('.'));
+  const std::vector<std::string> names = capture ? capture->markers : channel.fields();
+  s.table.fail("markers", "\"" + name + "\" is no marker of the recording" + (capture ? "" : ", by fields as " + field),
+               listed(names) + io::did_you_mean(name, names));
 }
 
 /// The name of the field that a channel has of those that the mapping gives.
@@ -319,6 +334,7 @@ struct Stream {
   const StreamMapping& mapping;
   std::vector<std::int64_t> t_ns;
   Columns columns;
+  std::vector<std::string> notes;                  ///< of markers
   std::vector<const ColumnMapping*> not_measured;  ///< of each row, the first column that it says is not measured
   StreamReport report;
 
@@ -409,6 +425,45 @@ void turn_rotations(Stream& s) {
   }
 }
 
+Eigen::Vector3d place_of(const Columns& columns, const std::string& marker, std::size_t i) {
+  return {columns.at(marker + ".x_m")[i], columns.at(marker + ".y_m")[i], columns.at(marker + ".z_m")[i]};
+}
+
+/// Replaces the columns of markers by those of the pose, NaN where none agrees with them, and its residual.
+void pose_of_markers(Stream& s) {
+  const std::vector<std::string>& names = s.mapping.markers;
+  if (names.empty()) return;
+  Places places;
+  for (const auto& p : s.mapping.marker_places_m) places.emplace_back(p[0], p[1], p[2]);
+  if (!pose_by_markers(places, places)) s.mapping.table.fail("markers", "are in one line", "at least 3 that are not");
+  MarkerTracker tracker(places, s.mapping.tolerance_m);
+  Columns pose;
+  for (std::size_t i = 0; i < s.t_ns.size(); ++i) {
+    Places seen;
+    for (const std::string& name : names) seen.push_back(place_of(s.columns, name, i));
+    const double none = std::numeric_limits<double>::quiet_NaN();
+    const MarkerPose at = tracker.next(seen).value_or(
+        MarkerPose{Eigen::Vector3d::Constant(none), Eigen::Quaterniond(none, none, none, none), none});
+    const auto add = [&](const char* column, double value) { pose[column].push_back(value); };
+    add("x_m", at.position.x()), add("y_m", at.position.y()), add("z_m", at.position.z());
+    add("qw", at.attitude.w()), add("qx", at.attitude.x()), add("qy", at.attitude.y()), add("qz", at.attitude.z());
+    add("residual_m", at.residual_m);
+  }
+  s.columns = std::move(pose);
+  const auto note = [&](std::size_t frames, const std::string& what) {
+    if (frames > 0) s.notes.push_back(std::to_string(frames) + (frames == 1 ? " frame " : " frames ") + what);
+  };
+  for (std::size_t k = 0; k < tracker.swapped().size(); ++k)
+    note(tracker.swapped()[k],
+         "with " + names[tracker.pair(k).first] + " and " + names[tracker.pair(k).second] + " swapped: put right");
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    note(tracker.left_out()[k], "with " + names[k] + " far from its place: done without it");
+    note(tracker.lost()[k], "in which " + names[k] + " was not seen");
+  }
+  for (const auto& [i, j] : tracker.alike())
+    s.notes.push_back(names[i] + " and " + names[j] + " can be swapped without a trace but the frames before");
+}
+
 /// Length of the quaternion of sample `i`; 1 where the stream has none.
 double length_of_rotation(const Stream& s, std::size_t i) {
   if (!s.columns.contains("qw")) return 1;
@@ -453,6 +508,9 @@ std::string fault_of(const Stream& s, std::size_t i, const Span& span) {
   if (s.t_ns[i] == kNoTime) return "no time";
   if (!span.recorded.contains(s.t_ns[i])) return "apart from the rest of the recording";
   if (const ColumnMapping* c = s.not_measured[i]) return c->fields.front() + " is not measured, as the message says";
+  if (const auto residual = s.columns.find("residual_m");
+      residual != s.columns.end() && std::isnan(residual->second[i]))
+    return "no pose agrees with the markers";
   for (const auto& [name, column] : s.columns) {
     if (std::isnan(column[i])) return "lacks " + name;
     if (!std::isfinite(column[i])) return name + " is no finite number";
@@ -580,13 +638,14 @@ Stream read_stream(const Channels& channels, const StreamMapping& mapping, const
                        mapping.time == TimeOf::stamp ? "\"received\", or \"field\" with time_field"
                                                      : "\"stamp\", or \"field\" with time_field");
   const Timed own = timed(channel, mapping, clocks);
-  Stream s{mapping, own.t_ns, {}, std::vector<const ColumnMapping*>(own.t_ns.size()), {}};
+  Stream s{mapping, own.t_ns, {}, {}, std::vector<const ColumnMapping*>(own.t_ns.size()), {}};
   s.report.stream = mapping.name;
   s.report.channel = mapping.channel;
   for (const ColumnMapping& c : mapping.columns) {
     Column column;
-    if (!mapping.body.empty()) {
-      s.columns[c.column] = field_of_body(channel, mapping, c.fields.front());
+    if (!mapping.body.empty() || !mapping.markers.empty()) {
+      const auto& field = mapping.markers.empty() ? field_of_body : field_of_marker;
+      s.columns[c.column] = field(channel, mapping, c.fields.front());
       continue;
     }
     const io::Table columns = mapping.table.table("columns");
@@ -610,6 +669,7 @@ Stream read_stream(const Channels& channels, const StreamMapping& mapping, const
   derive_pitch(s, gravity_m_s2);
   turn_angles(s);
   turn_rotations(s);
+  pose_of_markers(s);
   const std::string& counted = mapping.sequence;
   tidy(s, counted.empty() ? nullptr : &field_of(channel, mapping.table, "sequence", counted), span, shared);
   if (s.t_ns.size() < 2 && !is_optional(mapping))
@@ -716,6 +776,8 @@ Imported assemble(const Channels& channels, const Mapping& mapping) {
       const bool shared = std::ranges::count(mapping.streams, s.channel, &StreamMapping::channel) > 1;
       Stream stream = read_stream(channels, s, clocks, span, shared, mapping.header.gravity_m_s2);
       if (stream.t_ns.size() >= 2) {
+        for (const std::string& note : stream.notes) out.report.warnings.push_back(s.name + ": " + note);
+        if (stream.columns.contains("residual_m")) stream.report.residual_m = stream.columns.at("residual_m");
         if (stream.report.unusable > 0)
           out.report.warnings.push_back(s.name + ": " + std::to_string(stream.report.unusable) +
                                         " samples are unusable: " + reasons(stream.report));
@@ -734,7 +796,7 @@ Imported assemble(const Channels& channels, const Mapping& mapping) {
   }
   const auto imu = std::ranges::find(streams, "imu", [](const Stream& s) { return s.mapping.name; });
   for (const Stream& s : streams)
-    if (!s.mapping.body.empty() && imu != streams.end()) require_up(s, *imu);
+    if ((!s.mapping.body.empty() || !s.mapping.markers.empty()) && imu != streams.end()) require_up(s, *imu);
   out.report.clocks = clocks.reports();
   if (mapping.from_first) {
     out.report.start_ns = streams.front().t_ns.front();
@@ -760,6 +822,10 @@ std::string report_text(const ImportReport& report) {
     add("  %-8s %9zu %9.2f %6zu %6zu %6zu %6zu %8zu  %12.3f %8.3f  %s\n", s.stream.c_str(), s.samples, s.rate_hz,
         s.lost, s.twice, s.late, s.reordered, s.unusable, 1e3 * s.delay_median_s, 1e3 * s.delay_most_s,
         s.channel.c_str());
+  for (const StreamReport& s : report.streams)
+    if (!s.residual_m.empty())
+      add("  markers: residual %.3f mm median, %.3f mm most\n", 1e3 * io::median(s.residual_m),
+          1e3 * *std::ranges::max_element(s.residual_m));
   for (const ClockReport& c : report.clocks) {
     if (c.name == kReceiver) {
       const bool odd = c.offset_s < 0 || c.offset_s > kOddOffset_s;
@@ -774,8 +840,35 @@ std::string report_text(const ImportReport& report) {
   return text;
 }
 
-Imported import_recording(const std::vector<std::filesystem::path>& files, const Mapping& mapping,
+void place_markers(Mapping& mapping, std::vector<std::string>& warnings) {
+  for (StreamMapping& s : mapping.streams) {
+    if (!s.at_rest) continue;
+    Wanted wanted;
+    for (const ColumnMapping& c : s.columns) wanted[kOnlyChannel].insert(c.fields.begin(), c.fields.end());
+    Channels channels(wanted);
+    read_source(s.at_rest->file, channels, warnings);
+    const Channel& channel = channel_of(channels, s, kOnlyChannel, "markers");
+    const Eigen::Vector3d origin(s.at_rest->position_m[0], s.at_rest->position_m[1], s.at_rest->position_m[2]);
+    const Eigen::Quaterniond attitude = exponential({0, 0, s.at_rest->yaw_rad});
+    s.marker_places_m.clear();
+    for (const std::string& name : s.markers) {
+      std::array<double, 3> middle = {};
+      for (std::size_t k = 0; k < 3; ++k) {
+        std::vector<double> values = field_of_marker(channel, s, name + std::array{".x_m", ".y_m", ".z_m"}[k]);
+        std::erase_if(values, [](double value) { return !std::isfinite(value); });
+        if (values.empty()) s.table.fail("markers", "\"" + name + "\" is never seen at rest", "markers that are");
+        middle[k] = io::median(values);
+      }
+      const Eigen::Vector3d place = eigen_of(turn_of(s.world)) * Eigen::Vector3d(middle[0], middle[1], middle[2]);
+      const Eigen::Vector3d in_body = attitude.conjugate() * (place - origin);
+      s.marker_places_m.push_back({in_body.x(), in_body.y(), in_body.z()});
+    }
+  }
+}
+
+Imported import_recording(const std::vector<std::filesystem::path>& files, const Mapping& given,
                           const std::filesystem::path& out) {
+  Mapping mapping = given;
   Channels channels(mapping.wanted(), mapping.wanted_times());
   std::vector<std::string> warnings;
   const auto log_warnings = [&] {
@@ -783,6 +876,7 @@ Imported import_recording(const std::vector<std::filesystem::path>& files, const
   };
   Imported imported;
   try {
+    place_markers(mapping, warnings);
     for (const std::filesystem::path& file : files) read_source(file, channels, warnings);
     imported = assemble(channels, mapping);
   } catch (const io::InputError&) {
@@ -801,7 +895,7 @@ Imported import_recording(const std::vector<std::filesystem::path>& files, const
 nlohmann::ordered_json json_of(const ImportReport& report) {
   using Json = nlohmann::ordered_json;
   Json streams = Json::array(), clocks = Json::array();
-  for (const StreamReport& s : report.streams)
+  for (const StreamReport& s : report.streams) {
     streams.push_back({{"name", s.stream},
                        {"channel", s.channel},
                        {"samples", s.samples},
@@ -814,6 +908,8 @@ nlohmann::ordered_json json_of(const ImportReport& report) {
                        {"why_unusable", s.why_unusable},
                        {"delay_median_s", s.delay_median_s},
                        {"delay_most_s", s.delay_most_s}});
+    if (!s.residual_m.empty()) streams.back()["residual_m"] = s.residual_m;
+  }
   for (const ClockReport& c : report.clocks)
     clocks.push_back({{"name", c.name},
                       {"offset_s", c.offset_s},

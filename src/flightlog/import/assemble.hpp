@@ -25,6 +25,7 @@ struct StreamReport {
   double rate_hz = 0;                               ///< measured
   /// Delay beyond that of the quickest message of the same clock; 0 without times of receipt.
   double delay_median_s = 0, delay_most_s = 0;
+  std::vector<double> residual_m;  ///< of the pose by markers of each sample, root mean square; else empty
 };
 
 struct ClockReport {
@@ -51,6 +52,9 @@ struct Imported {
 /// InputError, at the mapping's line, for a channel or field not recorded and for undeterminable times. Validates
 /// nothing else: write_flight_log() does.
 Imported assemble(const Channels& channels, const Mapping& mapping);
+
+/// Finds the places of markers in B where the mapping has a recording at rest. InputError for a marker that is not in it.
+void place_markers(Mapping& mapping, std::vector<std::string>& warnings);
 
 /// Reads a recording's files (sources.hpp), logs warnings and writes the log to `out`; after InputError, nothing.
 Imported import_recording(const std::vector<std::filesystem::path>& files, const Mapping& mapping,

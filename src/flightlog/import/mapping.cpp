@@ -73,7 +73,7 @@ StreamKeys narrowed(StreamKeys keys, const io::Table& table, bool declared_input
     keys.has_frame = keys.has_world = false;
     return keys;
   }
-  if (keys.name == "mocap" && table.has("body")) {
+  if (keys.name == "mocap" && (table.has("body") || table.has("markers"))) {
     keys.columns.clear();
     return keys;
   }
@@ -104,6 +104,30 @@ void read_body(StreamMapping& stream) {
   for (const char* name : {"rx_rad", "ry_rad", "rz_rad"})
     if (!stream.rotation.empty()) columns.emplace_back(name);
   for (const std::string& name : columns) stream.columns.push_back({name, stream.channel, {stream.body + "." + name}});
+}
+
+/// The places of markers, which are fields of their own.
+void read_markers(StreamMapping& stream) {
+  const io::Table& table = stream.table;
+  stream.tolerance_m = table.number_or("tolerance_m", stream.tolerance_m, positive(1));
+  if (stream.says_axes) table.fail("frame", "is given with markers, whose places are in B", "no frame");
+  if (table.is_table("markers")) {
+    const io::Table markers = table.table("markers");
+    stream.markers = markers.keys();
+    for (const std::string& name : stream.markers) stream.marker_places_m.push_back(markers.numbers(name, 3));
+    if (table.has("at_rest")) table.fail("at_rest", "is given with places of markers", "one of the two");
+  } else {
+    stream.markers = table.strings("markers");
+    const io::Table rest = table.table("at_rest");
+    rest.accept({"file", "position_m", "yaw_rad"});
+    stream.at_rest = AtRest{rest.file("file"), rest.numbers("position_m", 3), rest.number_or("yaw_rad", 0)};
+  }
+  if (stream.markers.size() < 3)
+    table.fail("markers", "has " + std::to_string(stream.markers.size()) + " markers",
+               "at least 3 that are not in one line");
+  for (const std::string& name : stream.markers)
+    for (const char* axis : {".x_m", ".y_m", ".z_m"})
+      stream.columns.push_back({name + axis, stream.channel, {name + axis}});
 }
 
 void read_columns(const StreamKeys& keys, StreamMapping& stream) {
@@ -145,7 +169,8 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
   if (keys.has_world) accepted.emplace_back("world");
   if (keys.has_rate) accepted.emplace_back("rate_hz");
   if (keys.name == "command") accepted.insert(accepted.end(), {"inputs", "flown"});
-  if (keys.name == "mocap") accepted.insert(accepted.end(), {"source", "body", "rotation"});
+  if (keys.name == "mocap")
+    accepted.insert(accepted.end(), {"source", "body", "rotation", "markers", "tolerance_m", "at_rest"});
   if (keys.name == "imu") accepted.emplace_back("gyro");
   if (keys.name == "power") accepted.emplace_back("currents");
   table.accept(accepted);
@@ -192,14 +217,22 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
                                 : World::ned_x_north;
   }
   s.measures_rate = keys.has_rate && !table.has("rate_hz");
-  if (captured && table.has("body")) {
+  const char* instead = !captured ? "" : table.has("body") ? "body" : table.has("markers") ? "markers" : "";
+  if (*instead != 0)
     for (const char* key : {"columns", "scale", "offset", "from"})
-      if (table.has(key)) table.fail(key, "is given with body", "one of the two");
-    read_body(s);
-  } else {
-    if (captured && table.has("rotation")) table.fail("rotation", "is given without body", "body");
-    read_columns(keys, s);
-  }
+      if (table.has(key)) table.fail(key, "is given with " + std::string(instead), "one of the two");
+  const auto only_with = [&](const char* key, const char* other) {
+    if (captured && table.has(key) && instead != std::string_view(other))
+      table.fail(key, "is given without " + std::string(other), other);
+  };
+  if (instead == std::string_view("body") && table.has("markers"))
+    table.fail("markers", "is given with body", "one of the two");
+  only_with("rotation", "body");
+  only_with("at_rest", "markers");
+  only_with("tolerance_m", "markers");
+  if (instead == std::string_view("body")) read_body(s);
+  else if (instead == std::string_view("markers")) read_markers(s);
+  else read_columns(keys, s);
   return s;
 }
 

@@ -49,6 +49,13 @@
 //   body = "robot"                           # in place of columns: a rigid body of an export of Motive, QTM, Vicon
 //   rotation = "vector"                      # what three numbers of its rotation are, where the file does not say:
 //                                            # axis times angle, or angles about axes of the body in turn, as "xyz"
+//   [mocap.markers]                          # in place of columns: places of markers in B, m, at least three
+//   nose = [0.05, 0.0, 0.01]
+//   tolerance_m = 0.005                      # of [mocap]; default; a marker farther from its place is a wrong one
+//   [mocap.at_rest]                          # gives these places instead; then markers = ["nose", ...] of [mocap]
+//   file = "rest.csv"                        # the robot at rest and level
+//   position_m = [0.0, 0.0, 0.03]            # of B's origin in W
+//   yaw_rad = 0.0                            # default
 //   rate_hz = 200                            # optional in every stream; measured if missing
 //   latency_s = 0.0                          # time used less measured instant; 0 if the stamp is that instant
 //   position_noise_m = 1e-4
@@ -106,6 +113,13 @@ struct ColumnMapping {
   double offset = 0;
 };
 
+/// A recording of the robot at rest and level, which gives the markers' places in B.
+struct AtRest {
+  std::filesystem::path file;
+  std::vector<double> position_m;  ///< of B's origin in W
+  double yaw_rad = 0;              ///< of B
+};
+
 struct StreamMapping {
   std::string name, channel;  ///< "imu", "/imu"
   TimeOf time = TimeOf::stamp;
@@ -121,6 +135,10 @@ struct StreamMapping {
   std::string body;  ///< of an export of motion capture, in place of columns; empty: none
   std::string
       rotation;  ///< what three numbers of its rotation are: "vector", or axes of angles, as "xyz"; empty: not said
+  std::vector<std::string> markers;                  ///< whose places give the pose, in place of columns; empty: none
+  std::vector<std::vector<double>> marker_places_m;  ///< in B; empty until place_markers() where at_rest gives them
+  double tolerance_m = 0.005;                        ///< a marker farther from its place is a wrong one
+  std::optional<AtRest> at_rest;
   FieldNames flown_fields;  ///< command stream only: what is above flown_above in flight; empty: the whole log
   double flown_above = 0;
   io::Table table;  ///< the stream's table in the file, for error messages

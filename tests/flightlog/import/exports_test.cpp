@@ -36,14 +36,17 @@ class Recording {
     for (int i = 0; i < 20; ++i) std::snprintf(line, sizeof line, "%.3f,0.5\n", start_s + 0.01 * i), text += line;
     add("motors.csv", text);
   }
+  /// Writes a file that is none of the recording.
+  void write(const std::string& name, const std::string& text) { std::ofstream(folder_ / name) << text; }
   void add(const std::string& name, const std::string& text) {
-    std::ofstream(folder_ / name) << text;
+    write(name, text);
     files_.push_back(folder_ / name);
   }
   Imported import(const std::string& streams) {
     warnings.clear();
     std::ofstream(folder_ / "m.toml") << kHead << streams;
-    const Mapping mapping = read_mapping(folder_ / "m.toml");
+    Mapping mapping = read_mapping(folder_ / "m.toml");
+    place_markers(mapping, warnings);
     Channels channels(mapping.wanted(), mapping.wanted_times());
     for (const auto& file : files_) read_source(file, channels, warnings);
     return assemble(channels, mapping);
@@ -361,6 +364,97 @@ TEST(Exports, AreTablesWithAHead) {
       r.import(stream("time = \"field\"\ntime_field = \"Time (Seconds)\"\ncolumns = { x_m = \"robot Position X\", y_m "
                       "= \"robot Position Y\", z_m = \"robot Position Z\", qw = \"W 2\", qx = \"robot Rotation X\", qy "
                       "= \"robot Rotation Y\", qz = \"robot Rotation Z\" }\n")));
+}
+
+// ---- a pose from markers
+
+const Lines kMarkers = {"nose", "left", "right", "tail"};
+const std::vector<Eigen::Vector3d> kPlaces = {
+    {0.05, 0, 0.01}, {-0.04, 0.03, 0}, {-0.05, -0.02, 0.005}, {0, 0.01, 0.04}};
+const std::string kInBody =
+    "[mocap.markers]\nnose = [0.05, 0.0, 0.01]\nleft = [-0.04, 0.03, 0.0]\nright = [-0.05, -0.02, 0.005]\ntail = [0.0, "
+    "0.01, 0.04]\n";
+
+/// Markers in mm of a pose, of which `names` swaps the first two at frame 3, and one is lost at frame 5; none at kLost.
+std::string marker_cells(const Pose& at, int i, const char* separator, bool zeros) {
+  std::string text;
+  for (std::size_t k = 0; k < kPlaces.size(); ++k) {
+    const std::size_t of = i == 3 && k < 2 ? 1 - k : k;
+    const Eigen::Vector3d p = 1e3 * (at.p + at.q * kPlaces[of]);
+    const bool lost = i == kLost || (i == 5 && k == 2);
+    if (lost)
+      for (int c = 0; c < 3; ++c) text += separator + std::string(zeros ? "0.000" : "");
+    else text += numbers(separator, {p.x(), p.y(), p.z()});
+  }
+  return text;
+}
+
+std::string qtm_3d(bool names) {
+  std::string text =
+      "NO_OF_FRAMES\t20\nNO_OF_CAMERAS\t8\nNO_OF_MARKERS\t4\nFREQUENCY\t100\nDATA_INCLUDED\t3D\nMARKER_NAMES";
+  for (const std::string& name : kMarkers) text += "\t" + name;
+  text += "\n";
+  if (names) text += "Frame\tTime";
+  for (const std::string& name : kMarkers)
+    if (names) text += "\t" + name + " X\t" + name + " Y\t" + name + " Z";
+  if (names) text += "\n";
+  for (int i = 0; i < kFrames; ++i) {
+    const std::string cells = marker_cells(pose(i), i, "\t", true);
+    text += names ? std::to_string(i + 1) + numbers("\t", {0.01 * i}, 5) + cells + "\n" : cells.substr(1) + "\n";
+  }
+  return text;
+}
+
+std::string nexus(bool at_rest = false) {
+  std::string text = "Trajectories\n100\n,", axes = "\nFrame,Sub Frame", units = "\n,";
+  for (const std::string& name : kMarkers) text += "," + name + ",,", axes += ",X,Y,Z", units += ",mm,mm,mm";
+  text += axes + units + "\n";
+  // at rest: B's origin at (1, 2, 0.03), turned by 0.5 rad
+  const Pose rest{{1, 2, 0.03}, exponential({0, 0, 0.5})};
+  for (int i = 0; i < kFrames; ++i)
+    text += std::to_string(i) + ",0" + marker_cells(at_rest ? rest : pose(i), at_rest ? 0 : i, ",", false) + "\n";
+  return text;
+}
+
+TEST(Exports, OfMarkersGiveThePose) {
+  for (const std::string& text : {qtm_3d(true), qtm_3d(false), nexus()}) {
+    SCOPED_TRACE(text.substr(0, 100));
+    Recording r;
+    r.add(text.starts_with("NO_") ? "take.tsv" : "take.csv", text);
+    const Imported imported = r.import(stream("") + kInBody);
+    expect_motion(imported);
+    EXPECT_EQ(imported.report.warnings,
+              (Lines{"mocap: 1 frame with left and nose swapped: put right",
+                     "mocap: 1 frame in which left was not seen", "mocap: 1 frame in which nose was not seen",
+                     "mocap: 2 frames in which right was not seen", "mocap: 1 frame in which tail was not seen",
+                     "mocap: 1 samples are unusable: 1 no pose agrees with the markers"}));
+    const StreamReport& report = imported.report.streams[1];
+    ASSERT_EQ(report.residual_m.size(), kFrames - 1u);
+    for (const double residual_m : report.residual_m) EXPECT_LT(residual_m, 1e-9);  // mm with 9 digits
+  }
+}
+
+TEST(Exports, AtRestGiveThePlacesOfMarkers) {
+  Recording r;
+  r.add("take.csv", nexus());
+  r.write("rest.csv", nexus(true));
+  const std::string names = "markers = [\"nose\", \"left\", \"right\", \"tail\"]\n";
+  expect_motion(
+      r.import(stream(names) + "[mocap.at_rest]\nfile = \"rest.csv\"\nposition_m = [1.0, 2.0, 0.03]\nyaw_rad = 0.5\n"));
+  EXPECT_EQ(r.refusal(stream("markers = [\"nose\", \"left\"]\n") +
+                      "[mocap.at_rest]\nfile = \"rest.csv\"\nposition_m = [1.0, 2.0, 0.03]\n"),
+            "m.toml:16:11: mocap.markers: has 2 markers; accepted: at least 3 that are not in one line");
+  EXPECT_EQ(r.refusal(stream("markers = [\"nose\", \"left\", \"rigt\"]\n") +
+                      "[mocap.at_rest]\nfile = \"rest.csv\"\nposition_m = [1.0, 2.0, 0.03]\n"),
+            "m.toml:16:11: mocap.markers: \"rigt\" is no marker of the recording; accepted: nose, left, right, tail; "
+            "did you mean \"right\"?");
+  EXPECT_EQ(r.refusal(stream("frame = \"flu\"\n") + kInBody),
+            "m.toml:16:9: mocap.frame: is given with markers, whose places are in B; accepted: no frame");
+  EXPECT_EQ(r.refusal(stream("body = \"robot\"\ntolerance_m = 0.1\n")),
+            "m.toml:17:15: mocap.tolerance_m: is given without markers; accepted: markers");
+  EXPECT_EQ(r.refusal(stream("") +
+                      "[mocap.markers]\nnose = [0.0, 0.0, 0.0]\nleft = [0.1, 0.0, 0.0]\ntail = [0.2, 0.0, 0.0]\n"),
+            "m.toml:16:1: mocap.markers: are in one line; accepted: at least 3 that are not");
 }
 
 }  // namespace
