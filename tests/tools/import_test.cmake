@@ -46,6 +46,33 @@ expect_equal("stderr" "${err}" "")
 file(READ ${WORK}/of_tables/mocap.csv mocap)
 expect_equal("mocap.csv" "${mocap}" "t_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,1,0.002,0.003,1,0,0,0\n0.01,0.001,0.002,0.003,1,0,0,0\n")
 
+# ---- an export of motion capture, with the mapping that is shipped; y up in mm
+
+set(commands "time_us,m1,m2,m3,m4\n")
+set(take "Format Version,1.23,Take Name,hover,Export Frame Rate,100.000000,Rotation Type,Quaternion,Length Units,Millimeters\n\n,Type")
+foreach(row IN ITEMS "Rigid Body" "\n,Name" robot "\n,ID" 1 "\n,")
+  if(row MATCHES "\n")
+    string(APPEND take "${row}")
+  else()
+    string(REPEAT ",${row}" 7 cells)
+    string(APPEND take "${cells}")
+  endif()
+endforeach()
+string(APPEND take ",Rotation,Rotation,Rotation,Rotation,Position,Position,Position\nFrame,Time (Seconds),X,Y,Z,W,X,Y,Z\n")
+foreach(i RANGE 9)
+  string(APPEND commands "${i}0000,1,1,1,1\n")
+  string(APPEND take "${i},0.0${i},0,0,0,1,100${i},2000,3000\n")
+endforeach()
+file(WRITE ${WORK}/export/motors.csv "${commands}")
+file(WRITE ${WORK}/export/take.csv "${take}")
+set(export import ${WORK}/export/motors.csv ${WORK}/export/take.csv --mapping ${SOURCE}/configs/mapping/motion_capture.toml)
+run(${export} --out ${WORK}/of_export)
+expect_equal("stderr" "${err}" "")
+file(READ ${WORK}/of_export/mocap.csv mocap LIMIT 70)
+expect_match("mocap.csv" "${mocap}" "^t_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,1,-3,2,1,0,0,0\n0.01,1.001,-3,2,1,0,0,0\n")
+expect_refused("--set mocap.body=box: mocap.body: \"box\" is no rigid body of the recording; accepted: robot"
+  ${export} --out ${WORK}/refused --set mocap.body=box)
+
 # ---- one sample from before its clock was there: the flight is the others, and every program ends
 
 file(WRITE ${WORK}/zero/mapping.toml "schema = 1
