@@ -752,6 +752,10 @@ void put(FlightLog& log, Stream& s, std::int64_t start_ns) {
   } else if (s.mapping.name == "attitude") {
     log.attitude = AttitudeStream{t_s, c["qw"], c["qx"], c["qy"], c["qz"]};
     if (s.mapping.measures_rate) log.header.attitude->rate_hz = rate_hz;
+  } else if (s.mapping.name == "rig") {
+    log.forces = ForcesStream{
+        t_s, c["force_x_N"], c["force_y_N"], c["force_z_N"], c["moment_x_Nm"], c["moment_y_Nm"], c["moment_z_Nm"]};
+    if (s.mapping.measures_rate) log.header.rig->rate_hz = rate_hz;
   } else if (s.mapping.name == "policy") {
     log.policy.emplace().t_s = t_s;
     for (const std::string& name : log.header.policy) log.policy->numbers.push_back(c[name]);

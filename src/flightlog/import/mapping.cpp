@@ -42,6 +42,12 @@ const std::vector<StreamKeys> kStreams = {
      {"battery_nominal_V", "latency_s", "voltage_noise_V", "current_noise_A"},
      false,
      false},
+    {"rig",
+     {"force_x_N", "force_y_N", "force_z_N", "moment_x_Nm", "moment_y_Nm", "moment_z_Nm"},
+     {},
+     {"support", "latency_s", "position_m", "attitude", "force_noise_N", "moment_noise_Nm", "resonance_hz"},
+     false,
+     false},
     {"wings",
      {"left_stroke_rad", "left_rotation_rad", "right_stroke_rad", "right_rotation_rad"},
      {},
@@ -241,10 +247,17 @@ void read_declared(const io::Table& root, FlightHeader& h) {
   const io::Range rate = positive(1e6), latency = non_negative(10);
   const auto rate_of = [&](const io::Table& table) { return table.number_or("rate_hz", 0, rate); };
   const bool declared = !h.inputs.empty();
-  const io::Table mocap = root.table("mocap");
-  h.mocap = {rate_of(mocap), mocap.number("latency_s", latency), mocap.number("position_noise_m", non_negative(1)),
-             mocap.number("attitude_noise_rad", non_negative(1)), read_pose_source(mocap, declared)};
-  if (!declared || root.has("imu")) {
+  const auto rig = root.optional_table("rig");
+  if (rig) {
+    h.rig = read_rig(*rig);
+    h.rig->rate_hz = rate_of(*rig);
+  }
+  if (!rig) {
+    const io::Table mocap = root.table("mocap");
+    h.mocap = {rate_of(mocap), mocap.number("latency_s", latency), mocap.number("position_noise_m", non_negative(1)),
+               mocap.number("attitude_noise_rad", non_negative(1)), read_pose_source(mocap, declared)};
+  }
+  if (!rig && (!declared || root.has("imu"))) {
     const io::Table imu = root.table("imu");
     h.imu.rate_hz = rate_of(imu);
     h.imu.latency_s = imu.number("latency_s", latency);
@@ -318,8 +331,12 @@ Mapping read_mapping(const std::filesystem::path& path, const std::vector<std::s
   m.from_first = root.choice_or("start", "first", {"first", "clock"}) == "first";
   h.ambient = read_ambient(root.table("ambient"));
   for (const StreamKeys& keys : kStreams) {
-    const bool declared = !h.inputs.empty(),
-               needed = keys.name == "command" || keys.name == "mocap" || (keys.name == "imu" && !declared);
+    const bool declared = !h.inputs.empty(), flies = !root.has("rig");
+    const bool needed =
+        keys.name == "command" || (flies && (keys.name == "mocap" || (keys.name == "imu" && !declared)));
+    if (!flies && root.has(keys.name))
+      for (const char* other : {"mocap", "imu", "attitude", "policy"})
+        if (keys.name == other) root.fail(keys.name, "is of a robot that flies", "[rig] without it, or none");
     if (!needed && !root.has(keys.name)) continue;
     m.streams.push_back(read_stream(keys, root.table(keys.name), declared));
   }

@@ -72,6 +72,8 @@
 //   currents = true                          # default; false, with declared inputs only: battery_V alone
 //   [wings]                                  # optional
 //   noise_rad
+//   [rig]                                    # of a clamped robot, in place of mocap and imu: columns are those of
+//                                            # forces.csv, other keys those of [rig] in flight.toml
 //   [attitude]                               # optional: attitude of a second estimator; world and frame as above
 //   latency_s, noise_rad
 //   [policy]                                 # optional: what an exported policy got and gave

@@ -43,6 +43,31 @@ void expect_near(const Column& a, const Column& b, double tolerance) {
   for (std::size_t i = 0; i < a.size(); ++i) ASSERT_NEAR(a[i], b[i], tolerance) << i;
 }
 
+TEST(Assemble, TakesTheTablesOfAForceSensor) {
+  const io::TemporaryFolder folder;
+  std::ofstream motors(folder / "motors.csv"), forces(folder / "forces.csv");
+  motors << "time,left,right\n";
+  forces << "time,Fx,Fy,Fz,Tx,Ty,Tz\n";
+  for (int i = 0; i < 200; ++i) {
+    motors << 0.005 * i << "," << i % 7 << "," << i % 5 << "\n";
+    forces << 0.005 * i << ",0.1,-0.2," << 0.01 * i << ",1,2," << i << "\n";
+  }
+  motors.close(), forces.close();
+  const Mapping mapping = mapping_of("bench.toml");
+  const Imported in = import_recording({folder / "motors.csv", folder / "forces.csv"}, mapping, folder / "bench");
+  EXPECT_NEAR(in.log.header.rig->rate_hz, 200, 1e-6);
+  const FlightLog log = read_flight_log(folder / "bench");
+  EXPECT_EQ(log, in.log);
+  ASSERT_EQ(log.forces->t_s.size(), 200u);
+  EXPECT_DOUBLE_EQ(log.forces->force_z_N[100], 1);
+  EXPECT_DOUBLE_EQ(log.forces->moment_z_Nm[100], 0.1);
+  EXPECT_NE(
+      test::refusal([&] { mapping_of("bench.toml", {"mocap.channel=\"camera\""}); }).find("is of a robot that flies"),
+      std::string::npos);
+  EXPECT_NE(test::refusal([&] { mapping_of("bench.toml", {"rig.attitude=[1.0, 1.0, 0.0, 0.0]"}); }).find("length 1"),
+            std::string::npos);
+}
+
 TEST(Import, GivesBackALogThatWasWrittenAsTopics) {
   const FlightLog log = test::some_log();
   // by the times of receipt, which are those of the log

@@ -37,7 +37,7 @@ TEST(Mapping, ShippedOnesAreRead) {
     EXPECT_TRUE(fs::exists(kMappings.parent_path() / "vehicles" / m.header.vehicle)) << entry.path();
     ++count;
   }
-  EXPECT_EQ(count, 11);
+  EXPECT_EQ(count, 12);
 }
 
 // Firmwares spell a field in two ways: a list of names, of which a recording has one.
@@ -81,9 +81,10 @@ TEST(Mapping, RefusesFaults) {
   EXPECT_EQ(edited("channel = \"/pose\"\n", ""), "m.toml:27:1: mocap.channel: is missing; accepted: a string");
   EXPECT_EQ(
       edited("channel = \"/pose\"", "topic = \"/pose\""),
-      "m.toml:28:1: mocap.topic: unknown key; accepted: attitude_noise_rad, channel, clock, columns, frame, "
-      "from, late_s, "
-      "latency_s, offset, position_noise_m, rate_hz, scale, sequence, source, time, time_field, time_unit, world");
+      "m.toml:28:1: mocap.topic: unknown key; accepted: at_rest, attitude_noise_rad, body, channel, clock, columns, "
+      "frame, "
+      "from, late_s, latency_s, markers, offset, position_noise_m, rate_hz, rotation, scale, sequence, source, time, "
+      "time_field, time_unit, tolerance_m, world");
   EXPECT_EQ(edited("x_m = \"pose", "x_mm = \"pose"),
             "m.toml:34:1: mocap.columns.x_mm: unknown key; accepted here with another unit: \"x_m\"");
   EXPECT_EQ(edited("qz = \"pose.orientation.z\"\n", ""),
