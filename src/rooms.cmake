@@ -52,7 +52,7 @@ function(flappy_plugin name source)
   target_compile_options(flappy_${name} PRIVATE $<$<CONFIG:Release>:-O1>)  # their work is done in the libraries that they open
   set_property(GLOBAL APPEND PROPERTY flappy_installed flappy_${name})
   set(component torch)
-  if(name STREQUAL "onnx")
+  if(name MATCHES "^(onnx|matlab)$")
     set(component programs)
   endif()
   install(TARGETS flappy_${name} LIBRARY DESTINATION lib/flappy COMPONENT ${component})

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "flightlog/import/gzip.hpp"
+#include "flightlog/import/matlab.hpp"
 #include "flightlog/import/message_rows.hpp"
 #include "flightlog/import/table.hpp"
 #include "flightlog/import/ulog.hpp"
@@ -96,8 +97,7 @@ const OtherKind kOtherKinds[] = {
     {"7z\xBC\xAF\x27\x1C"sv, 0, {".7z"}, "a 7z archive", "7z x FILE"},
     {"ustar"sv, 257, {".tar", ".tgz"}, "a tar archive", "tar xf FILE"},
     {"\x89HDF\r\n"sv, 0, {".h5", ".hdf5"}, "an HDF5 file", "export it as CSV"},
-    {"MATLAB 5.0 MAT-file"sv, 0, {".mat"}, "a MATLAB file", "writetable, and the CSV"},
-    {"MATLAB 7.3 MAT-file"sv, 0, {".mat"}, "a MATLAB file", "writetable, and the CSV"},
+    {"MATLAB "sv, 0, {".mat"}, "a MATLAB file compressed by gzip", "gunzip FILE"},  // plain ones were recognised before
     {"PAR1"sv, 0, {".parquet"}, "a Parquet file", "pandas.read_parquet(FILE).to_csv(...)"},
     {"\x93NUMPY"sv, 0, {".npy"}, "a NumPy array", "numpy.savetxt with header= and delimiter=\",\""},
     {"\xA3\x95"sv, 0, {}, "a log of ArduPilot", kOfArduPilot},
@@ -110,7 +110,7 @@ const OtherKind kOtherKinds[] = {
 
 /// InputError for files that are no text, recognised by their first bytes or by the ending of their names.
 void require_text(const fs::path& file, const std::string& ending, std::string_view bytes) {
-  constexpr std::string_view kAccepted = "a bag, a ULog, a usdlog or a CSV";
+  constexpr std::string_view kAccepted = "a bag, a ULog, a usdlog, a MATLAB file or a CSV";
   for (const OtherKind& kind : kOtherKinds)
     if (bytes.substr(std::min(kind.at, bytes.size())).starts_with(kind.begins))
       throw io::InputError(file.string() + ": is " + std::string(kind.what) + "; accepted: " + std::string(kAccepted) +
@@ -140,6 +140,7 @@ void read_source(const fs::path& file, Channels& channels, std::vector<std::stri
   std::error_code ignored;
   if (fs::is_directory(file, ignored) || ros::Bag::is_bag(file)) return read_bag(file, channels, warnings);
   const io::MappedFile mapped(file);
+  if (is_matlab(mapped.bytes())) return read_matlab(file, mapped.bytes(), channels, warnings);
   if (!is_gzip(mapped.bytes())) return read_bytes(file, file, mapped.bytes(), channels, warnings);
   const std::string unpacked = gunzipped(mapped.bytes(), file.string(), warnings);
   read_bytes(file, file.extension() == ".gz" ? file.stem() : file, unpacked, channels, warnings);
