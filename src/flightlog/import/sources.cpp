@@ -7,6 +7,7 @@
 #include <set>
 #include <string_view>
 
+#include "flightlog/import/dataflash.hpp"
 #include "flightlog/import/gzip.hpp"
 #include "flightlog/import/matlab.hpp"
 #include "flightlog/import/message_rows.hpp"
@@ -71,7 +72,6 @@ struct OtherKind {
 };
 
 using namespace std::string_view_literals;
-constexpr std::string_view kOfArduPilot = "mavlogdump.py --format csv --types IMU FILE, one table for each type";
 const OtherKind kOtherKinds[] = {
     {"\x89MCAP0\r\n"sv,
      0,
@@ -100,9 +100,11 @@ const OtherKind kOtherKinds[] = {
     {"MATLAB "sv, 0, {".mat"}, "a MATLAB file compressed by gzip", "gunzip FILE"},  // plain ones were recognised before
     {"PAR1"sv, 0, {".parquet"}, "a Parquet file", "pandas.read_parquet(FILE).to_csv(...)"},
     {"\x93NUMPY"sv, 0, {".npy"}, "a NumPy array", "numpy.savetxt with header= and delimiter=\",\""},
-    {"\xA3\x95"sv, 0, {}, "a log of ArduPilot", kOfArduPilot},
-    {"FMT, 128, 89,"sv, 0, {}, "a text log of ArduPilot", kOfArduPilot},
-    {"H Product:Blackbox flight data recorder"sv, 0, {}, "a blackbox log of Betaflight", "blackbox_decode FILE"},
+    {"H Product:Blackbox flight data recorder"sv,
+     0,
+     {".bbl", ".bfl"},
+     "a blackbox log of Betaflight or INAV",
+     "blackbox_decode FILE, of that firmware's blackbox-tools"},
     {"\xD0\xCF\x11\xE0"sv, 0, {".xls"}, "an Excel file", "export it as CSV"},
     {"\xFF\xFE"sv, 0, {}, "text in UTF-16", "iconv -f UTF-16 -t UTF-8 FILE"},
     {"\xFE\xFF"sv, 0, {}, "text in UTF-16", "iconv -f UTF-16 -t UTF-8 FILE"},
@@ -110,7 +112,7 @@ const OtherKind kOtherKinds[] = {
 
 /// InputError for files that are no text, recognised by their first bytes or by the ending of their names.
 void require_text(const fs::path& file, const std::string& ending, std::string_view bytes) {
-  constexpr std::string_view kAccepted = "a bag, a ULog, a usdlog, a MATLAB file or a CSV";
+  constexpr std::string_view kAccepted = "a bag, a ULog, a usdlog, a log of ArduPilot, a MATLAB file or a CSV";
   for (const OtherKind& kind : kOtherKinds)
     if (bytes.substr(std::min(kind.at, bytes.size())).starts_with(kind.begins))
       throw io::InputError(file.string() + ": is " + std::string(kind.what) + "; accepted: " + std::string(kAccepted) +
@@ -125,11 +127,13 @@ void require_text(const fs::path& file, const std::string& ending, std::string_v
     throw io::InputError(file.string() + ": holds bytes that are no text; accepted: " + std::string(kAccepted));
 }
 
-/// Reads a file that is no bag as a ULog, a usdlog or a table; `plain` is its name without ".gz".
+/// Reads a file that is neither a bag nor of MATLAB; `plain` is its name without ".gz".
 void read_bytes(const fs::path& file, const fs::path& plain, std::string_view bytes, Channels& channels,
                 std::vector<std::string>& warnings) {
   if (is_ulog(bytes)) return read_ulog(bytes, file.string(), channels, warnings);
   if (is_usdlog(bytes)) return read_usdlog(bytes, file.string(), channels, warnings);
+  if (is_dataflash(bytes)) return read_dataflash(bytes, file.string(), channels, warnings);
+  if (is_dataflash_text(bytes)) return read_dataflash_text(bytes, file.string(), channels, warnings);
   require_text(file, plain.extension().string(), bytes);
   read_table(bytes, file.string(), plain.stem().string(), channels, warnings);
 }

@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <limits>
 #include <map>
 
 #include "flightlog/import/bytes.hpp"
@@ -18,16 +16,6 @@ namespace {
 constexpr char kUsdlogMagic = '\xBC';
 constexpr std::size_t kChecksum = 4;
 constexpr std::uint16_t kMilliseconds = 1, kMicroseconds = 2;  // versions, by the unit of their times
-
-/// A half-precision number (IEEE 754 binary16).
-double read_half(const char* bytes) {
-  const auto bits = number_at<std::uint16_t>(bytes);
-  const int exponent = bits >> 10 & 0x1F, fraction = bits & 0x3FF;
-  const double sign = (bits & 0x8000) != 0 ? -1 : 1;
-  if (exponent == 0x1F)
-    return fraction != 0 ? std::numeric_limits<double>::quiet_NaN() : sign * std::numeric_limits<double>::infinity();
-  return sign * (exponent == 0 ? std::ldexp(fraction, -24) : std::ldexp(fraction + 0x400, exponent - 25));
-}
 
 struct Type {
   char code;

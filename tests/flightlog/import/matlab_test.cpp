@@ -167,7 +167,8 @@ TEST(Matlab, RefusesWhatItCannotRead) {
   EXPECT_EQ(refusal(whole.substr(0, whole.size() - 500)),
             ": is damaged or was cut off; accepted: what save of MATLAB wrote");
   EXPECT_EQ(refusal("Matlab? no"),
-            ": does not begin as a .mat file; accepted: a bag, a ULog, a usdlog, a MATLAB file or a CSV");
+            ": does not begin as a .mat file; accepted: a bag, a ULog, a usdlog, a log of ArduPilot, a MATLAB file, a "
+            "C3D or a CSV");
 }
 
 TEST(Matlab, OutlivesAnyDamage) {

@@ -119,7 +119,8 @@ TEST(Sources, RefuseWhatTheyCannotRead) {
   const std::string at = folder.path().string();
   std::ofstream(folder / "f.mcap") << "t,x\n";
   EXPECT_EQ(test::refusal([&] { read(folder / "f.mcap"); }),
-            at + "/f.mcap: does not begin as a .mcap file; accepted: a bag, a ULog, a usdlog, a MATLAB file or a CSV");
+            at + "/f.mcap: does not begin as a .mcap file; accepted: a bag, a ULog, a usdlog, a log of ArduPilot, a "
+                 "MATLAB file or a CSV");
   std::ofstream(folder / "f.csv") << "t,x\n1,2,3\n";
   EXPECT_EQ(test::refusal([&] { read(folder / "f.csv"); }),
             at + "/f.csv:2:1: 3 cells for 2 names, and no row is otherwise; accepted: rows of as many cells");
@@ -137,7 +138,7 @@ TEST(Sources, SayWhatOtherFilesAre) {
     const std::string line = test::refusal([&] { read(folder / name); });
     return line.substr(std::min(line.size(), (folder / name).string().size()));
   };
-  const std::string accepted = "; accepted: a bag, a ULog, a usdlog, a MATLAB file or a CSV";
+  const std::string accepted = "; accepted: a bag, a ULog, a usdlog, a log of ArduPilot, a MATLAB file or a CSV";
   EXPECT_EQ(refusal("log.bag", "#ROSBAG V2.0\n..."),
             ": is a bag of ROS 1" + accepted + ", as made by: rosbags-convert --src FILE --dst FOLDER");
   EXPECT_EQ(refusal("named.csv", "#ROSBAG V2.0\n..."),
@@ -146,13 +147,9 @@ TEST(Sources, SayWhatOtherFilesAre) {
             ": is compressed by zstd" + accepted + ", as made by: zstd -d FILE");
   EXPECT_EQ(refusal("log.zip", "PK\x03\x04..."), ": is a zip archive, as .npz and .xlsx files are" + accepted +
                                                      ", as made by: unzip FILE, or export it as CSV");
-  const std::string ardupilot =
-      accepted + ", as made by: mavlogdump.py --format csv --types IMU FILE, one table for each type";
-  EXPECT_EQ(refusal("flight.bin", "\xA3\x95\x80\x80YFMT"), ": is a log of ArduPilot" + ardupilot);
-  EXPECT_EQ(refusal("flight.log", "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nIMU, 0, 0.0\n"),
-            ": is a text log of ArduPilot" + ardupilot);
   EXPECT_EQ(refusal("flight.bbl", "H Product:Blackbox flight data recorder by Nicholas Sherlock\nH Data version:2\n"),
-            ": is a blackbox log of Betaflight" + accepted + ", as made by: blackbox_decode FILE");
+            ": is a blackbox log of Betaflight or INAV" + accepted +
+                ", as made by: blackbox_decode FILE, of that firmware's blackbox-tools");
   EXPECT_EQ(refusal("take.mat.gz", gzipped("MATLAB 5.0 MAT-file, Platform: GLNXA64")),
             ": is a MATLAB file compressed by gzip" + accepted + ", as made by: gunzip FILE");
   EXPECT_EQ(refusal("any.zip", "any bytes"), ": does not begin as a .zip file" + accepted);
