@@ -1,6 +1,9 @@
 #include "flightlog/import/matlab.hpp"
 
 #include <algorithm>
+#include <cstring>
+#include <functional>
+#include <limits>
 #include <map>
 #include <numeric>
 
@@ -118,7 +121,7 @@ class FromChild {
   std::vector<T> list() {
     const std::string_view raw = content(sizeof(T));
     std::vector<T> values(raw.size() / sizeof(T));
-    std::memcpy(values.data(), raw.data(), values.size() * sizeof(T));
+    if (!raw.empty()) std::memcpy(values.data(), raw.data(), raw.size());
     return values;
   }
   std::string text() { return std::string(content(1)); }

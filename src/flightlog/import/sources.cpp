@@ -7,6 +7,7 @@
 #include <set>
 #include <string_view>
 
+#include "flightlog/import/c3d.hpp"
 #include "flightlog/import/dataflash.hpp"
 #include "flightlog/import/gzip.hpp"
 #include "flightlog/import/matlab.hpp"
@@ -112,12 +113,12 @@ const OtherKind kOtherKinds[] = {
 
 /// InputError for files that are no text, recognised by their first bytes or by the ending of their names.
 void require_text(const fs::path& file, const std::string& ending, std::string_view bytes) {
-  constexpr std::string_view kAccepted = "a bag, a ULog, a usdlog, a log of ArduPilot, a MATLAB file or a CSV";
+  constexpr std::string_view kAccepted = "a bag, a ULog, a usdlog, a log of ArduPilot, a MATLAB file, a C3D or a CSV";
   for (const OtherKind& kind : kOtherKinds)
     if (bytes.substr(std::min(kind.at, bytes.size())).starts_with(kind.begins))
       throw io::InputError(file.string() + ": is " + std::string(kind.what) + "; accepted: " + std::string(kAccepted) +
                            ", as made by: " + std::string(kind.remedy));
-  std::vector<std::string_view> named = {".ulg"};
+  std::vector<std::string_view> named = {".ulg", ".c3d"};
   for (const OtherKind& kind : kOtherKinds) named.insert(named.end(), kind.endings);
   if (std::ranges::find(named, ending) != named.end())
     throw io::InputError(file.string() + ": does not begin as a " + ending +
@@ -134,6 +135,7 @@ void read_bytes(const fs::path& file, const fs::path& plain, std::string_view by
   if (is_usdlog(bytes)) return read_usdlog(bytes, file.string(), channels, warnings);
   if (is_dataflash(bytes)) return read_dataflash(bytes, file.string(), channels, warnings);
   if (is_dataflash_text(bytes)) return read_dataflash_text(bytes, file.string(), channels, warnings);
+  if (is_c3d(bytes)) return read_c3d(bytes, file.string(), plain.stem().string(), channels, warnings);
   require_text(file, plain.extension().string(), bytes);
   read_table(bytes, file.string(), plain.stem().string(), channels, warnings);
 }

@@ -120,7 +120,7 @@ TEST(Sources, RefuseWhatTheyCannotRead) {
   std::ofstream(folder / "f.mcap") << "t,x\n";
   EXPECT_EQ(test::refusal([&] { read(folder / "f.mcap"); }),
             at + "/f.mcap: does not begin as a .mcap file; accepted: a bag, a ULog, a usdlog, a log of ArduPilot, a "
-                 "MATLAB file or a CSV");
+                 "MATLAB file, a C3D or a CSV");
   std::ofstream(folder / "f.csv") << "t,x\n1,2,3\n";
   EXPECT_EQ(test::refusal([&] { read(folder / "f.csv"); }),
             at + "/f.csv:2:1: 3 cells for 2 names, and no row is otherwise; accepted: rows of as many cells");
@@ -138,7 +138,7 @@ TEST(Sources, SayWhatOtherFilesAre) {
     const std::string line = test::refusal([&] { read(folder / name); });
     return line.substr(std::min(line.size(), (folder / name).string().size()));
   };
-  const std::string accepted = "; accepted: a bag, a ULog, a usdlog, a log of ArduPilot, a MATLAB file or a CSV";
+  const std::string accepted = "; accepted: a bag, a ULog, a usdlog, a log of ArduPilot, a MATLAB file, a C3D or a CSV";
   EXPECT_EQ(refusal("log.bag", "#ROSBAG V2.0\n..."),
             ": is a bag of ROS 1" + accepted + ", as made by: rosbags-convert --src FILE --dst FOLDER");
   EXPECT_EQ(refusal("named.csv", "#ROSBAG V2.0\n..."),
