@@ -94,7 +94,7 @@ class DataflashReader {
  protected:
   void say(const std::string& what) const { warnings_.push_back(name_ + ": " + what); }
 
-  /// False for a description that contradicts itself.
+  /// False for a description that contradicts itself; `size` 0: that of a text, where it says nothing.
   bool describe(int id, std::size_t size, std::string_view name, std::string_view letters, std::string_view columns) {
     MessageType type{std::string(name), std::string(letters), {}, size, std::nullopt, {}, {}};
     for (const std::string_view column : parts_of(columns)) type.columns.emplace_back(column);
@@ -112,8 +112,7 @@ class DataflashReader {
       for (std::size_t i = 0; letters[k] == 'a' && i < kArrayNumbers; ++i)
         type.fields.push_back(type.columns[k] + "[" + std::to_string(i) + "]");
     }
-    // lengths of types that the text form describes need not be those of its lines
-    if (!sound || !type.sound() || length != size) return false;
+    if (!sound || !type.sound() || (size > 0 && length != size)) return false;
     for (const std::string& field : type.fields) type.row.push_back({field, 0});
     types_[id] = std::move(type);
     return true;
@@ -123,6 +122,12 @@ class DataflashReader {
     const std::size_t at = units.find('#');
     if (const auto type = types_.find(id); type != types_.end() && at < type->second.columns.size())
       type->second.instance = at;
+  }
+
+  /// Whether a type describes others, and is no channel.
+  static bool describes(const MessageType& type) {
+    constexpr std::array<std::string_view, 4> kNames = {"FMT", "FMTU", "UNIT", "MULT"};
+    return std::ranges::find(kNames, type.name) != kNames.end();
   }
 
   /// Adds the row of a message, whose times are among its numbers.
@@ -261,6 +266,7 @@ class DataflashBinary : public DataflashReader {
   }
 
   void take(MessageType& type, std::size_t at) {
+    if (describes(type)) return;
     if (type.row.empty() || !channels_.wants(type.name)) {
       if (!type.instance) {
         if (declared_.insert(type.name).second) channels_.add(type.name, type.fields);
@@ -322,12 +328,11 @@ class DataflashText : public DataflashReader {
   }
 
   void learn(const std::vector<std::string_view>& cells) {
-    const double id = number(cells[1]), size = number(cells[2]);
+    const double id = number(cells[1]);
     const std::string_view columns(
         cells[5].data(), static_cast<std::size_t>(cells.back().data() + cells.back().size() - cells[5].data()));
     if (id == kFmt) return;
-    const bool sound = id >= 0 && id < 256 && size >= 0 && size < 65536 &&
-                       describe(static_cast<int>(id), static_cast<std::size_t>(size), cells[3], cells[4], columns);
+    const bool sound = id >= 0 && id < 256 && describe(static_cast<int>(id), 0, cells[3], cells[4], columns);
     if (sound) by_name_[std::string(cells[3])] = static_cast<int>(id);
     else contradictory_.insert(std::isfinite(id) ? static_cast<int>(std::clamp(id, -1.0, 256.0)) : -1);
   }
@@ -337,6 +342,7 @@ class DataflashText : public DataflashReader {
     const auto known = by_name_.find(std::string(cells[0]));
     if (known == by_name_.end()) return bad();
     MessageType& type = types_.at(known->second);
+    if (describes(type)) return;
     // a text may hold commas: it is the last column where it does
     const bool ends_in_text = !letter_of(type.letters.back())->read;
     if (cells.size() != type.columns.size() + 1 && !(ends_in_text && cells.size() > type.columns.size() + 1))

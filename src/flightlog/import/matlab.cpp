@@ -149,12 +149,12 @@ struct MatlabColumns {
 
   void add(const Shape& shape, const std::vector<double>& numbers, const Channels& channels) {
     fields.insert(fields.end(), shape.fields.begin(), shape.fields.end());
+    if (channels.wants(shape.channel)) rows = std::max(rows, shape.rows);
     for (std::size_t f = 0; f < shape.fields.size() && !numbers.empty(); ++f) {
       if (!channels.wants(shape.channel, shape.fields[f])) continue;
       row.push_back({shape.fields[f], 0});
       auto& column = values.emplace_back();
       for (std::size_t k = 0; k < shape.rows; ++k) column.push_back(numbers[shape.begins[f] + k * shape.step]);
-      rows = std::max(rows, shape.rows);
     }
   }
 };

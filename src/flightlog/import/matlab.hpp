@@ -1,9 +1,9 @@
 // Reads MATLAB's .mat files of version 5 to 7.3.
 //
 // A struct is a channel, as "mocap"; its fields are "t", "position[0]", "signals.values[2]". An element of an array of
-// structs is one, too, as "trial[1]". Arrays outside structs are fields of a channel that is named by the file's stem. The
-// longest side of an array is its rows, the first of equal ones; the other sides longer than 1 give indices from 0. Fields
-// shorter than others of their channel end with missing values. Single numbers and texts are no fields.
+// structs is one, too, as "trial[1]". Arrays outside structs are fields of a channel that is named by the file's stem.
+// The longest side of an array is its rows, the first of equal ones; the other sides longer than 1 give indices from 0.
+// Fields shorter than others of their channel end with missing values. Single numbers and texts are no fields.
 #pragma once
 
 #include <filesystem>

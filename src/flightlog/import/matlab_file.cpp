@@ -1,5 +1,6 @@
-// The plugin that reads MATLAB files: version 5 to 7 by libmatio [1], 7.3, which is HDF5, by its C library: of class names
-// that are padded by zeros, as h5py writes them, libmatio 1.5.23 drops the last letter, and numbers come as nothing.
+// The plugin that reads MATLAB files: version 5 to 7 by libmatio [1], 7.3, which is HDF5, by its C library: of class
+// names that are padded by zeros, as h5py writes them, libmatio 1.5.23 drops the last letter, and numbers come as
+// nothing.
 // [1] MathWorks, MAT-File Format: elements of a type, a size and that many bytes.
 #include "flightlog/import/matlab_file.hpp"
 

@@ -25,8 +25,8 @@ class MatlabSink {
 
 /// The functions of the plugin.
 struct MatlabFunctions {
-  /// Reads a file of version 5 to 7.3 that has these bytes. InputError, beginning with the path. May crash on damaged files:
-  /// call it in a child process.
+  /// Reads a file of version 5 to 7.3 that has these bytes. InputError, beginning with the path. May crash on damaged
+  /// files: call it in a child process.
   void (*read)(const std::string& path, std::string_view bytes, MatlabSink& sink);
 };
 extern "C" const MatlabFunctions flappy_matlab_functions;  ///< the only symbol that the plugin exports

@@ -124,6 +124,8 @@ TEST(Matlab, ReadsWhatIsWantedAlone) {
   EXPECT_EQ(channels.find("mocap")->column("position[0]"), nullptr);
   EXPECT_EQ(channels.find("mocap")->fields().size(), 5u);
   EXPECT_TRUE(channels.find("take")->stamp_ns().empty());
+  // rows without a wanted field, so that its name is what is refused
+  EXPECT_EQ(read(folder / "take.mat", nullptr, {{"mocap", {"time"}}}).find("mocap")->stamp_ns().size(), 4u);
 }
 
 TEST(Matlab, FillsShorterColumns) {
