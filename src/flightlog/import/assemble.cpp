@@ -684,23 +684,32 @@ Eigen::Quaterniond attitude_of(const Columns& c, std::size_t i) {
 
 Eigen::Quaterniond eigen_of(const Quaternion& q) { return {q.w, q.x, q.y, q.z}; }
 
-/// The angle, rad, from z of W to the mean specific force of the IMU, turned to W by the attitude `q` of each pose.
+/// The mean specific force of the IMU, m/s2, turned to W by the attitude `q` of each pose.
 template <typename Attitude>
-double tilt_of_force(const Stream& mocap, const Stream& imu, const Attitude& q) {
+Eigen::Vector3d mean_force(const Stream& mocap, const Stream& imu, const Attitude& q) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   const std::vector<std::size_t> rows = last_rows(imu.t_ns, mocap.t_ns);
   for (std::size_t i = 0; i < rows.size(); ++i)
     if (rows[i] < mocap.t_ns.size())
       sum += q(rows[i]) * Eigen::Vector3d(imu.columns.at("accel_x_m_s2")[i], imu.columns.at("accel_y_m_s2")[i],
                                           imu.columns.at("accel_z_m_s2")[i]);
-  return std::atan2(sum.head<2>().norm(), sum.z());
+  return sum / static_cast<double>(rows.size());
 }
+
+double tilt_of(const Eigen::Vector3d& force) { return std::atan2(force.head<2>().norm(), force.z()); }
 
 /// InputError where the axes that the mapping gives a body of an export contradict gravity: over a flight, the specific
 /// force in W is on average up, but for the change of speed by the flight's time.
-void require_up(const Stream& mocap, const Stream& imu) {
+void require_up(const Stream& mocap, const Stream& imu, double gravity_m_s2) {
   constexpr double kMaxTilt_rad = std::numbers::pi / 4;  // beyond, another axis is nearer to up
-  const double tilt_rad = tilt_of_force(mocap, imu, [&](std::size_t i) { return attitude_of(mocap.columns, i); });
+  constexpr double kMinShare = 0.5;  // of gravity: a robot that falls for half of its log says nothing of up
+  double size_m_s2 = 0;
+  for (std::size_t i = 0; i < imu.t_ns.size(); ++i)
+    size_m_s2 += std::hypot(imu.columns.at("accel_x_m_s2")[i], imu.columns.at("accel_y_m_s2")[i],
+                            imu.columns.at("accel_z_m_s2")[i]) /
+                 static_cast<double>(imu.t_ns.size());
+  if (size_m_s2 < kMinShare * gravity_m_s2) return;
+  const double tilt_rad = tilt_of(mean_force(mocap, imu, [&](std::size_t i) { return attitude_of(mocap.columns, i); }));
   if (tilt_rad < kMaxTilt_rad) return;
   const Eigen::Quaterniond world = eigen_of(turn_of(mocap.mapping.world)), axes = eigen_of(turn_of(mocap.mapping.axes));
   std::vector<std::string> fitting;
@@ -711,7 +720,7 @@ void require_up(const Stream& mocap, const Stream& imu) {
         return eigen_of(turn_of(w)) * world.conjugate() * attitude_of(mocap.columns, i) * axes.conjugate() *
                eigen_of(turn_of(a));
       };
-      if (tilt_of_force(mocap, imu, turned) < kMaxTilt_rad)
+      if (tilt_of(mean_force(mocap, imu, turned)) < kMaxTilt_rad)
         fitting.push_back(std::string("world = \"") + world_name + "\" with frame = \"" + axes_name + "\"");
     }
   mocap.mapping.table.fail(
@@ -800,7 +809,8 @@ Imported assemble(const Channels& channels, const Mapping& mapping) {
   }
   const auto imu = std::ranges::find(streams, "imu", [](const Stream& s) { return s.mapping.name; });
   for (const Stream& s : streams)
-    if ((!s.mapping.body.empty() || !s.mapping.markers.empty()) && imu != streams.end()) require_up(s, *imu);
+    if ((!s.mapping.body.empty() || !s.mapping.markers.empty()) && imu != streams.end())
+      require_up(s, *imu, mapping.header.gravity_m_s2);
   out.report.clocks = clocks.reports();
   if (mapping.from_first) {
     out.report.start_ns = streams.front().t_ns.front();

@@ -340,12 +340,15 @@ TEST(Exports, ThatWereCutOffAreWarnedOf) {
 TEST(Exports, AreHeldAgainstGravity) {
   Recording r;
   r.add("take.csv", motive("1.23", "Quaternion", "Meters"));
-  std::string imu = "t,x,y,z\n";
-  for (int i = 0; i < kFrames; ++i) {
-    const Eigen::Vector3d f = pose(i).q.conjugate() * Eigen::Vector3d(0, 0, 9.81);
-    imu += numbers("", {0.01 * i}) + numbers(",", {f.x(), f.y(), f.z()}) + "\n";
-  }
-  r.add("imu.csv", imu);
+  const auto imu = [](double up_m_s2) {
+    std::string text = "t,x,y,z\n";
+    for (int i = 0; i < kFrames; ++i) {
+      const Eigen::Vector3d f = pose(i).q.conjugate() * Eigen::Vector3d(0, 0, up_m_s2);
+      text += numbers("", {0.01 * i}) + numbers(",", {f.x(), f.y(), f.z()}) + "\n";
+    }
+    return text;
+  };
+  r.add("imu.csv", imu(9.81));
   const std::string with =
       "[imu]\nchannel = \"imu\"\ntime = \"field\"\ntime_field = \"t\"\nlatency_s = 0.0\nbandwidth_hz = "
       "80.0\nposition_m = [0.0, 0.0, 0.0]\naccel_noise_m_s2 = 0.3\ngyro = false\ncolumns = { accel_x_m_s2 = \"x\", "
@@ -354,6 +357,8 @@ TEST(Exports, AreHeldAgainstGravity) {
   const std::string line = r.refusal(stream("body = \"robot\"\nworld = \"enu\"\nframe = \"fur\"\n") + with);
   EXPECT_NE(line.find("m.toml:17:9: mocap.world: the mean force on the IMU points "), std::string::npos) << line;
   EXPECT_NE(line.find("world = \"y_up\" with frame = \"fur\""), std::string::npos) << line;
+  r.write("imu.csv", imu(-1));  // a fall says nothing
+  expect_motion(r.import(stream(kYUp) + with));
 }
 
 /// As raw tables, too, by the names of their columns.
