@@ -30,10 +30,10 @@ std::string first_cell(std::string_view line, char separator) {
   return cells.empty() ? "" : cells.front();
 }
 
-/// Pairs of key and value in a line, as "Length Units,Meters".
+/// What follows each cell in a line, as "Length Units,Meters": notes with commas may shift keys by one.
 std::map<std::string, std::string> pairs_of(const Cells& cells) {
   std::map<std::string, std::string> pairs;
-  for (std::size_t k = 0; k + 1 < cells.size(); k += 2) pairs[cells[k]] = cells[k + 1];
+  for (std::size_t k = 0; k + 1 < cells.size(); ++k) pairs.try_emplace(cells[k], cells[k + 1]);
   return pairs;
 }
 

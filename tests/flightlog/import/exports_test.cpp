@@ -148,10 +148,11 @@ std::string numbers(const char* separator, std::initializer_list<double> values,
 std::string motive(const std::string& version, const std::string& rotation, const std::string& unit,
                    bool z_up = false) {
   const bool quaternion = rotation == "Quaternion";
-  std::string text = "Format Version," + version +
-                     ",Take Name,hover,Take Notes,,Capture Frame Rate,100.000000,Export Frame Rate,100.000000,Total "
-                     "Exported Frames,20,Rotation Type," +
-                     rotation + ",Length Units," + unit + ",Coordinate Space,Global\r\n\r\n";
+  std::string text =
+      "Format Version," + version +
+      ",Take Name,hover,Take Notes,windy, still,Capture Frame Rate,100.000000,Export Frame Rate,100.000000,Total "
+      "Exported Frames,20,Rotation Type," +
+      rotation + ",Length Units," + unit + ",Coordinate Space,Global\r\n\r\n";
   const int turns = quaternion ? 4 : 3;
   Lines rows = {",Type", ",Name", ",ID", ",", "Frame,Time (Seconds)"};
   if (version == "1.25") rows.insert(rows.begin() + 3, ",Parent");
