@@ -31,11 +31,11 @@ constexpr double kConverged = 0.02;
 constexpr double kMinInformation = 0.05;
 /// Largest distance, in reaches, at which the columns of another point are used. Choice.
 constexpr double kMaxDistance = 2;
-/// Largest number of steps in a fit of effects whose parameters stay where they are. Choice.
-constexpr int kMaxEffectSteps = 4;
-/// Smallest reach of its differences, in prior standard deviations. Choice: shorter ones are lost in what is rough.
+/// Largest number of steps in a fit of effects whose parameters stay where they are, and in a fine one. Choice.
+constexpr int kMaxEffectSteps = 2, kMaxFineSteps = 4;
+/// Smallest reach of the differences of a fine one, in prior standard deviations. Choice: shorter ones are lost in what is rough.
 constexpr double kMinEffectReach = 0.03;
-/// Such a fit ends at a step of fewer standard deviations of the posterior. Choice: at a step of one, what a linear
+/// A fine one ends at a step of fewer standard deviations of the posterior. Choice: at a step of one, what a linear
 /// model gains may differ from what a simulation gains by half a nat for each coordinate.
 constexpr double kSettled_sd = 0.5;
 
@@ -376,6 +376,7 @@ Fit Fitter::fit_given(const Hypothesis& hypothesis, const VectorXd& start, const
 
 Fit Fitter::fit_effects(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters) const {
   const Index effects = hypothesis.size() - hypothesis.shared();
+  const bool fine = rules_->fits_effects_finely();
   VectorXd at = hypothesis.bounded(start);
   at.head(hypothesis.shared()) = parameters.at.head(hypothesis.shared());
   Directions directions = joint_directions(hypothesis, parameters);
@@ -385,16 +386,17 @@ Fit Fitter::fit_effects(const Hypothesis& hypothesis, const VectorXd& start, con
     const Regressors r = regressors(result);
     const BasisCoefficients sd = rules_->effects_discrepancy_sd(*this, hypothesis, result);
     result.posterior = solve(result, r, evidence_->reduce(result.statistics, r.columns, all_flights(), sd));
-    if (n == kMaxEffectSteps) return result;
+    if (n == (fine ? kMaxFineSteps : kMaxEffectSteps)) return result;
     VectorXd there = hypothesis.bounded(result.mean());
     there.head(hypothesis.shared()) = at.head(hypothesis.shared());
     there = rules_->next_effects(*this, hypothesis, result, there, sd);
     const VectorXd sd_of_effects = result.covariance().diagonal().tail(effects).cwiseSqrt();
-    const VectorXd reach = (kReachSd * sd_of_effects).cwiseMax(kMinEffectReach).cwiseMin(kFirstReach);
     const Eigen::ArrayXd step = (there - at).tail(effects).array().abs(), now = directions.reach.tail(effects).array();
-    if ((step < now).all() && (step < kSettled_sd * sd_of_effects.array()).all() && (now < 2 * reach.array()).all())
-      return result;
-    directions.reach.tail(effects) = reach;
+    if (fine)
+      directions.reach.tail(effects) = (kReachSd * sd_of_effects).cwiseMax(kMinEffectReach).cwiseMin(kFirstReach);
+    const bool settled = !fine || ((step < kSettled_sd * sd_of_effects.array()).all() &&
+                                   (now < 2 * directions.reach.tail(effects).array()).all());
+    if ((step < now).all() && settled) return result;
     at = there;
   }
 }

@@ -23,6 +23,7 @@ class RobotFit;
 struct NearSteps {
   std::function<double(const std::string& effect)> sd;  ///< prior standard deviation of the background; empty: none
   bool shapes = false;                                  ///< also the usual step, with one shape parameter moved
+  bool delays = false;                                  ///< also of delays of sensors
 };
 
 /// Prior of the law factor (Fit::law_factor): standard deviation of its logarithm about 0, and its largest value; its
@@ -46,6 +47,8 @@ class FitRules : public EvidenceRules {
   /// [group][basis] Standard deviation of the discrepancy in a fit that moves the effects alone (Fitter::fit_effects).
   virtual BasisCoefficients effects_discrepancy_sd(const Fitter& fitter, const Hypothesis& hypothesis,
                                                    const Fit& fit) const = 0;
+  /// Whether Fitter::fit_effects narrows its differences to its posterior, and goes on until a step is short in it.
+  virtual bool fits_effects_finely() const = 0;
   /// [coordinate] Where Fitter::fit_effects goes next. `fit`: where it is; `there`: where the linear model of `fit`
   /// leads; `sd`: that of effects_discrepancy_sd.
   virtual Eigen::VectorXd next_effects(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit,

@@ -159,7 +159,7 @@ std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, 
       steps.push_back({{id, i - first, h.size() - first, one_sided, here[i]}, h.vehicle(there), {}, {}, reach, {}});
       for (const double sign : {1.0, -1.0}) {
         there[i] = here[i] + sign * reach;
-        if (near.sd && !u.linear() && (sign > 0 || !one_sided))
+        if (near.sd && (!u.in_log || (near.delays && !u.linear())) && (sign > 0 || !one_sided))
           steps.back().near.push_back(h.vehicle(h.bounded(there)));
       }
       for (std::size_t n = 2; n <= kMaxSteps && one_sided; ++n) {

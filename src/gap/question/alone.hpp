@@ -32,6 +32,8 @@ class Alone : public Question {
                                            const Fit& fit) const override;
   Eigen::VectorXd next_effects(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit,
                                const Eigen::VectorXd& there, const BasisCoefficients& sd) const override;
+  /// The model's errors are larger than what a linear model gets wrong over usual differences.
+  bool fits_effects_finely() const override { return false; }
   NearSteps near_steps(const ModelDiscrepancy& discrepancy) const override;
   /// All of them.
   std::size_t minors(const sim::Randomisation& uncertain) const override;

@@ -186,7 +186,7 @@ VectorXd Contrast::next_effects(const Fitter& fitter, const Hypothesis& hypothes
 
 /// Sessions differ by small magnitudes.
 NearSteps Contrast::near_steps(const ModelDiscrepancy& discrepancy) const {
-  return {[&discrepancy](const std::string& effect) { return discrepancy.session.background_sd(effect); }};
+  return {[&discrepancy](const std::string& effect) { return discrepancy.session.background_sd(effect); }, false, true};
 }
 
 /// What changes between sessions; then, where references do not cover the regimes of the tests, so that errors of the

@@ -45,6 +45,8 @@ class Contrast : public Question {
   /// `there` itself for effects that are undone in the log, as these are linear.
   Eigen::VectorXd next_effects(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit,
                                const Eigen::VectorXd& there, const BasisCoefficients& sd) const override;
+  /// Errors of the model cancel, so the posterior may be ten times narrower than usual differences.
+  bool fits_effects_finely() const override { return true; }
   NearSteps near_steps(const ModelDiscrepancy& discrepancy) const override;
   std::size_t minors(const sim::Randomisation& /*uncertain*/) const override { return 0; }
   /// What sessions differ by; where the references do not cover all regimes also what the model gets wrong in all

@@ -59,21 +59,25 @@ TEST_F(Fits, FitsEffectsWhereTheParametersStay) {
   EXPECT_NEAR(linear.mean()[2], 0.8, 4 * std::sqrt(linear.covariance()(2, 2)));
 }
 
-// The wind acts as c + 3 c^2. Over the first differences, to 0.3 on both sides, the slope is that at 0, by which 0.15 looks
+// In a contrast. The wind acts as c + 3 c^2. Over the first differences, to 0.3 on both sides, the slope is that at 0, by which 0.15 looks
 // like 0.15 + 3 * 0.15^2 = 0.22.
 TEST_F(Fits, FollowsAMagnitudeThatBends) {
   const Hypothesis none(priors_, {}), wind(priors_, {"wind"});
   const double unit = unknowns_of("wind")[0].scale;
-  auto made = synthetic_flights(2, [unit](const SyntheticFlight& f, const VehicleHypothesis& h, Rows& rows) {
+  auto made = synthetic_flights(4, [unit](const SyntheticFlight& f, const VehicleHypothesis& h, Rows& rows) {
     const double c = value_of(h, "wind", "x_m_s") / unit;
     f.add(kSpecificForceX, 0, 5 * unit * (c + 3 * c * c) * f.velocity, rows);
   });
   Eigen::VectorXd at = wind.start();
-  at[2] = 0.15;
-  for (const auto& f : made) f->fly(wind.vehicle(at));
-  const Flights flights = as_flights(made);
+  for (std::size_t f = 0; f < made.size(); ++f) {
+    at[2] = f < 2 ? 0 : 0.15;
+    made[f]->fly(wind.vehicle(at));
+  }
+  const Flights flights = as_flights(made, 2);
+  ModelDiscrepancy discrepancy = read_model_discrepancy();
+  discrepancy.session = read_session_variation();
   const Fitter fitter(question_of(flights), flights,
-                      std::make_shared<const Evidence>(question_of(flights), flights, read_model_discrepancy(), 1), 1);
+                      std::make_shared<const Evidence>(question_of(flights), flights, discrepancy, 1), 1);
   const Fit fit = fitter.fit_effects(wind, wind.start(), fitter.fit(none, none.start(), 4));
   EXPECT_NEAR(fit.mean()[2], 0.15, 0.01);
 }
