@@ -13,7 +13,6 @@
 #include <bit>
 #include <cstring>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <optional>
 
@@ -310,7 +309,8 @@ class Id {
 
 class Version73 {
  public:
-  Version73(const std::string& path, MatlabSink& sink) : path_(path), sink_(sink), names_(path) {}
+  Version73(const std::string& path, std::size_t file_size, MatlabSink& sink)
+      : path_(path), max_count_(kLargestFactor * file_size), sink_(sink), names_(path) {}
 
   void read() {
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
@@ -349,7 +349,7 @@ class Version73 {
     if (array.sizes.empty()) array.sizes = {1};
     std::size_t count = 1;
     for (const std::size_t size : array.sizes)
-      if (__builtin_mul_overflow(count, size, &count) || count > kMaxCount) return damaged(array.name);
+      if (__builtin_mul_overflow(count, size, &count) || count > max_count_) return damaged(array.name);
     std::vector<double> values;
     if (count > 0 && sink_.wants(array)) {
       values.resize(count);
@@ -419,9 +419,10 @@ class Version73 {
 
   void damaged(const std::string& name) { sink_.warn(io::shortened(name) + " is damaged: left out"); }
 
-  static constexpr std::size_t kMaxCount = std::numeric_limits<std::size_t>::max() / sizeof(double);
+  static constexpr std::size_t kLargestFactor = 1032;  // of deflate: so many bytes of a byte
 
   const std::string& path_;
+  std::size_t max_count_;  ///< numbers that a file of its size can hold
   MatlabSink& sink_;
   Names names_;
 };
@@ -429,7 +430,7 @@ class Version73 {
 void read(const std::string& path, std::string_view bytes, MatlabSink& sink) {
   constexpr std::string_view kHdf5("\x89HDF\r\n\x1a\n", 8);
   constexpr std::size_t kUserBlock = 512;  // MATLAB's head
-  if (bytes.substr(std::min(kUserBlock, bytes.size())).starts_with(kHdf5)) Version73(path, sink).read();
+  if (bytes.substr(std::min(kUserBlock, bytes.size())).starts_with(kHdf5)) Version73(path, bytes.size(), sink).read();
   else Version5(path, sink).read(bytes);
 }
 
