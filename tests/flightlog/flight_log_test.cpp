@@ -15,6 +15,7 @@
 #include "flightlog/some_log.hpp"
 #include "io/files.hpp"
 #include "io/read_files.hpp"
+#include "refusal.hpp"
 
 namespace flappy::flightlog {
 namespace {
@@ -190,6 +191,50 @@ TEST(FlightLog, OfDeclaredInputsIsRefusedWhereItIsFaulty) {
             "log: is driven by left_flap, pitch_servo, lamp2; accepted: a flight driven by left_voltage_V and "
             "right_voltage_V");
   EXPECT_EQ(message([&] { flightlog::require_voltages(sample_log(), "log"); }), "accepted");
+}
+
+/// The log of a clamped robot.
+FlightLog clamped_log() {
+  FlightLog log = sample_log();
+  log.header.mocap = {}, log.header.imu = {}, log.header.attitude.reset(), log.header.policy.clear();
+  log.mocap = {}, log.imu = {}, log.attitude.reset(), log.policy.reset(), log.header.flown.reset();
+  log.header.rig = {1000, 1e-3, {0.01, 0, -1.0 / 70}, {0.6, 0, 0.8, 0}, 3e-3, 16e-6, 400};
+  const Column& t_s = log.command.t_s;
+  log.forces = ForcesStream{t_s, t_s, t_s, t_s, t_s, t_s, t_s};
+  return log;
+}
+
+TEST(FlightLog, OfAClampedRobotReadsBackExactly) {
+  const FlightLog log = clamped_log();
+  const LogFiles files = flight_log_files(log);
+  EXPECT_FALSE(files.contains("mocap.csv") || files.contains("imu.csv"));
+  EXPECT_EQ(parse_flight_log(files, "bench"), log);
+  EXPECT_EQ(test::refusal([&] { require_flown(log, "bench"); }),
+            "bench: is of a clamped robot; accepted: the log of a flight, without [rig]");
+}
+
+TEST(FlightLog, OfAClampedRobotIsRefusedWhereItIsFaulty) {
+  const auto refused = [](const std::function<void(LogFiles&)>& spoil) {
+    LogFiles files = flight_log_files(clamped_log());
+    spoil(files);
+    return test::refusal([&] { parse_flight_log(files, "bench"); });
+  };
+  EXPECT_EQ(
+      refused([](LogFiles& f) { f.erase("forces.csv"); }),
+      "bench/forces.csv: is missing; accepted: a folder with flight.toml, command.csv and forces.csv, as [rig] says");
+  EXPECT_EQ(refused([](LogFiles& f) { f["mocap.csv"] = "t_s\n"; }),
+            "bench/mocap.csv: is there, but flight.toml has [rig]; accepted: forces.csv alone, or no [rig]");
+  EXPECT_NE(refused([](LogFiles& f) { f["flight.toml"] += "\n[mocap]\n"; }).find("is of a robot that flies"),
+            std::string::npos);
+  const auto edited = [&](const std::string& from, const std::string& to) {
+    return refused([&](LogFiles& f) {
+      std::string& text = f["flight.toml"];
+      text.replace(text.find(from), from.size(), to);
+    });
+  };
+  EXPECT_NE(edited("\"clamped\"", "\"string\"").find("accepted: \"clamped\""), std::string::npos);
+  EXPECT_NE(edited("[0.6, 0, 0.8, 0]", "[0.6, 0, 0.6, 0]").find("a quaternion w, x, y, z of length 1"),
+            std::string::npos);
 }
 
 TEST(FlightLog, KeepsUnitQuaternionsToTheLastDigit) {

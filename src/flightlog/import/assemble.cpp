@@ -702,13 +702,13 @@ double tilt_of(const Eigen::Vector3d& force) { return std::atan2(force.head<2>()
 /// force in W is on average up, but for the change of speed by the flight's time.
 void require_up(const Stream& mocap, const Stream& imu, double gravity_m_s2) {
   constexpr double kMaxTilt_rad = std::numbers::pi / 4;  // beyond, another axis is nearer to up
-  constexpr double kMinShare = 0.5;  // of gravity: a robot that falls for half of its log says nothing of up
+  constexpr double kMinPull = 0.5;  // of gravity: a robot that falls for half of its log says nothing of up
   double size_m_s2 = 0;
   for (std::size_t i = 0; i < imu.t_ns.size(); ++i)
     size_m_s2 += std::hypot(imu.columns.at("accel_x_m_s2")[i], imu.columns.at("accel_y_m_s2")[i],
                             imu.columns.at("accel_z_m_s2")[i]) /
                  static_cast<double>(imu.t_ns.size());
-  if (size_m_s2 < kMinShare * gravity_m_s2) return;
+  if (size_m_s2 < kMinPull * gravity_m_s2) return;
   const double tilt_rad = tilt_of(mean_force(mocap, imu, [&](std::size_t i) { return attitude_of(mocap.columns, i); }));
   if (tilt_rad < kMaxTilt_rad) return;
   const Eigen::Quaterniond world = eigen_of(turn_of(mocap.mapping.world)), axes = eigen_of(turn_of(mocap.mapping.axes));

@@ -217,6 +217,7 @@ class FlightFile {
 
 std::uint64_t write_flight_mcap(const std::filesystem::path& path, const FlightLog& log,
                                 const std::vector<VehicleTopics>& vehicles) {
+  require_flown(log, path.string());
   require_voltages(log, path.string());
   return FlightFile(path, log, vehicles).write();
 }

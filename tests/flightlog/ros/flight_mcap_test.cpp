@@ -77,6 +77,12 @@ TEST(FlightMcap, HasATopicForEachStream) {
   EXPECT_EQ(number(seen.at("/wing_input")[9], "bias_v"), log.command.inputs->bias_V[9]);
 }
 
+TEST(FlightMcap, RefusesAClampedRobot) {
+  FlightLog log = test::some_log(0.1);
+  log.header.rig.emplace();
+  EXPECT_THROW(write_flight_mcap("bench.mcap", log), io::InputError);
+}
+
 TEST(FlightMcap, DoesWithoutWhatIsNotLogged) {
   FlightLog log = test::some_log(0.1);
   log.power.reset();

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "flappy/batch.hpp"
@@ -21,7 +22,7 @@ model::Vehicle vehicle() { return model::read_vehicle(FLAPPY_SOURCE_DIR "/config
 
 /// Strokes of both sides, and a difference, a bias and a split cycle that change.
 std::pair<double, double> volts(double t_s, double flapping_Hz) {
-  const double phase = 2 * std::numbers::pi * flapping_Hz * t_s, amplitude = 9 + std::sin(4 * t_s);
+  const double phase = 2 * std::numbers::pi * flapping_Hz * t_s, amplitude = 9 + 3 * std::sin(4 * t_s);
   return {(amplitude + 0.5) * std::cos(phase) + 0.3,
           (amplitude - 0.5) * std::cos(phase) + 0.3 + 0.4 * std::sin(2 * phase)};
 }
@@ -97,9 +98,40 @@ TEST(Clamped, PredictsWhatTheWingsDoToTheStand) {
 }
 
 TEST(Clamped, IsCheckedByItsForces) {
-  const model::Vehicle nominal = vehicle();
-  const flightlog::FlightLog log = clamped_log(nominal);
+  const flightlog::FlightLog log = clamped_log(vehicle());
   EXPECT_EQ(flightlog::data_faults(log, "stand").size(), 1u) << "1.5 s are too short, and nothing else is wrong";
+  const auto warns = [&](const std::string& check, const std::function<void(flightlog::FlightLog&)>& spoil) {
+    flightlog::FlightLog spoilt = log;
+    spoil(spoilt);
+    for (const flightlog::Finding& f : flightlog::check_flight(spoilt).findings)
+      if (f.check == check) return f.verdict == flightlog::Verdict::warning ? f.text : std::string();
+    return std::string("no such check");
+  };
+  const auto nothing = [](flightlog::FlightLog& /*log*/) {};
+  for (const char* check : {"rig axes", "rig resonance", "forces beat"}) EXPECT_EQ(warns(check, nothing), "") << check;
+  EXPECT_NE(warns("rig axes",
+                  [](flightlog::FlightLog& l) {
+                    for (auto* c : {&l.forces->force_x_N, &l.forces->force_y_N, &l.forces->force_z_N})
+                      for (double& v : *c) v = -v;
+                  })
+                .find("the force of the sensor on the robot"),
+            std::string::npos);
+  EXPECT_NE(warns("rig axes",
+                  [](flightlog::FlightLog& l) {
+                    l.header.rig->attitude = {0.5, 0.5, 0.5, 0.5};
+                  })
+                .find("another rig.attitude"),
+            std::string::npos);
+  EXPECT_NE(warns("rig resonance", [](flightlog::FlightLog& l) { l.header.rig->resonance_hz = 120; })
+                .find("it magnifies them"),
+            std::string::npos);
+  EXPECT_EQ(warns("rig resonance", [](flightlog::FlightLog& l) { l.header.rig->resonance_hz = 400; }), "");
+  EXPECT_NE(warns("forces beat",
+                  [](flightlog::FlightLog& l) {
+                    for (double& t : l.forces->t_s) t *= 1.012;
+                  })
+                .find("another clock"),
+            std::string::npos);
 }
 
 }  // namespace
