@@ -233,7 +233,7 @@ TEST(FlightLog, OfAClampedRobotIsRefusedWhereItIsFaulty) {
     });
   };
   EXPECT_NE(edited("\"clamped\"", "\"string\"").find("accepted: \"clamped\""), std::string::npos);
-  EXPECT_NE(edited("[0.6, 0, 0.8, 0]", "[0.6, 0, 0.6, 0]").find("a quaternion w, x, y, z of length 1"),
+  EXPECT_NE(edited("attitude = [0.6", "attitude = [0.7").find("a quaternion w, x, y, z of length 1"),
             std::string::npos);
 }
 
@@ -317,7 +317,7 @@ TEST(FlightLog, RefusesFaultyHeaders) {
       header("gravity_m_s2", "gravity"),
       "log/flight.toml:5:1: gravity: unknown key; accepted: ambient, attitude, changes, command, flapping_Hz, flown, "
       "gravity_m_s2, imu, "
-      "mocap, policy, power, schema, session, vehicle, vehicle_sha256, wings");
+      "mocap, policy, power, rig, schema, session, vehicle, vehicle_sha256, wings");
   EXPECT_EQ(header("gravity_m_s2 = 9.8", "# "),
             "log/flight.toml: gravity_m_s2: is missing; accepted: a number from 0 to 100");
   EXPECT_EQ(header("flapping_Hz = 34.0", "flapping_Hz = -34.0"),
@@ -554,7 +554,7 @@ TEST_F(FlightLogFolder, RefusesWhatIsNotThere) {
   fs::rename(folder_ / "power.csv", folder_ / "Power.csv");
   EXPECT_EQ(read_message(folder_), (folder_ / "Power.csv").string() +
                                        ": is no stream of a flight log; accepted: imu.csv, power.csv, wings.csv, "
-                                       "attitude.csv, policy.csv; did you mean \"power.csv\"?");
+                                       "attitude.csv, forces.csv, policy.csv; did you mean \"power.csv\"?");
   fs::remove(folder_ / "Power.csv");
   testing::internal::CaptureStderr();
   const flightlog::FlightLog without = flightlog::read_flight_log(folder_);

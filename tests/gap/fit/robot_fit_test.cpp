@@ -211,6 +211,7 @@ TEST(Contrast, NamesNoEffectForWhatOnlyItsLawExplains) {
   const Flights flights = as_flights(made, 2), references{flights.references, {}};
   ModelDiscrepancy discrepancy = read_model_discrepancy();
   discrepancy.session = read_session_variation();
+  discrepancy.session.own_scale_sd = 0.1;  // else sessions may differ by as much
   const RobotFit robot(question_of(flights),
                        RobotFit::of_references(question_of(references), references, priors, discrepancy, {}, 2),
                        flights);
