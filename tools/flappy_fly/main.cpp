@@ -118,7 +118,8 @@ void print(const rollout::FlyConfig& config, const rollout::FlyOptions& options,
   else if (!options.mcap.empty()) std::printf("  the flight was too short for topics\n");
   std::printf("  %.2f s, %.1f million steps/s, %.0f times real time, hash %s\n", r.wall_s, r.steps / r.wall_s / 1e6,
               r.steps * config.fleet.batch.step_s / r.wall_s, io::hexadecimal(r.hash).c_str());
-  if (r.logs > 0) std::printf("%s\n", io::shown_by(options.log_folder.string()).c_str());
+  if (r.logs > 0 && config.log.rig) std::printf("checked by: flappy-gap check %s\n", options.log_folder.c_str());
+  else if (r.logs > 0) std::printf("%s\n", io::shown_by(options.log_folder.string()).c_str());
 }
 
 Json json_of(const rollout::FlyConfig& config, const rollout::FlyOptions& options, const rollout::FlyResult& r) {
