@@ -99,8 +99,8 @@ class Batch {
   FlapperState state(std::size_t i) const;
   std::uint32_t status(std::size_t i) const;
   HeldImpulse held_impulse(std::size_t i) const;
-  /// What a welded vehicle with motors gave to its stand since its reset: held_impulse() less the momentum that its wings
-  /// have now. Weights excluded.
+  /// Impulse of a welded vehicle with motors on its stand since its reset, as HeldImpulse: the air gave held_impulse() to
+  /// the wings, which keep their momentum. Weights excluded.
   HeldImpulse stand_impulse(std::size_t i) const;
   /// Energy drawn since the reset, J. With motors: V i of both, summed over the steps, returned energy subtracted. With
   /// articulated wings: mechanical work of the muscles of each wing while their total power is positive, because

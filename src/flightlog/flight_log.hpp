@@ -107,7 +107,7 @@ struct AttitudeHeader {
 /// A stand that holds the torso, with a six-axis sensor: table [rig]. The log of such a robot has no motion.
 struct RigHeader {
   double rate_hz = 0, latency_s = 0;
-  std::array<double, 3> position_m = {0, 0, 0};   ///< of the point about which moments are measured, in B
+  std::array<double, 3> position_m = {0, 0, 0};   ///< place of the point about which the sensor gives moments, B
   std::array<double, 4> attitude = {1, 0, 0, 0};  ///< w, x, y, z; turns the sensor's axes to B
   double force_noise_N = 0, moment_noise_Nm = 0;
   double resonance_hz = 0;  ///< lowest natural frequency of the robot on its sensor; 0: not known
@@ -198,7 +198,7 @@ struct AttitudeStream {
   bool operator==(const AttitudeStream&) const = default;
 };
 
-/// What a clamped robot exerts on its sensor, in the axes of the sensor.
+/// Force and moment of a clamped robot on its sensor, in the sensor's axes.
 struct ForcesStream {
   Column t_s, force_x_N, force_y_N, force_z_N, moment_x_Nm, moment_y_Nm, moment_z_Nm;
   bool operator==(const ForcesStream&) const = default;
@@ -219,7 +219,7 @@ struct FlightLog {
   std::optional<PowerStream> power;  ///< this and the next three: only where the header declares them
   std::optional<WingsStream> wings;
   std::optional<AttitudeStream> attitude;
-  std::optional<ForcesStream> forces;  ///< of a clamped robot, whose mocap and imu are empty
+  std::optional<ForcesStream> forces;  ///< only of a clamped robot; then mocap and imu are empty
   std::optional<PolicyStream> policy;
   bool operator==(const FlightLog&) const = default;
 };

@@ -105,5 +105,11 @@ FLAPPY_INLINE WingInertia<T> wing_inertia(const SideParameters<T>& p, const Wing
   return i;
 }
 
+/// Angular momentum of a wing and its leading edge, about the origin of a torso at rest, in B.
+template <class T>
+FLAPPY_INLINE Vec3<T> angular_momentum(const WingPose<T>& g, const WingInertia<T>& i, const Vec3<T>& shoulder) {
+  return g.beta_rate * i.stroke_spin + g.theta_rate * i.rotation_spin + cross(shoulder, g.momentum);
+}
+
 }  // namespace FLAPPY_ISA
 }  // namespace flappy::model

@@ -416,10 +416,8 @@ HeldImpulse Batch<T>::stand_impulse(std::size_t i) const {
   const Vec3<double> rest{0, 0, 0};
   Vec3<double> momentum = rest, spin = rest;
   const auto add = [&](const auto& side, const model::WingPose<double>& pose) {
-    const model::WingInertia<double> wing = model::wing_inertia(side, pose);
     momentum = momentum + pose.momentum;
-    spin = spin + (pose.beta_rate * wing.stroke_spin + pose.theta_rate * wing.rotation_spin +
-                   model::cross(side.shoulder_m, pose.momentum));
+    spin = spin + model::angular_momentum(pose, model::wing_inertia(side, pose), side.shoulder_m);
   };
   add(p.left, model::place_wing<+1>(p.left, x.left, rest));
   add(p.right, model::place_wing<-1>(p.right, x.right, rest));

@@ -132,6 +132,7 @@ CheckReport check_flight(const FlightLog& log) {
     const ForcesStream& f = *log.forces;
     check_repeats("forces", {&f.force_x_N, &f.force_y_N, &f.force_z_N, &f.moment_x_Nm, &f.moment_y_Nm, &f.moment_z_Nm},
                   h.rig->force_noise_N, report.findings);
+    check_latencies(h, report.findings);
     check_rig(log, report.findings);
     check_command(log, report.findings);
     check_power(log, report.findings);

@@ -2,7 +2,8 @@
 // misses pulses, a battery's voltage that freezes.
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <iterator>
+#include <utility>
 
 #include "flightlog/check/check_parts.hpp"
 #include "io/statistics.hpp"
@@ -17,15 +18,19 @@ constexpr double kTimesAsMany = 3;
 /// More clipped samples of an axis forbid a diagnosis.
 constexpr double kMaxClippedShare = 0.01;
 
-/// Number of samples clipped at one end, which is `values.begin()`; `values`: counts by value from that end on.
-template <class Values>
-std::size_t clipped(Values from, Values to) {
-  if (from == to || from->second < kFewestClipped) return 0;
+/// Number of samples clipped at the end where sorted values begin.
+template <class Iterator>
+std::size_t clipped(Iterator from, Iterator to) {
+  const auto count_of_next = [&] {
+    const Iterator same = std::find_if(from, to, [value = *from](double v) { return v != value; });
+    return static_cast<std::size_t>(std::distance(std::exchange(from, same), same));
+  };
+  const std::size_t at_end = from == to ? 0 : count_of_next();
+  if (at_end < kFewestClipped) return 0;
   std::size_t next = 0, most = 0;
-  for (Values at = std::next(from); at != to && next < kNextValues; ++at, ++next) most = std::max(most, at->second);
-  return next == kNextValues && static_cast<double>(from->second) > kTimesAsMany * static_cast<double>(most)
-             ? from->second
-             : 0;
+  for (; from != to && next < kNextValues; ++next) most = std::max(most, count_of_next());
+  const bool many = static_cast<double>(at_end) > kTimesAsMany * static_cast<double>(most);
+  return next == kNextValues && many ? at_end : 0;
 }
 
 /// Samples on both sides of one that give its usual value, and the share of that value to which the counter drops.
@@ -51,12 +56,12 @@ void check_range(const FlightLog& log, Findings& findings) {
       {"accel_y_m_s2", &s.accel_y_m_s2, "m/s^2"}, {"accel_z_m_s2", &s.accel_z_m_s2, "m/s^2"}};
   bool any = false;
   for (const auto& [name, column, unit] : axes) {
-    std::map<double, std::size_t> counts;
-    for (const double v : *column) ++counts[v];
-    const std::size_t low = clipped(counts.begin(), counts.end()), high = clipped(counts.rbegin(), counts.rend());
+    Column sorted = *column;
+    std::ranges::sort(sorted);
+    const std::size_t low = clipped(sorted.begin(), sorted.end()), high = clipped(sorted.rbegin(), sorted.rend());
     if (low + high == 0) continue;
     any = true;
-    const double end = high >= low ? counts.rbegin()->first : counts.begin()->first;
+    const double end = high >= low ? sorted.back() : sorted.front();
     const auto at = static_cast<std::size_t>(std::ranges::find(*column, end) - column->begin());
     const double share = static_cast<double>(low + high) / static_cast<double>(column->size());
     findings.push_back({"imu range",

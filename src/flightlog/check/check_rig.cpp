@@ -9,7 +9,7 @@
 namespace flappy::flightlog {
 namespace {
 
-/// RigMeans over this span tell how the force follows the voltages: some beats.
+/// Means over this span tell how the force follows the voltages: some beats.
 constexpr double kMeans_s = 0.2;
 /// Least spread of the squared voltage, over its mean, at which it shows.
 constexpr double kMinSpreadShare = 0.2;

@@ -334,7 +334,7 @@ struct Stream {
   const StreamMapping& mapping;
   std::vector<std::int64_t> t_ns;
   Columns columns;
-  std::vector<std::string> notes;                  ///< of markers
+  std::vector<std::string> notes;                  ///< warnings about markers
   std::vector<const ColumnMapping*> not_measured;  ///< of each row, the first column that it says is not measured
   StreamReport report;
 
@@ -702,7 +702,7 @@ double tilt_of(const Eigen::Vector3d& force) { return std::atan2(force.head<2>()
 /// force in W is on average up, but for the change of speed by the flight's time.
 void require_up(const Stream& mocap, const Stream& imu, double gravity_m_s2) {
   constexpr double kMaxTilt_rad = std::numbers::pi / 4;  // beyond, another axis is nearer to up
-  constexpr double kMinPull = 0.5;  // of gravity: a robot that falls for half of its log says nothing of up
+  constexpr double kMinPull = 0.5;  // share of gravity; a robot in free fall does not show up and down
   double size_m_s2 = 0;
   for (std::size_t i = 0; i < imu.t_ns.size(); ++i)
     size_m_s2 += std::hypot(imu.columns.at("accel_x_m_s2")[i], imu.columns.at("accel_y_m_s2")[i],

@@ -25,7 +25,8 @@ struct StreamReport {
   double rate_hz = 0;                               ///< measured
   /// Delay beyond that of the quickest message of the same clock; 0 without times of receipt.
   double delay_median_s = 0, delay_most_s = 0;
-  std::vector<double> residual_m;  ///< of the pose by markers of each sample, root mean square; else empty
+  std::vector<double>
+      residual_m;  ///< [sample] rms distance of the markers from their places in the pose, m; without markers empty
 };
 
 struct ClockReport {

@@ -17,7 +17,7 @@ namespace flappy::flightlog {
 namespace {
 
 constexpr std::size_t kC3dBlock = 512;
-constexpr char kC3dMark = 0x50;                              ///< of a header, and of its kind of data
+constexpr char kC3dMark = 0x50;                              ///< second byte of the header
 constexpr unsigned char kIntel = 84, kDec = 85, kMips = 86;  ///< processors
 constexpr std::size_t kRotationNumbers = 17;  ///< a matrix of 4 x 4, column by column, and its reliability
 constexpr double kMaxFrames = 1e9;            ///< more are a damaged count
@@ -254,7 +254,7 @@ class C3dReader {
     if (const auto all = number("POINT:LONG_FRAMES")) return *all;
     const auto first = field_number("TRIAL:ACTUAL_START_FIELD"), last = field_number("TRIAL:ACTUAL_END_FIELD");
     const double trial = first && last ? *last - *first + 1 : 0;
-    return trial > 65535 || (trial > 0 && frames == 65535) ? trial : frames;  // what the count of 16 bits cannot say
+    return trial > 65535 || (trial > 0 && frames == 65535) ? trial : frames;  // FRAMES has 16 bits
   }
 
   // ---- data

@@ -37,7 +37,7 @@ inline const std::string kOnlyChannel = "*";
 /// The wanted fields of each channel; an empty set: all its fields.
 using Wanted = std::map<std::string, std::set<std::string>>;
 
-/// What an export of a motion-capture system says of itself.
+/// Head of an export of a motion-capture system.
 struct Capture {
   std::string program;
   bool says_up;  ///< whether z is up in it unless its user chose otherwise
@@ -56,7 +56,7 @@ class Channel {
   const std::vector<std::int64_t>& stamp_ns() const { return stamp_ns_; }
   /// One value for each row, NaN where the row lacks it; null where the field is unknown or not wanted.
   const std::vector<double>* column(std::string_view field) const;
-  /// What the recording says of a field's unit; empty where it says nothing.
+  /// Unit of a field by the recording; empty: it names none.
   std::string unit(std::string_view field) const;
   void add_unit(const std::string& field, const std::string& unit) { units_[field] = unit; }
   /// Null where the channel is of no motion-capture system.

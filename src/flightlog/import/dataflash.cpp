@@ -75,7 +75,7 @@ std::vector<std::string_view> parts_of(std::string_view text) {
 struct MessageType {
   std::string name, letters;
   std::vector<std::string> columns;
-  std::size_t size = 0;                 ///< of a whole message
+  std::size_t size = 0;                 ///< bytes of a message with its head
   std::optional<std::size_t> instance;  ///< the column that FMTU marks
   std::vector<std::string> fields;      ///< those of numbers; one of an array has its index
   Row row;

@@ -31,11 +31,12 @@ constexpr double kConverged = 0.02;
 constexpr double kMinInformation = 0.05;
 /// Largest distance, in reaches, at which the columns of another point are used. Choice.
 constexpr double kMaxDistance = 2;
-/// Largest number of steps in a fit of effects whose parameters stay where they are, and in a fine one. Choice.
+/// Largest number of steps in a fit of effects whose parameters stay where they are, and in a fine fit. Choice.
 constexpr int kMaxEffectSteps = 2, kMaxFineSteps = 4;
-/// Smallest reach of the differences of a fine one, in prior standard deviations. Choice: shorter ones are lost in what is rough.
+/// Smallest reach of the differences of a fine fit, in prior standard deviations. Choice: shorter ones are lost in what
+/// is rough.
 constexpr double kMinEffectReach = 0.03;
-/// A fine one ends at a step of fewer standard deviations of the posterior. Choice: at a step of one, what a linear
+/// A fine fit ends at a step of fewer standard deviations of the posterior. Choice: at a step of one, what a linear
 /// model gains may differ from what a simulation gains by half a nat for each coordinate.
 constexpr double kSettled_sd = 0.5;
 

@@ -19,7 +19,8 @@ struct Fit;
 class Fitter;
 class RobotFit;
 
-/// The further vehicles of magnitude_steps() for small magnitudes, which backgrounds have.
+/// The further vehicles of magnitude_steps() for small magnitudes, which backgrounds have. Effects of sensors act
+/// linearly and need none, but delays.
 struct NearSteps {
   std::function<double(const std::string& effect)> sd;  ///< prior standard deviation of the background; empty: none
   bool shapes = false;                                  ///< also the usual step, with one shape parameter moved

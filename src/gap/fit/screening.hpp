@@ -20,7 +20,7 @@ struct MagnitudeStep : Magnitude {
   std::vector<VehicleHypothesis> shaped;   ///< the same, each with one shape parameter a standard deviation up
   std::vector<VehicleHypothesis> further;  ///< two to kMaxSteps steps away; only if one_sided
   double near_reach;                       ///< two standard deviations of the background, from 0.05 to kMagnitudeReach
-  std::vector<VehicleHypothesis> near;     ///< near_reach away: above and, unless one_sided, below; none if linear
+  std::vector<VehicleHypothesis> near;     ///< near_reach away: above and, unless one_sided, below; NearSteps
 };
 /// Number of steps along a magnitude that cannot be negative. Choice.
 inline constexpr std::size_t kMaxSteps = 5;

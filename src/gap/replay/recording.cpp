@@ -139,6 +139,7 @@ void Recording::lay_clamped_grid() {
   begin_s = bound_s(i);
   double now_s = begin_s;
   torso.emplace_back();
+  std::vector<std::size_t> samples;  // [interval]
   const std::vector<std::pair<double, double>> undriven = undriven_s();
   for (; i + 1 < t_s.size() && bound_s(i + 1) <= last_s; ++i) {
     const int n = static_cast<int>(std::lround((bound_s(i + 1) - now_s) / kPredictionStep_s));
@@ -148,22 +149,22 @@ void Recording::lay_clamped_grid() {
     steps.push_back(n);
     end_s.push_back(now_s);
     torso.emplace_back();
-    samples_.push_back(i);
+    samples.push_back(i);
     const bool driven =
         std::ranges::none_of(undriven, [&](const auto& span) { return span.first < now_s && from_s < span.second; });
     // a gap of the sensor makes a long interval, whose mean its one sample is not
     valid.push_back(driven && n * kPredictionStep_s < 1.5 * usual_s + kPredictionStep_s ? 1 : 0);
   }
-  take_loads();
+  take_loads(samples);
 }
 
-/// Forces and moments of the samples, in B and about the torso origin.
-void Recording::take_loads() {
+/// Forces and moments, in B and about the torso origin. `samples`: [interval] index in forces.csv.
+void Recording::take_loads(const std::vector<std::size_t>& samples) {
   const flightlog::ForcesStream& f = *log.forces;
   const flightlog::RigHeader& rig = *log.header.rig;
   const Eigen::Quaterniond to_B(rig.attitude[0], rig.attitude[1], rig.attitude[2], rig.attitude[3]);
   const Vector3d at(rig.position_m.data());
-  for (const std::size_t i : samples_) {
+  for (const std::size_t i : samples) {
     const Vector3d force = to_B * Vector3d(f.force_x_N[i], f.force_y_N[i], f.force_z_N[i]);
     const Vector3d moment = to_B * Vector3d(f.moment_x_Nm[i], f.moment_y_Nm[i], f.moment_z_Nm[i]) + at.cross(force);
     force_m_s2.push_back(force / mass_kg);

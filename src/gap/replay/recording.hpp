@@ -92,12 +92,11 @@ struct Recording {
   void prepare(const std::string& place);
   void lay_grid();
   void lay_clamped_grid();
-  void take_loads();
+  void take_loads(const std::vector<std::size_t>& samples);
   std::vector<std::pair<double, double>> undriven_s() const;
   void read_voltages();
   void find_phase();
   void read_regimes();
-  std::vector<std::size_t> samples_;             ///< [interval] sample of forces.csv of a clamped robot
   std::vector<double> phase_t_s_, phase_beats_;  ///< unwrapped phase of the commands; empty: not logged
   double phase_offset_ = 0, phase_hz_ = 0;       ///< fitted to the voltages where no phase is logged
   double first_beat_ = 0;                        ///< number, counted by the command's phase, of the beat that is beat 0

@@ -61,12 +61,6 @@ void reset_block(sim::Block<Flown>& block, const TorsoAt* from, const TorsoAt& t
   }
 }
 
-/// Angular momentum of a wing and its leading edge about the torso origin, which rests.
-template <class T>
-FLAPPY_INLINE Vec3<T> angular_momentum(const WingPose<T>& g, const WingInertia<T>& i, const Vec3<T>& shoulder) {
-  return g.beta_rate * i.stroke_spin + g.theta_rate * i.rotation_spin + cross(shoulder, g.momentum);
-}
-
 void clamped_block(sim::Block<Flown>& block, double interval_s, ClampedBlockState& kept, ResetBlockState& rows) {
   const Vec3<V> none{all(0), all(0), all(0)};
   for (int first = 0; first < sim::kLanes<Flown>; first += kWidth<Flown>) {
