@@ -201,6 +201,7 @@ class DiagnosisSection {
       part["short"] = long_name ? spoken(channel) : channel_words(channel);
       parts.push_back(part);
     }
+    add_ladder();
     if (parts.empty()) return;
     section_.add(Json{
         {"kind", "anatomy"},
@@ -217,6 +218,19 @@ class DiagnosisSection {
     add_heat(gap::ResidualTest::regime, "While doing what", true,
              "The same in thirds of the beats, by what the robot did.");
     add_regimes();
+  }
+
+  /// Adds the table of the rungs at which the vehicle leaves the robot.
+  void add_ladder() {
+    if (diagnosis_.ladder.empty()) return;
+    const auto times = [](const std::optional<double>& e) { return e ? format("%.1f", *e) : std::string("not seen"); };
+    Json rows = Json::array();
+    for (const gap::LadderRung& r : diagnosis_.ladder)
+      rows.push_back({r.rung, times(r.nominal), times(r.refit), times(r.effect), format("%.2f", r.probability)});
+    section_.add(table(
+        "Where the vehicle leaves the robot: error over noise, from the cause down",
+        {"rung", "vehicle's file", "parameters refitted", "with the best effect", "probability of an effect there"},
+        std::move(rows)));
   }
 
   /// Adds a matrix of residual over noise: a row for each channel that exceeds noise, a column for each place.

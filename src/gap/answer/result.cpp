@@ -5,6 +5,7 @@
 
 #include "gap/answer/verdict.hpp"
 #include "gap/localise/closure.hpp"
+#include "gap/localise/ladder.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -140,6 +141,9 @@ Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flig
       {Fitted::nominal, &inference.nominal},
       {Fitted::refit, &inference.refit},
       {Fitted::effect, best != nullptr ? &best->held_out : nullptr}};
+  if (!flights.tests.front()->is_averaged())
+    r.ladder = ladder_of(context, inference.nominal, inference.refit, best != nullptr ? &best->held_out : nullptr,
+                         r.hypotheses);
   for (const auto& [fitted, residual] : fits) {
     if (residual == nullptr) continue;
     std::vector<ResidualLocation> locations = locate(context, *residual, fitted);

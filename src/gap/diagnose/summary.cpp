@@ -108,6 +108,23 @@ std::string sensor_line(const Estimate& s) {
   return told("the IMU sits", 1e3, "mm", "along " + way + axis);
 }
 
+/// The rungs of the ladder that the logs show.
+std::vector<std::string> ladder_lines(const Diagnosis& diagnosis) {
+  std::vector<std::string> lines;
+  const auto times = [](const std::optional<double>& e) {
+    return e ? io::format("%8.1f", *e) : std::string("       -");
+  };
+  for (const LadderRung& r : diagnosis.ladder) {
+    if (!r.nominal && !r.refit) continue;
+    if (lines.empty())
+      lines.push_back(
+          "error over noise: vehicle's file, refitted, with the best effect; probability of an effect there:");
+    lines.push_back(io::format("  %-18s", r.rung.c_str()) + times(r.nominal) + times(r.refit) + times(r.effect) +
+                    io::format("%8.2f", r.probability));
+  }
+  return lines;
+}
+
 /// Lines of what the flights show, which stand before the verdict.
 std::vector<std::string> seen_lines(const Diagnosis& diagnosis) {
   std::vector<std::string> lines;
@@ -185,6 +202,7 @@ std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::strin
     lines.push_back(suspects_words(diagnosis.suspects, as_it_is));
     lines.push_back(kReferenceDecides);
   }
+  for (std::string& line : ladder_lines(diagnosis)) lines.push_back(std::move(line));
   const std::vector<ResidualLocation> locations = one_of_each_test(diagnosis);
   lines.push_back(locations.empty() ? kNothingStandsOut
                                     : "where the gap lies, with parameters refitted (rms, that of noise):");

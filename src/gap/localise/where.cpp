@@ -223,6 +223,7 @@ RowContext row_context_of(const FlightList& flights, std::vector<double> noise_s
   for (const auto& f : flights) {
     s.beats.push_back(f->beats());
     s.beats_Hz.push_back(f->beats_Hz());
+    s.clamped.push_back(f->recording() != nullptr && f->recording()->clamped() ? 1 : 0);
     s.covered.emplace_back();
     for (std::size_t j = 0; j < f->beats(); ++j)
       for (int channel = 0; channel < kChannels; ++channel) s.covered.back().push_back(f->covers(j, channel) ? 1 : 0);

@@ -37,6 +37,7 @@ struct Quantity {
 struct RowContext {
   std::vector<std::size_t> beats;          ///< [flight] number of beats
   std::vector<double> beats_Hz;            ///< [flight]
+  std::vector<char> clamped;               ///< [flight] whether the robot was clamped
   std::vector<std::vector<char>> covered;  ///< [flight][beat and channel, in one row]
   std::vector<Quantity> regimes, inputs;   ///< those that all flights have
   std::vector<char> rows;                  ///< [group] whether the group has rows

@@ -168,6 +168,15 @@ struct OddFlight {
   std::optional<double> step;     ///< by how much, in the quantity's unit
 };
 
+/// How far a vehicle is from a robot with wings on one rung of the ladder (gap/localise/ladder.hpp).
+struct LadderRung {
+  std::string rung;
+  /// Root mean square of residual over noise, 1: noise alone; by Fitted. None: nothing in the logs shows it, or not
+  /// fitted.
+  std::optional<double> nominal, refit, effect;
+  double probability = 0;  ///< that effects of this rung are missing
+};
+
 struct NamedDiagnosis;
 
 struct Diagnosis {
@@ -193,6 +202,7 @@ struct Diagnosis {
   std::optional<double> nominal_loss, refit_loss, effect_loss;  ///< mean losses in held-out flights
   double noise_floor = 0;                                       ///< loss of noise alone
   std::optional<Closure> closure;                               ///< closure of the most probable fitted hypothesis
+  std::vector<LadderRung> ladder;                               ///< empty of a beat-averaged vehicle
   std::vector<std::string> untestable;                          ///< effects that cannot show in these logs
   std::optional<Validation> validation;                         ///< only for a beat-averaged vehicle
   std::vector<ClosedLoop> closed_loop;  ///< empty in a contrast, for a beat-averaged vehicle or a stopped diagnosis

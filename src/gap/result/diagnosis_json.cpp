@@ -152,6 +152,14 @@ Json to_json(const OddFlight& o) {
           {"step", optional(o.step)}};
 }
 
+Json to_json(const LadderRung& r) {
+  return {{"rung", r.rung},
+          {"nominal", optional(r.nominal)},
+          {"refit", optional(r.refit)},
+          {"effect", optional(r.effect)},
+          {"probability", r.probability}};
+}
+
 Json to_json(const Validation& v) {
   Json ladder = Json::array(), controls = Json::array(), agreements = Json::array();
   for (const Validation::Rung& r : v.ladder) {
@@ -241,6 +249,9 @@ Diagnosis read(const Json& json) {
   d.effect_loss = optional_of(gap.at("effect"));
   d.noise_floor = gap.at("noise_floor");
   d.closure = closure_of(gap.at("closure"));
+  for (const Json& r : json.value("ladder", Json::array()))
+    d.ladder.push_back({r.at("rung"), optional_of(r.at("nominal")), optional_of(r.at("refit")),
+                        optional_of(r.at("effect")), r.at("probability")});
   d.untestable = json.at("untestable");
   for (const Json& s : json.value("suspects", Json::array()))
     d.suspects.push_back({s.at("effect"), s.at("probability"), closure_of(s.at("closure"))});
@@ -259,7 +270,8 @@ Diagnosis read(const Json& json) {
 Json to_json(const Diagnosis& d) {
   Json faults = Json::array(), hypotheses = Json::array(), terms = Json::array(), locations = Json::array(),
        closed_loop = Json::array(), moved = Json::object(), suspects = Json::array(), seen = Json::array(),
-       odd = Json::array();
+       odd = Json::array(), ladder = Json::array();
+  for (const LadderRung& r : d.ladder) ladder.push_back(to_json(r));
   for (const SeenQuantity& s : d.seen) seen.push_back(to_json(s));
   for (const OddFlight& o : d.odd) odd.push_back(to_json(o));
   for (const flightlog::DataFault& f : d.faults)
@@ -302,6 +314,7 @@ Json to_json(const Diagnosis& d) {
                  {"effect", optional(d.effect_loss)},
                  {"noise_floor", d.noise_floor},
                  {"closure", to_json(d.closure)}}},
+               {"ladder", ladder},
                {"closed_loop", closed_loop},
                {"next_experiment", d.next ? to_json(*d.next) : Json(nullptr)},
                {"untestable", d.untestable},

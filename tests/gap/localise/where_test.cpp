@@ -8,6 +8,7 @@
 #include <random>
 
 #include "gap/localise/closure.hpp"
+#include "gap/localise/ladder.hpp"
 #include "gap/localise/significance.hpp"
 
 namespace flappy::gap {
@@ -158,6 +159,7 @@ Flown flown(unsigned seed, double past) {
   for (int flight = 0; flight < 3; ++flight) {
     f.around.beats.push_back(kBeats);
     f.around.beats_Hz.push_back(34);
+    f.around.clamped.push_back(0);
     f.around.covered.emplace_back(kBeats * kChannels, 1);
     height.values.push_back(remembering(random, kBeats, 0.95));
     input.values.push_back(remembering(random, kBeats, 0.8));
@@ -192,6 +194,42 @@ TEST(Where, FindsNothingInNoise) {
   EXPECT_EQ(low.size(), 6u);
   // without a gap any discovery is false: one table in twenty may have some, and the tests are within a few percent of exact
   EXPECT_LE(found, 4);
+}
+
+TEST(Ladder, CountsEachRungAgainstItsNoise) {
+  Flown f = flown(1, 0.3);
+  f.around.clamped[1] = 1;
+  for (std::size_t i = 0; i < f.residual[1].size(); ++i)
+    if (i % kRowsPerBeat < group_of(kStrokeLeft, 0)) f.residual[1][i] *= 5;
+  TestResiduals none = f.residual;
+  none[2].clear();
+  RankedHypothesis spring, both;
+  spring.effects = {"spring_hardening"}, spring.probability = 0.6;
+  both.effects = {"wing_damage", "gyro_bias"}, both.probability = 0.3;
+  const std::vector<LadderRung> ladder = ladder_of(f.around, none, f.residual, nullptr, {spring, both});
+  ASSERT_EQ(ladder.size(), 3u);
+  EXPECT_NEAR(*ladder[0].refit, 1, 0.05) << "wings and motors, of all flights";
+  // path and rotate of a clamped robot have no rows in truth; here they are noise of six rows beside 54 of five times
+  EXPECT_NEAR(*ladder[1].refit, std::sqrt((54 * 25 + 6) / 60.0), 0.1);
+  EXPECT_NEAR(*ladder[2].refit, 1, 0.05);
+  EXPECT_FALSE(ladder[0].nominal) << "it diverged";
+  EXPECT_FALSE(ladder[0].effect) << "not fitted";
+  EXPECT_EQ(ladder[0].probability, 0.6);
+  EXPECT_EQ(ladder[1].probability, 0.3) << "wing_damage";
+  EXPECT_EQ(ladder[2].probability, 0.3) << "gyro_bias";
+  // without film and currents
+  for (const int channel : {kStrokeLeft, kStrokeRight, kBattery, kCurrentLeft, kCurrentRight})
+    for (int c = 0; c < kCoefficients; ++c) f.around.rows[group_of(channel, c)] = 0;
+  EXPECT_FALSE(ladder_of(f.around, none, f.residual, nullptr, {})[0].refit);
+}
+
+TEST(Ladder, AnEffectActsOnTheRungWhereAClampedRobotShowsIt) {
+  for (const char* effect : {"gear_backlash", "stop_compliance", "battery_sag", "wing_inertia"})
+    EXPECT_EQ(rung_of_effect(effect), 0u) << effect;
+  for (const char* effect : {"rotational_lift", "wing_damage", "clap_and_fling"})
+    EXPECT_EQ(rung_of_effect(effect), 1u) << effect;
+  for (const char* effect : {"com_offset", "tether", "wind", "ground_effect", "mocap_delay"})
+    EXPECT_EQ(rung_of_effect(effect), 2u) << effect;
 }
 
 TEST(Where, FindsWhatDependsOnHeight) {

@@ -76,6 +76,7 @@ Diagnosis whole() {
   d.background = {{"body_drag.area_m2", 1e-4, 0, 2e-4, "m^2"}};
   d.sensors = {{"imu_clock.rate", 4e-5, 3e-5, 5e-5, ""}};
   d.moved_parameters = {{"torso.mass_kg", -1.5}};
+  d.ladder = {{"drive and hinges", 12.5, 3, {}, 0.75}, {"air", {}, {}, {}, 0}};
   d.locations = {location(Fitted::nominal, ResidualTest::channel, 3, false),
                  {Fitted::refit,
                   ResidualTest::phase,
