@@ -28,7 +28,7 @@ struct FamilyOptions {
   std::string reference;  ///< folder for a session without effects that the robot flies before; empty: none
   std::size_t reference_sessions = 1;  ///< of the flights of `reference`, in turn
   bool calm_reference = false;
-  bool hover = false, own_parameters = false, conventions = false;
+  bool hover = false, bench = false, own_parameters = false, conventions = false;
 };
 
 /// Flies a robot through the interface of all families; fly_case() is the counterpart with family A's own options.
@@ -40,7 +40,8 @@ Json fly_family(const RobotOptions& o, const FamilyOptions& f) {
   a.vehicle_file = o.vehicle;
   for (const BlindEffect& e : effects_of(o.effects)) a.effects.emplace_back(e.id, e.magnitude);
   a.hover = f.hover, a.own_parameters = f.own_parameters, a.conventions = f.conventions;
-  a.power = o.power, a.wings = o.wings;
+  a.power = o.power || f.bench, a.wings = o.wings || f.bench, a.bench = f.bench;
+  if (a.bench) benchmark::require_bench(family);
   std::optional<Assignment> reference;
   if (!f.reference.empty()) {
     reference = a;
@@ -56,7 +57,8 @@ Json fly_family(const RobotOptions& o, const FamilyOptions& f) {
     for (std::size_t k = 0; k < flights.size(); ++k) {
       folders.push_back((std::filesystem::path(to) / ("flight_" + std::to_string(k + 1))).string());
       flightlog::write_flight_log(folders.back().get<std::string>(), flights[k].log);
-      std::printf("%s: %g s\n", folders.back().get<std::string>().c_str(), Family::kFlight_s);
+      std::printf("%s: %g s\n", folders.back().get<std::string>().c_str(),
+                  flights[k].log.command.t_s.empty() ? 0 : std::round(flights[k].log.command.t_s.back()));
     }
   };
   write_all(robot.reference, f.reference);
@@ -188,6 +190,10 @@ int main(int argc, char** argv) {
       .needs(reference)
       .shows_default();
   fly.flag("--calm-reference", of.calm_reference, "the reference hovers and follows slow paths").needs(reference);
+  const io::Option bench =
+      fly.flag("--bench", of.bench, "of family b or c: clamped to a force sensor and filmed, in place of flights")
+          .needs(family)
+          .excludes(hovers);
   fly.flag("--own-parameters", of.own_parameters, "of a family: draw the parameters of each body").needs(family);
   fly.flag("--conventions", of.conventions, "of a family: draw sensors and declarations as laboratories have them")
       .needs(family);
@@ -197,7 +203,8 @@ int main(int argc, char** argv) {
                                   .needs(family)
                                   .excludes(reference)
                                   .excludes(programmed)
-                                  .excludes(hovers);
+                                  .excludes(hovers)
+                                  .excludes(bench);
   fly.option("--firmware", on_board.firmware, "mistake of the firmware around it").needs(exported).shows_default();
   fly.option("--begin", on_board.begin_s, "when the policy acts, s").range(0.0, 60.0).needs(exported).shows_default();
   fly.option("--duration", on_board.lasts_s, "of that flight, s").range(0.1, 60.0).needs(exported).shows_default();
@@ -243,6 +250,8 @@ int main(int argc, char** argv) {
       .range(std::size_t{1}, blind::Family::kFlights)
       .needs(contrast)
       .shows_default();
+  make.flag("--bench", made.plan.bench, "robots are clamped to a force sensor and filmed, with --contrast")
+      .needs(contrast);
   make.option("--vehicle", made.vehicle, "the robot as declared").shows_default();
   make.option("--randomise", made.randomise, "what robots of the part parameters are drawn from").shows_default();
   make.option("--detectable", made.detectable, "what is detectable of every effect; none: the family's own table");

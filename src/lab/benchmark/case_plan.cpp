@@ -49,6 +49,7 @@ class Planner {
       (in_catalogue(e) ? detectable_ : outside_).push_back(e.id);
       if (in_catalogue(e) && d.detectable <= 1) typical_.push_back(e.id);
     }
+    if (options.bench) require_bench(family);
     if (outside_.empty())
       throw io::InputError(
           "--detectable: nothing outside the catalogue is detectable; accepted: a table of flappy-blind detectability");
@@ -180,6 +181,7 @@ class Planner {
         c.references = std::min(c.references, options_.flights);
         c.reference_sessions = std::min(options_.reference_sessions, c.references);
         c.flights = std::min(c.flights, options_.flights);
+        c.bench = options_.bench;
       });
     };
     const auto single = [&](std::size_t k, PlannedCase& c) { c.effects = {{all[k % all.size()], 1}}; };
@@ -267,7 +269,8 @@ blind::Assignment assignment_of(const PlannedCase& planned, const std::filesyste
   blind::Assignment a;
   a.vehicle_file = vehicle;
   for (const blind::BlindEffect& e : planned.effects) a.effects.emplace_back(e.id, e.magnitude);
-  a.hover = planned.hover, a.power = planned.power;
+  a.hover = planned.hover, a.power = planned.power || planned.bench;
+  a.bench = a.wings = planned.bench;
   a.own_parameters = planned.own_parameters, a.conventions = planned.conventions;
   a.session = planned.references > 0 ? 1 : 0;
   return a;

@@ -33,6 +33,7 @@ struct PlannedCase {
   std::vector<blind::BlindEffect> effects;
   std::uint64_t seed = 0;
   bool hover = false, power = false;
+  bool bench = false;                                ///< clamped and filmed in place of flights, with currents
   bool own_parameters = false, conventions = false;  ///< as in blind::Assignment
   bool published = false;                            ///< its vehicle is drawn from the published randomisation
   /// In a contrast, the robot flies `references` flights without its effects, and then `flights` in another session.
@@ -55,6 +56,7 @@ struct PlanOptions {
   std::size_t at_most = 0;           ///< most cases of each part; 0: all
   std::size_t flights = blind::Family::kFlights;  ///< most flights of a session of a contrast
   std::size_t reference_sessions = 1;             ///< of the references of a contrast; other numbers have other seeds
+  bool bench = false;                             ///< robots of contrasts are clamped in place of flying
 };
 
 /// Seeds of family b begin at 20,000,000 (development) and 29,000,000 (reported); a and c: 10,000,000 and 30,000,000

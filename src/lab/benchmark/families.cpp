@@ -47,6 +47,11 @@ void check_engine(const std::filesystem::path& folder, const std::string& family
                          "; accepted: a build with " + engine);
 }
 
+void require_bench(const Family& family) {
+  if (!family.has_bench())
+    throw io::InputError("--bench: robots of family " + family.name() + " cannot be clamped; accepted: b or c");
+}
+
 bool in_catalogue(const blind::FamilyEffect& effect) { return !effect.id.starts_with("outside_"); }
 
 std::uint64_t seed_of_draw(std::uint64_t seed, std::uint64_t draw) { return seed * blind::kTries + draw; }

@@ -18,6 +18,9 @@ const blind::Family& family_named(const std::string& name);
 /// InputError if the robots of a benchmark are of another engine, or version of it, than those that this build flies.
 void check_engine(const std::filesystem::path& folder, const std::string& family, const std::string& engine);
 
+/// InputError if robots of the family cannot be clamped.
+void require_bench(const blind::Family& family);
+
 /// Whether the catalogue has an effect with this cause.
 bool in_catalogue(const blind::FamilyEffect& effect);
 

@@ -125,20 +125,22 @@ blind::Assignment Label::robot(const std::filesystem::path& vehicle) const {
 Json to_json(const PlannedCase& p) {
   Json effects = Json::array();
   for (const blind::BlindEffect& e : p.effects) effects.push_back({{"id", e.id}, {"magnitude", e.magnitude}});
-  return {{"number", p.number},
-          {"part", p.part},
-          {"effects", effects},
-          {"seed", p.seed},
-          {"hover", p.hover},
-          {"power", p.power},
-          {"own_parameters", p.own_parameters},
-          {"conventions", p.conventions},
-          {"published", p.published},
-          {"references", p.references},
-          {"reference_sessions", p.reference_sessions},
-          {"flights", p.flights},
-          {"calm_reference", p.calm_reference},
-          {"withheld", p.withheld}};
+  Json json = {{"number", p.number},
+               {"part", p.part},
+               {"effects", effects},
+               {"seed", p.seed},
+               {"hover", p.hover},
+               {"power", p.power},
+               {"own_parameters", p.own_parameters},
+               {"conventions", p.conventions},
+               {"published", p.published},
+               {"references", p.references},
+               {"reference_sessions", p.reference_sessions},
+               {"flights", p.flights},
+               {"calm_reference", p.calm_reference},
+               {"withheld", p.withheld}};
+  if (p.bench) json["bench"] = true;  // plans without have the hash that they had before
+  return json;
 }
 
 Json to_json(const Label& label) {
@@ -158,6 +160,7 @@ Label label_from(const Json& json) {
   p.seed = json.at("seed");
   p.hover = json.at("hover");
   p.power = json.at("power");
+  p.bench = json.value("bench", false);
   p.own_parameters = json.at("own_parameters");
   p.conventions = json.at("conventions");
   p.published = json.at("published");

@@ -44,6 +44,8 @@ struct Assignment {
   bool own_parameters = false;        ///< draws each parameter of each body independently; else the file's values
   bool conventions = false;           ///< draws declarations within the habits of laboratories; else they are exact
   bool power = false, wings = false;  ///< whether currents and wing angles are logged
+  /// Runs on a bench in place of flights: clamped to a six-axis force sensor, wings filmed. Needs Family::has_bench().
+  bool bench = false;
   const ProposedFlight* proposed = nullptr;  ///< replaces hover and rich flights; null: none
   model::Changes changes;                    ///< made to the robot on purpose before these flights; the log says them
 
@@ -113,10 +115,14 @@ class Family {
   /// An engine whose version is part of its robots, as "MuJoCo 2.2.2"; empty: none.
   virtual std::string engine() const { return ""; }
   virtual const std::vector<FamilyEffect>& effects() const = 0;
+  /// Whether its robots can be clamped (Assignment::bench).
+  virtual bool has_bench() const { return false; }
   static constexpr std::size_t kFlights = 3;
   static constexpr double kFlight_s = 10;
   /// Flies flight 0, 1 or 2, or 3, the proposed one; the robot trims for some seconds before the log. Returns the same
-  /// bytes for the same arguments, with any number of threads, on all processors of one kind.
+  /// bytes for the same arguments, with any number of threads, on all processors of one kind. On a bench, runs 0 to 2 hold
+  /// inputs for 2 s each, 37 points in all, and end with a sweep, of about 27 s each; the films of two of them hold ten
+  /// points between them.
   virtual FamilyFlight fly(const Assignment& a, std::size_t flight) const = 0;
   virtual Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect,
                             double magnitude) const = 0;
