@@ -145,6 +145,7 @@ void decide(const Question& question, const RobotFit& robot, const Fitter& fitte
   if (rule.refutation.min_share > 0) refute(robot.evidence(), flights, rule.refutation.min_share, d);
   question.refute(robot, fitter, flights, rule, d);
   set_probabilities(d.hypotheses, rule);
+  exclude_unchanged(d);
   conclude(
       rule, [&](const ScoredHypothesis& a) { return question.pool(a); }, d);
   question.choose_predicting(d);

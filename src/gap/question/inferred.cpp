@@ -1,6 +1,7 @@
 #include "gap/question/inferred.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "model/effects/registry.hpp"
@@ -22,6 +23,18 @@ std::string pool_name(const std::vector<std::string>& effects) {
   std::string name;
   for (const std::string& g : groups) name += (name.empty() ? "" : "+") + g;
   return name;
+}
+
+void exclude_unchanged(Inference& d) {
+  if (std::ranges::none_of(d.seen, [](const SeenQuantity& s) { return std::abs(s.times()) > kPlainTimes; })) return;
+  double rest = 0;
+  for (ScoredHypothesis& a : d.hypotheses) {
+    if (a.kind == HypothesisKind::none || a.kind == HypothesisKind::parameters) a.probability = 0;
+    rest += a.probability;
+  }
+  if (!(rest > 0)) return;
+  for (ScoredHypothesis& a : d.hypotheses) a.probability /= rest;
+  std::ranges::stable_sort(d.hypotheses, std::greater{}, &ScoredHypothesis::probability);
 }
 
 void predict_with_the_likeliest(Inference& d) {

@@ -109,6 +109,12 @@ struct ReferenceFit {
 /// Sorted groups of the effects, joined by +: "body_drag+world_force". An effect without a group is its own group.
 std::string pool_name(const std::vector<std::string>& effects);
 
+/// A quantity that changed by more times what sessions differ by is a change, whatever its cause. Choice.
+inline constexpr double kPlainTimes = 7;
+/// Where d.seen has such a quantity, nobody may say "unchanged": takes the probabilities of none and parameters away
+/// and gives them to the others in proportion.
+void exclude_unchanged(Inference& d);
+
 /// Sets predicted_with of the conclusion: to the effects of the likeliest fitted hypothesis that contains the
 /// conclusion's effects, if it is likelier. Its further effects may be due to chance, so they are not named; yet a
 /// vehicle with them predicts better. The conclusion none keeps the file.

@@ -44,6 +44,21 @@ Inference conclude(std::vector<ScoredHypothesis> hypotheses) {
   return d;
 }
 
+TEST(Verdict, IsNotUnchangedWhereAQuantityChangedPlainly) {
+  Inference d;
+  d.hypotheses = {hypothesis(0.6, HypothesisKind::parameters), hypothesis(0.2, HypothesisKind::none),
+                  hypothesis(0.05, {"wind"}), hypothesis(0.15, HypothesisKind::unknown)};
+  d.seen = {{"mean force along z", "m/s^2", 0, -1.4, 0.21}, {"battery", "V", 0, 0.1, 1}};
+  exclude_unchanged(d);
+  EXPECT_EQ(d.hypotheses[0].probability, 0.6) << "6.7 times";
+  d.seen[0].scatter = 0.19;
+  exclude_unchanged(d);
+  EXPECT_EQ(d.hypotheses[0].kind, HypothesisKind::unknown) << "7.4 times";
+  EXPECT_NEAR(d.hypotheses[0].probability, 0.75, 1e-12);
+  EXPECT_NEAR(d.hypotheses[1].probability, 0.25, 1e-12) << "wind";
+  EXPECT_EQ(d.hypotheses[3].probability, 0);
+}
+
 TEST(Verdict, CountsNatsBeyondChanceByStudentsT) {
   const auto weighed = [](double log_evidence, double prior, ScoredHypothesis a) {
     a.log_prior = std::log(prior);
