@@ -11,6 +11,7 @@
 #include "io/program.hpp"
 #include "io/sha256.hpp"
 #include "io/text.hpp"
+#include "lab/benchmark/change_over_noise.hpp"
 #include "lab/benchmark/records.hpp"
 
 namespace flappy::benchmark {
@@ -112,6 +113,14 @@ void check_verdict(const fs::path& folder, const Manifest& manifest, const fs::p
                          " was scored with another; accepted: the file that it was scored with");
 }
 
+/// Whether the score leaves a case out, because its effect does not show.
+bool within_noise(const fs::path& folder, std::size_t number) {
+  const fs::path file = true_fits(folder) / (number_text(number) + "_over_noise.json");
+  if (!fs::exists(file)) return false;
+  const Json change = read_json(file).at("change_over_noise");
+  return !change.is_null() && change.get<double>() < kBeyondNoise;
+}
+
 class Calibration {
  public:
   explicit Calibration(const CalibrateCommand& command)
@@ -142,6 +151,7 @@ class Calibration {
           own.hypotheses.push_back(std::move(a));
         }
         if (own.hypotheses.empty()) continue;  // its data were faulty
+        if (within_noise(folder, c.number)) continue;
         own.part = parts.try_emplace(manifest.family + " " + own.truth.part, counts.size()).first->second;
         if (own.part == counts.size()) counts.push_back(0);
         counts[own.part] += 1;
