@@ -322,6 +322,11 @@ void propose_experiment(const DiagnosisRequest& request, Diagnosed& d) {
   NextOptions options;
   options.threads = request.settings.threads;
   options.references = d.flights.references;
+  // as before: a laboratory has a force sensor or not, and what references do not show does not cancel
+  const FlightList& before = d.flights.references.empty() ? d.flights.tests : d.flights.references;
+  const auto clamped = [](const auto& flight) { return flight->recording()->clamped(); };
+  options.on_bench = std::ranges::any_of(before, clamped);
+  options.in_flight = !std::ranges::all_of(before, clamped);
   options.discrepancy = request.options.discrepancy;
   options.rule = request.options.rule;
   const std::vector<NextExperiment> ranked = rank_experiments(d.inference, *d.uncertain, request.manoeuvres, options);

@@ -111,6 +111,10 @@ std::vector<std::vector<double>> course_of(const flightlog::FlightLog& log) {
   const auto steps = static_cast<std::size_t>((c.t_s.back() - c.t_s.front()) / kCourseStep_s);
   std::vector<std::vector<double>> course;
   for (const auto& [t_s, values] : columns) {
+    if (t_s->empty()) {  // a clamped robot has no path
+      course.emplace_back();
+      continue;
+    }
     std::vector<double> sums(steps, 0), counts(steps, 0);
     for (std::size_t i = 0; i < t_s->size(); ++i) {
       const double at = ((*t_s)[i] - c.t_s.front()) / kCourseStep_s;
@@ -132,6 +136,7 @@ std::vector<Course> courses_of(const std::vector<std::vector<double>>& first,
     const std::size_t n = std::min(first[q].size(), second[q].size());
     const Eigen::Map<const VectorXd> a(first[q].data(), static_cast<Index>(n)),
         b(second[q].data(), static_cast<Index>(n));
+    if (n == 0) continue;
     const double own = (a.array() - a.mean()).matrix().norm(), apart = (a - b).norm();
     list.push_back({own > 0 ? apart / own : 0, {kCourses[q], {a.begin(), a.end()}, {b.begin(), b.end()}}});
   }
@@ -230,8 +235,10 @@ std::vector<NextExperiment> rank_experiments(const Inference& inference, const s
   const std::vector<Rival> rivals = rivals_of(question, inference, uncertain, as_filed, options.least_probability);
   if (rivals.size() < 2) return {};
   std::vector<std::optional<NextExperiment>> found(manoeuvres.size());
-  io::parallel_for(manoeuvres.size(), options.threads,
-                   [&](std::size_t i) { found[i] = weighed(question, manoeuvres[i], rivals, options); });
+  const auto is_ready = [&](const Manoeuvre& m) { return m.config.log.rig ? options.on_bench : options.in_flight; };
+  io::parallel_for(manoeuvres.size(), options.threads, [&](std::size_t i) {
+    if (is_ready(manoeuvres[i])) found[i] = weighed(question, manoeuvres[i], rivals, options);
+  });
   std::vector<NextExperiment> list;
   for (std::optional<NextExperiment>& e : found)
     if (e) list.push_back(std::move(*e));

@@ -40,9 +40,10 @@ std::vector<Manoeuvre> read_manoeuvres(const std::filesystem::path& folder,
                                        const std::vector<std::string>& overrides = {});
 
 struct NextOptions {
-  int threads = 0;                  ///< as for io::parallel_for
-  double least_probability = 0.01;  ///< smallest probability of a rival
-  FlightList references;            ///< reference flights of a contrast; empty: no contrast
+  int threads = 0;                          ///< as for io::parallel_for
+  double least_probability = 0.01;          ///< smallest probability of a rival
+  FlightList references;                    ///< reference flights of a contrast; empty: no contrast
+  bool in_flight = true, on_bench = false;  ///< whether the robot may fly, or be clamped
   ModelDiscrepancy discrepancy;
   VerdictRule rule;
 };

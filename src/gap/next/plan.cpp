@@ -35,7 +35,8 @@ struct Session {
   const Manoeuvre* manoeuvre = nullptr;  ///< null: flights of PlanSettings::like
   std::size_t flights = 3;
   bool reference = false, power = false, wings = false;
-  const Manoeuvre* further = nullptr;  ///< intervention before as many further flights; null: no further flights
+  const Manoeuvre* further = nullptr;  ///< as many further flights of this, perhaps with an intervention; null: none
+  bool films_further = false;          ///< whether only the wings of the further ones are filmed
 };
 
 class Planner {
@@ -131,8 +132,13 @@ class Planner {
             [n](Session& s) { s.flights = n; });
     for (const Manoeuvre& m : manoeuvres_) {
       if (&m == asked.manoeuvre) continue;
-      if (m.config.changes.any())
-        add(m.name, in_words(m.config.changes) + ", before " + std::to_string(asked.flights) + " further flights",
+      const std::string further = std::to_string(asked.flights) + " further ";
+      if (m.config.log.rig) {
+        add(m.name, further + "runs, clamped to a force sensor", [&m](Session& s) { s.further = &m; });
+        add(m.name + "_filmed", further + "runs, clamped to a force sensor, the wings filmed",
+            [&m](Session& s) { s.further = &m, s.films_further = true; });
+      } else if (m.config.changes.any())
+        add(m.name, in_words(m.config.changes) + ", before " + further + "flights",
             [&m](Session& s) { s.further = &m; });
       else add(m.name, "this manoeuvre in place of " + asked.manoeuvre->name, [&m](Session& s) { s.manoeuvre = &m; });
     }
@@ -153,22 +159,26 @@ class Planner {
       add(settings_.like, flights.tests);
       return flights;
     }
-    const auto fly = [&](rollout::FlyConfig config, std::size_t count) {
+    const auto fly = [&](const Manoeuvre& manoeuvre, bool films, bool references) {
+      rollout::FlyConfig config = manoeuvre.config;
       if (session.power)
         config.log.power = flightlog::PowerHeader{kBattery_V, kLog_Hz, 0, kVoltageNoise_V, kCurrentNoise_A};
-      if (session.wings) config.log.wings = flightlog::WingsHeader{kLog_Hz, kWingNoise_rad};
-      return simulate(config, vehicle_, count, config.settle_s);
+      if (films) config.log.wings = flightlog::WingsHeader{kLog_Hz, kWingNoise_rad};
+      std::vector<rollout::SimulatedFlight> flown =
+          simulate(config, vehicle_, session.flights * (references ? 2 : 1), config.settle_s);
+      for (std::size_t i = 0; i < flown.size(); ++i) {
+        if (flown[i].lost || !flown[i].log) return false;
+        (references && i < session.flights ? flights.references : flights.tests)
+            .push_back(
+                std::make_shared<ResetPrediction>(Recording(manoeuvre.name, std::move(*flown[i].log), vehicle_)));
+      }
+      return true;
     };
-    std::vector<rollout::SimulatedFlight> flown =
-        fly(session.manoeuvre->config, session.flights * (session.reference ? 2 : 1));
-    if (session.further != nullptr)
-      std::ranges::move(fly(session.further->config, session.flights), std::back_inserter(flown));
-    for (std::size_t i = 0; i < flown.size(); ++i) {
-      if (flown[i].lost || !flown[i].log) return {};
-      (session.reference && i < session.flights ? flights.references : flights.tests)
-          .push_back(std::make_shared<ResetPrediction>(
-              Recording(session.manoeuvre->name, std::move(*flown[i].log), vehicle_)));
-    }
+    if (!fly(*session.manoeuvre, session.wings, session.reference)) return {};
+    if (session.further == nullptr) return flights;
+    // a robot that is clamped after the change was clamped before it, too
+    const bool before = session.reference && session.further->config.log.rig.has_value();
+    if (!fly(*session.further, session.wings || session.films_further, before)) return {};
     return flights;
   }
 

@@ -208,6 +208,26 @@ TEST(NextExperiment, ForeseesWhatAnInterventionChanges) {
   for (const NextExperiment& n : {ranked[0], ranked[1]}) EXPECT_GT(n.expected_nats, 1) << n.manoeuvre;
 }
 
+TEST(NextExperiment, ProposesARunOnABenchWhereThereIsOne) {
+  const sim::Randomisation prior = uncertain();
+  const Inference d =
+      diagnosis(prior, {hypothesis(prior, {"gear_backlash"}, {1}, 0.6), hypothesis(prior, {"tether"}, {1}, 0.4)});
+  const auto choice = library({"bench", "dash"});
+  NextOptions options = shipped();
+  const auto named = [&](bool in_flight, bool on_bench) {
+    options.in_flight = in_flight, options.on_bench = on_bench;
+    std::vector<std::string> names;
+    for (const NextExperiment& n : gap::rank_experiments(d, prior, choice, options)) names.push_back(n.manoeuvre);
+    return names;
+  };
+  EXPECT_EQ(named(true, false), std::vector<std::string>{"dash"});
+  EXPECT_EQ(named(false, true), std::vector<std::string>{"bench"});
+  const auto ranked = gap::rank_experiments(d, prior, choice, options);
+  EXPECT_GT(ranked[0].expected_nats, 2) << "a clamped robot shows a backlash, and no tether";
+  ASSERT_EQ(ranked[0].courses.size(), 4u) << "inputs, no path";
+  for (const Course& c : ranked[0].courses) EXPECT_EQ(c.first, c.second) << c.quantity;
+}
+
 TEST(NextExperiment, RefusesInterventionsThatAreNone) {
   const flight::Folder folder;
   std::filesystem::copy(source_path("configs"), folder / "configs", std::filesystem::copy_options::recursive);
