@@ -12,6 +12,7 @@
 #include "flightlog/import/marker_pose.hpp"
 #include "flightlog/import/recorded_units.hpp"
 #include "flightlog/import/sources.hpp"
+#include "flightlog/import/wing_film.hpp"
 #include "flightlog/rotation.hpp"
 #include "flightlog/stream_statistics.hpp"
 #include "io/log.hpp"
@@ -99,16 +100,38 @@ const std::vector<double>& field_of_body(const Channel& channel, const StreamMap
   s.table.fail("rotation", "is given, but the file says what its rotation is", "no rotation");
 }
 
-/// The field of a marker. InputError for a marker that is not there, and where the file does not say which axis is up.
-const std::vector<double>& field_of_marker(const Channel& channel, const StreamMapping& s, const std::string& field) {
+/// The factor from a coordinate of a point to m: as the mapping says, else by the unit that the recording says, else 1.
+double unit_of_point(const Channel& channel, const StreamMapping& s, const std::string& field) {
+  if (s.unit_m) return *s.unit_m;
+  const std::string unit = channel.unit(field);
+  if (unit.empty()) return 1;
+  const auto known = recorded_unit(unit);
+  if (!known || known->suffix != "_m")
+    s.table.fail(s.points.empty() ? "markers" : "points", "\"" + field + "\" is in " + io::shortened(unit),
+                 known ? "fields of lengths" : "the unit in m as unit_m");
+  return known->factor;
+}
+
+/// A coordinate of a marker or of a point of the wings, m. InputError for one that is not there, and where the file does not
+/// say which axis is up.
+std::vector<double> field_of_marker(const Channel& channel, const StreamMapping& s, const FieldNames& fields) {
   const Capture* capture = channel.capture();
   if (capture && !capture->says_up && !s.says_world)
     s.table.fail("world", "is missing: " + capture->program + "'s files do not say which axis is up",
                  "\"y_up\" (the program's default), \"enu\" (z up)");
-  if (const auto* found = channel.column(field)) return *found;
+  for (const std::string& field : fields)
+    if (const auto* found = channel.column(field)) {
+      std::vector<double> values = *found;
+      for (double& value : values) value *= unit_of_point(channel, s, field);
+      return values;
+    }
+  const std::string& field = fields.front();
   const std::string name = field.substr(0, field.rfind('.'));
   const std::vector<std::string> names = capture ? capture->markers : channel.fields();
-  s.table.fail("markers", "\"" + name + "\" is no marker of the recording" + (capture ? "" : ", by fields as " + field),
+  const bool is_marker = std::ranges::find(s.markers, name) != s.markers.end();
+  s.table.fail(is_marker ? "markers" : "points",
+               "\"" + name + "\" is no " + (is_marker ? "marker" : "point") + " of the recording" +
+                   (capture ? "" : ", by fields as " + field + " or " + fields[1]),
                listed(names) + io::did_you_mean(name, names));
 }
 
@@ -159,7 +182,7 @@ void require_unit(const Channel& channel, const StreamMapping& s) {
   constexpr double kTail = 0.05;                         // share of the times at either end that is ignored
   std::vector<double> times = field_of(channel, s.table, "time_field", s.time_fields.front());
   std::erase_if(times, [](double t) { return !std::isfinite(t); });
-  if (times.size() < 2 || s.time_fields.size() > 1) return;
+  if (times.size() < 2 || s.time_fields.size() > 1 || s.time_fields.front() == kFrame) return;
   const double low = io::quantile(times, kTail), middle = std::abs(io::median(times)),
                high = io::quantile(times, 1 - kTail);
   const double step = (high - low) / ((1 - 2 * kTail) * static_cast<double>(times.size() - 1)),
@@ -215,6 +238,9 @@ class Clocks {
       if (left_out(channels, s)) continue;
       const Channel& channel = channel_of(channels, s, s.channel, "channel");
       if (s.time == TimeOf::received) continue;
+      if (s.time == TimeOf::field && s.time_fields.front() == kFrame && !channel.column(kFrame))
+        s.table.fail("time", "\"frame\" is given for a recording that is no table",
+                     "a table with a row for each frame");
       if (s.time == TimeOf::field) require_unit(channel, s);
       auto& pairs = pairs_[s.clock];
       const std::vector<StampedReceipt> own = stamped_receipts(channel, s);
@@ -336,6 +362,7 @@ struct Stream {
   Columns columns;
   std::vector<std::string> notes;                  ///< warnings about markers
   std::vector<const ColumnMapping*> not_measured;  ///< of each row, the first column that it says is not measured
+  std::vector<std::string> faults;                 ///< of wings by points: of each row, why it is unusable, or empty
   StreamReport report;
 
   void turn() {
@@ -464,6 +491,86 @@ void pose_of_markers(Stream& s) {
     s.notes.push_back(names[i] + " and " + names[j] + " can be swapped without a trace but the frames before");
 }
 
+Eigen::Quaterniond attitude_of(const Columns& c, std::size_t i) {
+  return {c.at("qw")[i], c.at("qx")[i], c.at("qy")[i], c.at("qz")[i]};
+}
+
+Eigen::Quaterniond eigen_of(const Quaternion& q) { return {q.w, q.x, q.y, q.z}; }
+
+/// Attitudes, B to W, at the times of a film, by those of motion capture, which arrive `latency_s` later. None where
+/// motion capture pauses.
+std::vector<std::optional<Eigen::Quaterniond>> attitudes_at(const std::vector<std::int64_t>& t_ns, const Stream& mocap,
+                                                            double latency_s) {
+  constexpr double kLongestPause = 3;  // periods; a robot turns little within them
+  const auto latency_ns = std::llround(1e9 * latency_s);
+  const double pause_ns = kLongestPause * 1e9 / mocap.report.rate_hz;
+  std::vector<std::optional<Eigen::Quaterniond>> attitudes;
+  for (const std::int64_t t : t_ns) {
+    attitudes.emplace_back();
+    if (t == kNoTime) continue;
+    const auto after = std::ranges::lower_bound(mocap.t_ns, t + latency_ns);
+    if (after == mocap.t_ns.end()) continue;
+    const auto k = static_cast<std::size_t>(after - mocap.t_ns.begin());
+    if (*after == t + latency_ns) {
+      attitudes.back() = attitude_of(mocap.columns, k).normalized();
+    } else if (k > 0) {
+      const auto step = static_cast<double>(*after - mocap.t_ns[k - 1]);
+      const double share = static_cast<double>(t + latency_ns - mocap.t_ns[k - 1]) / step;
+      if (step < pause_ns)
+        attitudes.back() =
+            attitude_of(mocap.columns, k - 1).normalized().slerp(share, attitude_of(mocap.columns, k).normalized());
+    }
+  }
+  return attitudes;
+}
+
+/// Replaces the columns of digitised points by the angles of the wings, with the deviation, which the log has no place
+/// for. `mocap`: the stream that shows the attitude where the points do not; or null.
+void angles_of_points(Stream& s, const Stream* mocap, double latency_s) {
+  const StreamMapping& m = s.mapping;
+  if (m.points.empty()) return;
+  std::vector<FilmedFrame> frames(s.t_ns.size());
+  const Eigen::Quaterniond to_world = eigen_of(turn_of(m.world));
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const auto at = [&](std::size_t point) { return place_of(s.columns, m.points[point], i); };
+    frames[i].wings = {WingPoints{at(0), at(1), at(2)}, WingPoints{at(3), at(4), at(5)}};
+    frames[i].attitude = to_world.conjugate() * m.attitude.conjugate();
+  }
+  Column residual;
+  if (!m.markers.empty()) {
+    pose_of_markers(s);
+    residual = s.columns.at("residual_m");
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      frames[i].attitude = attitude_of(s.columns, i);
+      if (std::isnan(residual[i])) frames[i].attitude.reset();
+    }
+  } else if (mocap) {
+    const auto attitudes = attitudes_at(s.t_ns, *mocap, latency_s);
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      frames[i].attitude = attitudes[i];
+      if (attitudes[i]) frames[i].attitude = to_world.conjugate() * *attitudes[i];
+    }
+  }
+  const FilmedWings wings = filmed_wings(frames, m.points, m.stroke_plane_rad, m.length_tolerance);
+  if (2 * wings.swapped > wings.whole)
+    m.table.table("points").fail("left_root",
+                                 "\"" + m.points[0] + "\" is on the right of \"" + m.points[3] + "\" in " +
+                                     std::to_string(wings.swapped) + " of " + std::to_string(wings.whole) + " frames",
+                                 "left and right as the robot has them, and axes of the points as " +
+                                     std::string(m.markers.empty() ? "world and attitude" : "markers") + " say");
+  s.columns.clear();
+  if (!residual.empty()) s.columns["residual_m"] = std::move(residual);
+  for (const auto& [left, right] : wings.angles) {
+    s.columns["left_stroke_rad"].push_back(left.stroke_rad),
+        s.columns["left_rotation_rad"].push_back(left.rotation_rad);
+    s.columns["right_stroke_rad"].push_back(right.stroke_rad);
+    s.columns["right_rotation_rad"].push_back(right.rotation_rad);
+    s.columns["deviation_rad"].push_back(std::max(std::abs(left.deviation_rad), std::abs(right.deviation_rad)));
+  }
+  s.faults = wings.faults;
+  s.report.stroke_noise_rad = wings.stroke_noise_rad;
+}
+
 /// Length of the quaternion of sample `i`; 1 where the stream has none.
 double length_of_rotation(const Stream& s, std::size_t i) {
   if (!s.columns.contains("qw")) return 1;
@@ -507,6 +614,7 @@ void require_range(const Stream& s) {
 std::string fault_of(const Stream& s, std::size_t i, const Span& span) {
   if (s.t_ns[i] == kNoTime) return "no time";
   if (!span.recorded.contains(s.t_ns[i])) return "apart from the rest of the recording";
+  if (!s.faults.empty() && !s.faults[i].empty()) return s.faults[i];
   if (const ColumnMapping* c = s.not_measured[i]) return c->fields.front() + " is not measured, as the message says";
   if (const auto residual = s.columns.find("residual_m");
       residual != s.columns.end() && std::isnan(residual->second[i]))
@@ -527,7 +635,8 @@ void tidy(Stream& s, const std::vector<double>* sequence, const Span& span, bool
   constexpr double kOthersShare = 0.1;
   std::size_t none = 0;
   for (std::size_t i = 0; i < s.t_ns.size(); ++i) none += has_none(s, i);
-  const bool has_others = shared && static_cast<double>(none) > kOthersShare * static_cast<double>(s.t_ns.size());
+  const bool has_others =
+      shared && s.faults.empty() && static_cast<double>(none) > kOthersShare * static_cast<double>(s.t_ns.size());
   std::vector<std::size_t> rows;
   std::int64_t latest = kNoTime;
   for (std::size_t i = 0; i < s.t_ns.size(); ++i) {
@@ -629,7 +738,7 @@ std::string usable(const StreamReport& report) {
 }
 
 Stream read_stream(const Channels& channels, const StreamMapping& mapping, const Clocks& clocks, const Span& span,
-                   bool shared, double gravity_m_s2) {
+                   bool shared, const FlightHeader& header, const Stream* mocap) {
   const Channel& channel = channel_of(channels, mapping, mapping.channel, "channel");
   if (all_missing(raw_times(channel, mapping)) && !channel.received_ns().empty())
     mapping.table.fail("time",
@@ -638,14 +747,14 @@ Stream read_stream(const Channels& channels, const StreamMapping& mapping, const
                        mapping.time == TimeOf::stamp ? "\"received\", or \"field\" with time_field"
                                                      : "\"stamp\", or \"field\" with time_field");
   const Timed own = timed(channel, mapping, clocks);
-  Stream s{mapping, own.t_ns, {}, {}, std::vector<const ColumnMapping*>(own.t_ns.size()), {}};
+  Stream s{mapping, own.t_ns, {}, {}, std::vector<const ColumnMapping*>(own.t_ns.size()), {}, {}};
   s.report.stream = mapping.name;
   s.report.channel = mapping.channel;
   for (const ColumnMapping& c : mapping.columns) {
     Column column;
-    if (!mapping.body.empty() || !mapping.markers.empty()) {
-      const auto& field = mapping.markers.empty() ? field_of_body : field_of_marker;
-      s.columns[c.column] = field(channel, mapping, c.fields.front());
+    if (!mapping.body.empty() || !mapping.markers.empty() || !mapping.points.empty()) {
+      s.columns[c.column] = mapping.body.empty() ? field_of_marker(channel, mapping, c.fields)
+                                                 : field_of_body(channel, mapping, c.fields.front());
       continue;
     }
     const io::Table columns = mapping.table.table("columns");
@@ -666,10 +775,11 @@ Stream read_stream(const Channels& channels, const StreamMapping& mapping, const
     s.columns[c.column] = std::move(column);
   }
   if (mapping.time != TimeOf::received) count_delays(s, channel, clocks.quickest(mapping));
-  derive_pitch(s, gravity_m_s2);
+  derive_pitch(s, header.gravity_m_s2);
   turn_angles(s);
   turn_rotations(s);
-  pose_of_markers(s);
+  if (mapping.points.empty()) pose_of_markers(s);
+  angles_of_points(s, mocap, header.mocap.latency_s);
   const std::string& counted = mapping.sequence;
   tidy(s, counted.empty() ? nullptr : &field_of(channel, mapping.table, "sequence", counted), span, shared);
   if (s.t_ns.size() < 2 && !is_optional(mapping))
@@ -677,12 +787,6 @@ Stream read_stream(const Channels& channels, const StreamMapping& mapping, const
   s.turn();
   return s;
 }
-
-Eigen::Quaterniond attitude_of(const Columns& c, std::size_t i) {
-  return {c.at("qw")[i], c.at("qx")[i], c.at("qy")[i], c.at("qz")[i]};
-}
-
-Eigen::Quaterniond eigen_of(const Quaternion& q) { return {q.w, q.x, q.y, q.z}; }
 
 /// The mean specific force of the IMU, m/s2, turned to W by the attitude `q` of each pose.
 template <typename Attitude>
@@ -780,6 +884,7 @@ void put(FlightLog& log, Stream& s, std::int64_t start_ns) {
 Imported assemble(const Channels& channels, const Mapping& mapping) {
   const Clocks clocks(channels, mapping);
   std::vector<Stream> streams;
+  streams.reserve(mapping.streams.size());
   Imported out;
   out.log.header = mapping.header;
   const Span span = span_of(channels, mapping, clocks);
@@ -787,10 +892,13 @@ Imported assemble(const Channels& channels, const Mapping& mapping) {
     std::string why;
     if (!left_out(channels, s)) {
       const bool shared = std::ranges::count(mapping.streams, s.channel, &StreamMapping::channel) > 1;
-      Stream stream = read_stream(channels, s, clocks, span, shared, mapping.header.gravity_m_s2);
+      const auto mocap = std::ranges::find(streams, "mocap", [](const Stream& other) { return other.mapping.name; });
+      Stream stream =
+          read_stream(channels, s, clocks, span, shared, mapping.header, mocap == streams.end() ? nullptr : &*mocap);
       if (stream.t_ns.size() >= 2) {
         for (const std::string& note : stream.notes) out.report.warnings.push_back(s.name + ": " + note);
         if (stream.columns.contains("residual_m")) stream.report.residual_m = stream.columns.at("residual_m");
+        if (stream.columns.contains("deviation_rad")) stream.report.deviation_rad = stream.columns.at("deviation_rad");
         if (stream.report.unusable > 0)
           out.report.warnings.push_back(s.name + ": " + std::to_string(stream.report.unusable) +
                                         " samples are unusable: " + reasons(stream.report));
@@ -840,6 +948,12 @@ std::string report_text(const ImportReport& report) {
     if (!s.residual_m.empty())
       add("  markers: residual %.3f mm median, %.3f mm most\n", 1e3 * io::median(s.residual_m),
           1e3 * *std::ranges::max_element(s.residual_m));
+  for (const StreamReport& s : report.streams)
+    if (!s.deviation_rad.empty())
+      add("  wings: deviation, which the log leaves out, %.4f rad median, %.4f rad most; noise of the stroke %.4f rad, "
+          "by the "
+          "scatter of the wings' length\n",
+          io::median(s.deviation_rad), *std::ranges::max_element(s.deviation_rad), s.stroke_noise_rad);
   for (const ClockReport& c : report.clocks) {
     if (c.name == kReceiver) {
       const bool odd = c.offset_s < 0 || c.offset_s > kOddOffset_s;
@@ -868,7 +982,7 @@ void place_markers(Mapping& mapping, std::vector<std::string>& warnings) {
     for (const std::string& name : s.markers) {
       std::array<double, 3> middle = {};
       for (std::size_t k = 0; k < 3; ++k) {
-        std::vector<double> values = field_of_marker(channel, s, name + std::array{".x_m", ".y_m", ".z_m"}[k]);
+        std::vector<double> values = field_of_marker(channel, s, point_fields(name, k));
         std::erase_if(values, [](double value) { return !std::isfinite(value); });
         if (values.empty()) s.table.fail("markers", "\"" + name + "\" is never seen at rest", "markers that are");
         middle[k] = io::median(values);
@@ -923,6 +1037,8 @@ nlohmann::ordered_json json_of(const ImportReport& report) {
                        {"delay_median_s", s.delay_median_s},
                        {"delay_most_s", s.delay_most_s}});
     if (!s.residual_m.empty()) streams.back()["residual_m"] = s.residual_m;
+    if (!s.deviation_rad.empty())
+      streams.back()["deviation_rad"] = s.deviation_rad, streams.back()["stroke_noise_rad"] = s.stroke_noise_rad;
   }
   for (const ClockReport& c : report.clocks)
     clocks.push_back({{"name", c.name},

@@ -34,6 +34,9 @@ using Row = std::vector<Item>;
 /// Stands for the name of the channel in a recording that has only one.
 inline const std::string kOnlyChannel = "*";
 
+/// Field of the number of a table's row, from 0: rows that are left out count. Only where it is wanted.
+inline const std::string kFrame = "#frame";
+
 /// The wanted fields of each channel; an empty set: all its fields.
 using Wanted = std::map<std::string, std::set<std::string>>;
 

@@ -1,6 +1,8 @@
 #include "flightlog/import/mapping.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 namespace flappy::flightlog {
 namespace {
@@ -57,6 +59,7 @@ const std::vector<StreamKeys> kStreams = {
     {"attitude", {"qw", "qx", "qy", "qz"}, {}, {"latency_s", "noise_rad"}, true, true},
     {"policy", {}, {}, {"numbers"}, false, false, false},
 };
+constexpr double kUnitTolerance = 1e-3;  // of the length of a quaternion, as in flight.toml
 const Names kAngles = {"roll_rad", "pitch_rad", "yaw_rad"};
 const Names kRotations = {"vector", "xyz", "xzy", "yxz", "yzx", "zxy", "zyx"};
 /// In place of the pitch: acceleration in W, without gravity.
@@ -112,6 +115,12 @@ void read_body(StreamMapping& stream) {
   for (const std::string& name : columns) stream.columns.push_back({name, stream.channel, {stream.body + "." + name}});
 }
 
+/// The three columns of a point, which a table may call by any of several fields.
+void add_point(StreamMapping& stream, const std::string& name) {
+  for (const std::size_t axis : {0, 1, 2})
+    stream.columns.push_back({name + kPointAxes[axis], stream.channel, point_fields(name, axis)});
+}
+
 /// The places of markers, which are fields of their own.
 void read_markers(StreamMapping& stream) {
   const io::Table& table = stream.table;
@@ -131,9 +140,37 @@ void read_markers(StreamMapping& stream) {
   if (stream.markers.size() < 3)
     table.fail("markers", "has " + std::to_string(stream.markers.size()) + " markers",
                "at least 3 that are not in one line");
-  for (const std::string& name : stream.markers)
-    for (const char* axis : {".x_m", ".y_m", ".z_m"})
-      stream.columns.push_back({name + axis, stream.channel, {name + axis}});
+  for (const std::string& name : stream.markers) add_point(stream, name);
+}
+
+/// Digitised points of the wings, and of the body where the mapping has markers.
+void read_points(StreamMapping& stream, bool clamped) {
+  const io::Table& table = stream.table;
+  const io::Table points = table.table("points");
+  points.accept({kWingPoints.begin(), kWingPoints.end()});
+  for (const char* key : kWingPoints) {
+    const std::string name = points.string(key);
+    if (const auto used = std::ranges::find(stream.points, name); used != stream.points.end())
+      points.fail(
+          key, "\"" + name + "\" is " + kWingPoints[static_cast<std::size_t>(used - stream.points.begin())] + ", too",
+          "six points");
+    stream.points.push_back(name);
+  }
+  stream.stroke_plane_rad = table.number_or("stroke_plane_rad", 0, {-std::numbers::pi / 2, std::numbers::pi / 2});
+  stream.length_tolerance = table.number_or("length_tolerance", stream.length_tolerance, positive(1));
+  if (table.has("markers")) {
+    if (table.has("attitude")) table.fail("attitude", "is given with markers, which show it", "one of the two");
+    read_markers(stream);
+  } else if (table.has("attitude")) {
+    if (!clamped) table.fail("attitude", "is given for a robot that flies", "markers, or none: that of mocap");
+    const std::vector<double> q = table.numbers("attitude", 4);
+    stream.attitude = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
+    if (std::abs(stream.attitude.norm() - 1) > kUnitTolerance)
+      table.fail("attitude", "has another length than 1", "a quaternion w, x, y, z of length 1");
+    stream.attitude.normalize();
+  }
+  for (const std::string& name : stream.points)
+    if (std::ranges::find(stream.markers, name) == stream.markers.end()) add_point(stream, name);
 }
 
 void read_columns(const StreamKeys& keys, StreamMapping& stream) {
@@ -166,17 +203,20 @@ void read_columns(const StreamKeys& keys, StreamMapping& stream) {
     columns.fail(given.front(), "is given without " + io::joined(missing), "all four inputs of the wing beat, or none");
 }
 
-StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bool declared_inputs) {
+StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bool declared_inputs, bool clamped) {
   const StreamKeys keys = narrowed(all_keys, table, declared_inputs);
   Names accepted = {"channel",  "time",    "time_field", "time_unit", "clock", "late_s",
-                    "sequence", "columns", "scale",      "offset",    "from"};
+                    "sequence", "columns", "scale",      "offset",    "from",  "frame_rate_hz"};
   accepted.insert(accepted.end(), keys.declared.begin(), keys.declared.end());
   if (keys.has_frame) accepted.emplace_back("frame");
   if (keys.has_world) accepted.emplace_back("world");
   if (keys.has_rate) accepted.emplace_back("rate_hz");
   if (keys.name == "command") accepted.insert(accepted.end(), {"inputs", "flown"});
   if (keys.name == "mocap")
-    accepted.insert(accepted.end(), {"source", "body", "rotation", "markers", "tolerance_m", "at_rest"});
+    accepted.insert(accepted.end(), {"source", "body", "rotation", "markers", "tolerance_m", "at_rest", "unit_m"});
+  if (keys.name == "wings")
+    accepted.insert(accepted.end(), {"points", "markers", "tolerance_m", "at_rest", "unit_m", "attitude", "world",
+                                     "stroke_plane_rad", "length_tolerance"});
   if (keys.name == "imu") accepted.emplace_back("gyro");
   if (keys.name == "power") accepted.emplace_back("currents");
   table.accept(accepted);
@@ -186,9 +226,14 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
     s.flown_above = flown->number("above");
   }
   s.channel = table.string("channel");
-  const std::string time = table.choice_or("time", "stamp", {"stamp", "received", "field"});
+  const std::string time = table.choice_or("time", "stamp", {"stamp", "received", "field", "frame"});
   s.time = time == "stamp" ? TimeOf::stamp : time == "received" ? TimeOf::received : TimeOf::field;
-  if (s.time == TimeOf::field) {
+  if (time == "frame") {
+    s.time_fields = {kFrame};
+    s.time_unit_ns = 1e9 / table.number("frame_rate_hz", {1e-3, 1e6});
+    for (const char* key : {"time_field", "time_unit"})
+      if (table.has(key)) table.fail(key, "is given with time = \"frame\"", "frame_rate_hz alone");
+  } else if (s.time == TimeOf::field) {
     s.time_fields = read_field(table, "time_field");
     if (s.time_fields.size() > 2)
       table.fail("time_field", "has more than two fields", "a field, or one of the date and one of the time of day");
@@ -199,6 +244,8 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
     for (const char* key : {"time_field", "time_unit"})
       if (table.has(key)) table.fail(key, "is given with time = \"" + time + "\"", "time = \"field\"");
   }
+  if (time != "frame" && table.has("frame_rate_hz"))
+    table.fail("frame_rate_hz", "is given with time = \"" + time + "\"", "time = \"frame\"");
   s.clock = table.string_or("clock", kReceiver);
   if (s.time == TimeOf::received && s.clock != kReceiver)
     table.fail("clock", "\"" + s.clock + "\" is not the clock of times of receipt",
@@ -212,10 +259,11 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
         table.choice_or("frame", "flu", captured ? Names{"flu", "frd", "fur", "luf"} : Names{"flu", "frd"});
     s.axes = axes == "flu" ? Axes::flu : axes == "frd" ? Axes::frd : axes == "fur" ? Axes::fur : Axes::luf;
   }
-  if (keys.has_world) {
+  const bool filmed = keys.name == "wings";
+  if (keys.has_world || (filmed && table.has("points"))) {
     s.says_world = table.has("world");
     Names worlds = {"enu", "ned", "ned_x_north"};
-    if (captured) worlds.emplace_back("y_up");
+    if (captured || filmed) worlds.emplace_back("y_up");
     const std::string world = table.choice_or("world", "enu", worlds);
     s.world = world == "enu"    ? World::enu
               : world == "ned"  ? World::ned
@@ -223,21 +271,28 @@ StreamMapping read_stream(const StreamKeys& all_keys, const io::Table& table, bo
                                 : World::ned_x_north;
   }
   s.measures_rate = keys.has_rate && !table.has("rate_hz");
-  const char* instead = !captured ? "" : table.has("body") ? "body" : table.has("markers") ? "markers" : "";
+  const char* instead = filmed                 ? (table.has("points") ? "points" : "")
+                        : !captured            ? ""
+                        : table.has("body")    ? "body"
+                        : table.has("markers") ? "markers"
+                                               : "";
   if (*instead != 0)
     for (const char* key : {"columns", "scale", "offset", "from"})
       if (table.has(key)) table.fail(key, "is given with " + std::string(instead), "one of the two");
-  const auto only_with = [&](const char* key, const char* other) {
-    if (captured && table.has(key) && instead != std::string_view(other))
-      table.fail(key, "is given without " + std::string(other), other);
+  const auto only_with = [&](const std::string& other, const Names& names) {
+    for (const std::string& key : names)
+      if (table.has(key) && !table.has(other)) table.fail(key, "is given without " + other, other);
   };
   if (instead == std::string_view("body") && table.has("markers"))
     table.fail("markers", "is given with body", "one of the two");
-  only_with("rotation", "body");
-  only_with("at_rest", "markers");
-  only_with("tolerance_m", "markers");
+  if (captured) only_with("body", {"rotation"});
+  if (captured) only_with("markers", {"unit_m"});
+  if (captured || filmed) only_with("markers", {"at_rest", "tolerance_m"});
+  if (filmed) only_with("points", {"unit_m", "markers", "attitude", "world", "stroke_plane_rad", "length_tolerance"});
+  if ((captured || filmed) && table.has("unit_m")) s.unit_m = table.number("unit_m", positive(1e3));
   if (instead == std::string_view("body")) read_body(s);
   else if (instead == std::string_view("markers")) read_markers(s);
+  else if (instead == std::string_view("points")) read_points(s, clamped);
   else read_columns(keys, s);
   return s;
 }
@@ -285,6 +340,15 @@ void read_declared(const io::Table& root, FlightHeader& h) {
 }
 
 }  // namespace
+
+FieldNames point_fields(const std::string& name, std::size_t axis) {
+  FieldNames fields;
+  const char small = "xyz"[axis], large = "XYZ"[axis];
+  fields.push_back(name + kPointAxes[axis]);
+  for (const char* between : {"_", "."})
+    for (const char letter : {large, small}) fields.push_back(name + between + letter);
+  return fields;
+}
 
 Wanted Mapping::wanted() const {
   Wanted wanted;
@@ -338,7 +402,7 @@ Mapping read_mapping(const std::filesystem::path& path, const std::vector<std::s
       for (const char* other : {"mocap", "imu", "attitude", "policy"})
         if (keys.name == other) root.fail(keys.name, "is of a robot that flies", "[rig] without it, or none");
     if (!needed && !root.has(keys.name)) continue;
-    m.streams.push_back(read_stream(keys, root.table(keys.name), declared));
+    m.streams.push_back(read_stream(keys, root.table(keys.name), declared, !flies));
   }
   read_declared(root, h);
   m.dds = io::read_dds_config(root);

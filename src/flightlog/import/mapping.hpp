@@ -19,7 +19,8 @@
 //   [command]
 //   channel = "/wing_input"                  # a topic; of a CSV, its file's stem; "*": the only channel
 //   inputs = ["left_flap", "tail"]           # optional: columns in place of voltages; then [imu], flapping_Hz optional
-//   time = "stamp"                           # default; "received", or "field"
+//   time = "stamp"                           # default; "received", "field", or "frame"
+//   frame_rate_hz = 5000.0                   # with time = "frame": row n of a table, from 0, is n/frame_rate_hz
 //   time_field = "timestamp"                 # the field of the time, with time = "field"; or two: ["date", "time"]
 //   time_unit = "us"                         # its unit: "s", "ms", "us", "ns"; default: as the table says, else "s"
 //   clock = "robot"                          # the clock of the stamps; "receiver" (default): of times of receipt
@@ -56,6 +57,7 @@
 //   file = "rest.csv"                        # the robot at rest and level
 //   position_m = [0.0, 0.0, 0.03]            # of B's origin in W
 //   yaw_rad = 0.0                            # default
+//   unit_m = 1.0                             # of [mocap], with markers; default: the table's row of units, else 1
 //   rate_hz = 200                            # optional in every stream; measured if missing
 //   latency_s = 0.0                          # time used less measured instant; 0 if the stamp is that instant
 //   position_noise_m = 1e-4
@@ -72,6 +74,15 @@
 //   currents = true                          # default; false, with declared inputs only: battery_V alone
 //   [wings]                                  # optional
 //   noise_rad
+//   [wings.points]                           # in place of columns: digitised points (wing_film.hpp), by their names in
+//   left_root = "pt1"                        # the table; also left_tip, left_trailing, right_root, right_tip,
+//                                            # right_trailing
+//   unit_m = 1e-3                            # of [wings], as all that follow: unit of the points; as in [mocap]
+//   length_tolerance = 0.1                   # default; a length that differs by a larger share from its median is wrong
+//   stroke_plane_rad = 0.0                   # default; Phi of model/jointed.hpp
+//   [wings.markers]                          # points of the body, as in [mocap], with tolerance_m and at_rest; or
+//   attitude = [1.0, 0.0, 0.0, 0.0]          # of a clamped robot: turns the axes of the points to B; default; else that
+//   world = "enu"                            # of [mocap], of which the points have this world
 //   [rig]                                    # of a clamped robot, in place of mocap and imu: columns are those of
 //                                            # forces.csv, other keys those of [rig] in flight.toml
 //   [attitude]                               # optional: attitude of a second estimator; world and frame as above
@@ -88,6 +99,8 @@
 // Fields of named elements: "position[left_stroke]" (joint), "transforms[torso].transform.translation.x" (transform).
 #pragma once
 
+#include <Eigen/Geometry>
+#include <array>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -100,6 +113,12 @@
 #include "io/dds_config.hpp"
 
 namespace flappy::flightlog {
+
+/// What the names of a point's columns add to its own, m.
+inline constexpr std::array kPointAxes = {".x_m", ".y_m", ".z_m"};
+/// Keys of [wings.points]: of each wing two points of its axis of rotation, and one behind it.
+inline constexpr std::array kWingPoints = {"left_root",  "left_tip",  "left_trailing",
+                                           "right_root", "right_tip", "right_trailing"};
 
 enum class TimeOf { stamp, received, field };
 enum class World { enu, ned, ned_x_north, y_up };
@@ -140,6 +159,10 @@ struct StreamMapping {
   std::vector<std::string> markers;                  ///< whose places give the pose, in place of columns; empty: none
   std::vector<std::vector<double>> marker_places_m;  ///< in B; empty until place_markers() where at_rest gives them
   double tolerance_m = 0.005;                        ///< a marker farther from its place is a wrong one
+  std::optional<double> unit_m;                      ///< of markers and points; none: as the table says, else 1
+  std::vector<std::string> points;                   ///< of the wings, as kWingPoints, in place of columns; empty: none
+  double stroke_plane_rad = 0, length_tolerance = 0.1;           ///< with points
+  Eigen::Quaterniond attitude = Eigen::Quaterniond::Identity();  ///< with points of a clamped robot: to B
   std::optional<AtRest> at_rest;
   FieldNames flown_fields;  ///< command stream only: what is above flown_above in flight; empty: the whole log
   double flown_above = 0;
@@ -160,6 +183,9 @@ struct Mapping {
   Wanted wanted() const;
   Wanted wanted_times() const;  ///< those of them that are times
 };
+
+/// Fields that a table may have for a coordinate of a point, as "pt1_X" of "pt1".
+FieldNames point_fields(const std::string& name, std::size_t axis);
 
 /// InputError "file:line:column: key: ..." for a file that is no valid mapping.
 Mapping read_mapping(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});

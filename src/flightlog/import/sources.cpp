@@ -12,6 +12,7 @@
 #include "flightlog/import/gzip.hpp"
 #include "flightlog/import/matlab.hpp"
 #include "flightlog/import/message_rows.hpp"
+#include "flightlog/import/sparse_points.hpp"
 #include "flightlog/import/table.hpp"
 #include "flightlog/import/ulog.hpp"
 #include "flightlog/import/usdlog.hpp"
@@ -137,6 +138,8 @@ void read_bytes(const fs::path& file, const fs::path& plain, std::string_view by
   if (is_dataflash_text(bytes)) return read_dataflash_text(bytes, file.string(), channels, warnings);
   if (is_c3d(bytes)) return read_c3d(bytes, file.string(), plain.stem().string(), channels, warnings);
   require_text(file, plain.extension().string(), bytes);
+  if (is_sparse_points(bytes))
+    return read_sparse_points(bytes, file.string(), plain.stem().string(), channels, warnings);
   read_table(bytes, file.string(), plain.stem().string(), channels, warnings);
 }
 

@@ -46,6 +46,8 @@ class TableReader {
     const std::set<std::string> all(fields.begin(), fields.end());
     for (const std::string& field : wanted && !wanted->empty() ? *wanted : all) want(field);
     if (export_) want_bodies(wanted);
+    if (wanted && wanted->contains(kFrame))
+      frame_ = row_.size(), row_.push_back({kFrame, 0}), channels_.add(channel_, {kFrame});
     not_numbers_.resize(cells_.size());
   }
 
@@ -55,7 +57,11 @@ class TableReader {
     Lines lines(text_, above_);
     std::vector<Line> row;  // lines of the current row: several if a quoted cell contains line ends
     for (auto line = lines.next(); line; line = lines.next()) {
-      if (line->number <= head_.end || is_blank(line->text)) continue;
+      if (line->number <= head_.end) continue;
+      if (is_blank(line->text)) {
+        blank_ += rows_ + other_width_.count > 0 && row.empty();
+        continue;
+      }
       if (row.empty() && is_comment(line->text)) {
         if (rows_ > 0) comments_.add(line->number, "");
         continue;
@@ -163,6 +169,7 @@ class TableReader {
       if (std::isinf(row_[k].value)) not_numbers_[k].add(line, cell);
     }
     for (const auto& [body, at] : bodies_) export_->read(body, cells, &row_[at]);
+    if (frame_) row_[*frame_].value = static_cast<double>(rows_ - 1 + other_width_.count + blank_);
     channels_.add(channel_, kNoTime, export_ ? export_->stamp_ns(cells, rows_ - 1) : kNoTime, row_);
   }
 
@@ -195,7 +202,8 @@ class TableReader {
   std::vector<std::pair<std::size_t, std::size_t>> bodies_;  ///< wanted bodies of export_, and where they begin in row_
   std::vector<WantedCell> cells_;                            ///< where each of them stands
   std::size_t named_ = 0;                                    ///< number of columns up to the last that has a name
-  std::size_t rows_ = 0;
+  std::optional<std::size_t> frame_;                         ///< place of kFrame in row_
+  std::size_t rows_ = 0, blank_ = 0;                         ///< blank lines among the rows
   bool points_ = false;             ///< whether a cell had a point: then a comma is no decimal comma
   LeftOut other_width_, comments_;  ///< other_width_ includes rows with quotes that are never closed
   std::vector<LeftOut> not_numbers_;

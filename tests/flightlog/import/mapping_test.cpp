@@ -37,7 +37,7 @@ TEST(Mapping, ShippedOnesAreRead) {
     EXPECT_TRUE(fs::exists(kMappings.parent_path() / "vehicles" / m.header.vehicle)) << entry.path();
     ++count;
   }
-  EXPECT_EQ(count, 12);
+  EXPECT_EQ(count, 13);
 }
 
 // Firmwares spell a field in two ways: a list of names, of which a recording has one.
@@ -83,8 +83,9 @@ TEST(Mapping, RefusesFaults) {
       edited("channel = \"/pose\"", "topic = \"/pose\""),
       "m.toml:28:1: mocap.topic: unknown key; accepted: at_rest, attitude_noise_rad, body, channel, clock, columns, "
       "frame, "
-      "from, late_s, latency_s, markers, offset, position_noise_m, rate_hz, rotation, scale, sequence, source, time, "
-      "time_field, time_unit, tolerance_m, world");
+      "frame_rate_hz, from, late_s, latency_s, markers, offset, position_noise_m, rate_hz, rotation, scale, sequence, "
+      "source, time, "
+      "time_field, time_unit, tolerance_m, unit_m, world");
   EXPECT_EQ(edited("x_m = \"pose", "x_mm = \"pose"),
             "m.toml:34:1: mocap.columns.x_mm: unknown key; accepted here with another unit: \"x_m\"");
   EXPECT_EQ(edited("qz = \"pose.orientation.z\"\n", ""),
