@@ -11,7 +11,8 @@
 //   forces.csv    only of a clamped robot, which [rig] declares, in place of mocap.csv and imu.csv:
 //                 t_s,force_x_N,force_y_N,force_z_N,moment_x_Nm,moment_y_Nm,moment_z_Nm
 //   policy.csv    optional, declared in [policy]: t_s and its numbers, for each inference of an exported policy
-//   truth.csv     only from a simulator: the full state; read_flight_log() never opens it
+//   truth.csv     only from a simulator: the full state; read_flight_log() never opens it, nor joints.csv and
+//   wing_loads.csv
 //   joints.csv    only from a simulator, articulated wings: angles, rates, torques, power and work of all joints
 //
 // With declared inputs, imu.csv is optional, may lack a gyro ([imu] gyro = false), and power.csv may lack the currents
@@ -227,9 +228,10 @@ struct FlightLog {
 namespace log_file {
 inline const std::string kHeader = "flight.toml", kCommand = "command.csv", kMocap = "mocap.csv", kImu = "imu.csv",
                          kPower = "power.csv", kWings = "wings.csv", kAttitude = "attitude.csv", kForces = "forces.csv",
-                         kPolicy = "policy.csv", kTruth = "truth.csv", kJoints = "joints.csv";
-inline const std::vector<std::string> kAll = {kHeader,   kCommand, kMocap,  kImu,   kPower, kWings,
-                                              kAttitude, kForces,  kPolicy, kTruth, kJoints};
+                         kPolicy = "policy.csv", kTruth = "truth.csv", kJoints = "joints.csv",
+                         kWingLoads = "wing_loads.csv";
+inline const std::vector<std::string> kAll = {kHeader,   kCommand, kMocap,  kImu,   kPower,  kWings,
+                                              kAttitude, kForces,  kPolicy, kTruth, kJoints, kWingLoads};
 }  // namespace log_file
 
 /// Columns of truth.csv: pose, motion and wings of the flapper, and the bias of its gyro.

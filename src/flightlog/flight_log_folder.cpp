@@ -96,7 +96,7 @@ FlightLog read_flight_log(const fs::path& folder) {
   const std::vector<std::string> optional = {kImu, kPower, kWings, kAttitude, kForces, kPolicy};
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
-    if (!name.ends_with(".csv") || name == kTruth || name == kJoints) continue;
+    if (!name.ends_with(".csv") || name == kTruth || name == kJoints || name == kWingLoads) continue;
     // A misspelt name of an optional stream is an error, because the stream would otherwise be ignored silently.
     const std::string nearest = io::nearest_name(name, optional);
     if (!nearest.empty() && nearest != name)

@@ -101,6 +101,7 @@ sim::World read_world(const io::Table& root) {
 LogOptions read_log(const io::Table& root, double control_hz) {
   const io::Range rate = io::positive(control_hz), noise = io::non_negative(10);
   LogOptions log;
+  if (const auto t = root.optional_table("log")) log.wing_loads = t->boolean_or("wing_loads", false);
   if (const auto t = root.optional_table("log.power"))
     log.power = {t->number("battery_nominal_V", io::positive(100)), t->number("rate_hz", rate),
                  t->number("latency_s", noise), t->number("voltage_noise_V", noise),
@@ -254,7 +255,7 @@ class Reader {
       if (task.parts >> static_cast<int>(part) & 1)
         root_.fail("task", io::toml_string(task.name) + " observes wings or their phase" + but,
                    "a task of other parts");
-    for (const char* key : {"log.power", "log.wings", "log.rig"})
+    for (const char* key : {"log.power", "log.wings", "log.rig", "log.wing_loads"})
       if (root_.has(key)) root_.fail(key, "is asked for" + but, "no such log");
     c_.fleet.task.input_unit = "1";
   }
@@ -267,7 +268,8 @@ class Reader {
                  "a task whose actions are of the wing beat");
     if (root_.has("log.power"))
       root_.fail("log.power", "is asked for" + but, "no such log; joints.csv has their muscles'");
-    if (root_.has("log.rig")) root_.fail("log.rig", "is asked for" + but, "no such log");
+    for (const char* key : {"log.rig", "log.wing_loads"})
+      if (root_.has(key)) root_.fail(key, "is asked for" + but, "no such log");
     c_.fleet.task.input_unit = "1";
   }
 

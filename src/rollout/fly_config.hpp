@@ -14,6 +14,7 @@
 //   [changes]         what was done to the robot on purpose: model/changes.hpp
 //   [log.power]       battery_nominal_V, rate_hz, latency_s, voltage_noise_V, current_noise_A
 //   [log.wings]       rate_hz, noise_rad
+//   [log]             wing_loads = true: wing_loads.csv beside the log, of vehicles with hinged wings (default false)
 //   [log.rig]         welded: forces.csv in place of motion capture and IMU. Keys of [rig] in flight.toml, but rate_hz
 //   [dds]             io/dds_config.hpp; it does not change the flights, so `resolved` leaves it out
 // Override "controller.attitude.pitch.p=4" applies to the controller's file; "controller=other.toml" replaces the file.
@@ -37,6 +38,7 @@ struct LogOptions {
   std::optional<flightlog::PowerHeader> power;
   std::optional<flightlog::WingsHeader> wings;
   std::optional<flightlog::RigHeader> rig;
+  bool wing_loads = false;
 };
 
 struct FlyConfig {

@@ -14,6 +14,7 @@
 #include "model/wing_beat.hpp"
 #include "sim/lanes.hpp"
 #include "sim/storage.hpp"
+#include "sim/wing_loads.hpp"
 
 namespace flappy::rollout {
 namespace {
@@ -35,6 +36,27 @@ const std::vector<std::string> kJointNames = [] {
   names.insert(names.end(), {"positive_work_J", "work_J"});
   return names;
 }();
+
+/// Columns of the loads of the wings: means over the control period before t_s.
+const std::vector<std::string> kLoadNames = [] {
+  std::vector<std::string> names = {"t_s"};
+  for (const std::string side : {"left_", "right_"})
+    for (const char* what : {"force_x_N", "force_y_N", "force_z_N", "moment_x_Nm", "moment_y_Nm", "moment_z_Nm",
+                             "lift_N", "drag_N", "aerodynamic_power_W", "mechanical_power_W"})
+      names.push_back(side + what);
+  return names;
+}();
+
+void write_columns(const std::filesystem::path& file, const std::vector<std::string>& names,
+                   const std::vector<flightlog::Column>& columns) {
+  io::CsvWriter csv(file, names);
+  std::vector<double> row(names.size());
+  for (std::size_t i = 0; i < columns[0].size(); ++i) {
+    for (std::size_t k = 0; k < row.size(); ++k) row[k] = columns[k][i];
+    csv.row(row);
+  }
+  csv.close();
+}
 
 /// Columns of the truth: the motion, and what supports the flapper: 0 nothing, 1 the ground, 2 welded to a stand.
 const std::vector<std::string> kTruthNames = [] {
@@ -131,6 +153,7 @@ struct Recorder<T>::Storage {
   flightlog::FlightLog log;
   std::vector<flightlog::Column> truth = std::vector<flightlog::Column>(kTruthNames.size());
   std::vector<flightlog::Column> joints;  // empty without articulated wings
+  std::vector<flightlog::Column> loads;   // of the wings; empty where they are not asked for
   TickSampler power{0}, wings{0};
   sim::HeldImpulse given{};  // to the stand, until the last control tick
   sim::FlapperState state;   // at the last control tick
@@ -138,7 +161,7 @@ struct Recorder<T>::Storage {
   struct {
     sim::Block<T> block;
     std::vector<T> effect_states, contact_memory;
-  } metered;  // copy of the block at the last control tick, for add_power(); unused without power.csv
+  } metered;  // copy of the block at the last control tick, for add_power() and add_loads(); unused without either
   double step_hz;
   struct {
     bool acts = false;  // the policy acts in the period that comes, and so from then on:
@@ -179,7 +202,8 @@ struct Recorder<T>::Storage {
     if (vehicle.jointed) joints.resize(kJointNames.size());
     if (h.power) log.power.emplace(), power = TickSampler(h.power->rate_hz);
     if (h.wings) log.wings.emplace(), wings = TickSampler(h.wings->rate_hz);
-    if (h.power) {  // a meter needs the rows of effects, even if no effect is in force
+    if (config.log.wing_loads) loads.resize(kLoadNames.size());
+    if (h.power || !loads.empty()) {  // a meter needs the rows of effects, even if no effect is in force
       sim::storage_of(f.batch()).keep_effects(0);
       sim::storage_of(f.batch()).put_effect_rows(i, vehicle);
     }
@@ -234,7 +258,7 @@ struct Recorder<T>::Storage {
 
   void look() {
     state = fleet.batch().state(flapper);
-    if (!log.power) return;
+    if (!log.power && loads.empty()) return;
     auto& body = sim::storage_of(fleet.batch());
     const std::size_t block = flapper / sim::kLanes<T>;
     const T* states = body.effects_of(block).states;
@@ -357,6 +381,33 @@ struct Recorder<T>::Storage {
     log.power->right_current_A.push_back(noisy(static_cast<double>(meter[2 * kLanes + lane]), h.current_noise_A, 2));
   }
 
+  /// Means over the period from `begin` to `end`, which a copy of the block flies again with the voltages that it had. Call
+  /// it before add_command() and add_power(), which change what is held, and the copy.
+  void add_loads(std::int64_t begin, std::int64_t end) {
+    auto& body = sim::storage_of(fleet.batch());
+    sim::BlockEffects<T> in_force = body.effects_of(flapper / sim::kLanes<T>);
+    in_force.states = metered.effect_states.data();
+    in_force.contact.memory = metered.contact_memory.data();
+    const std::vector<DriverUpdate> updates = driver_updates(fleet, flapper);
+    std::vector<sim::StepVoltage> voltages;
+    sim::StepVoltage now{held_V[0], held_V[1]};
+    auto update = updates.begin();
+    for (std::int64_t step = begin; step < end; ++step) {
+      for (; update != updates.end() && update->step <= step; ++update) now = {update->left_V, update->right_V};
+      voltages.push_back(now);
+    }
+    const auto lane = static_cast<int>(flapper % sim::kLanes<T>);
+    const auto mean = sim::mean_wing_loads<T>(metered.block, in_force, body.plan(), lane, voltages);
+    std::size_t k = 0;
+    const auto put = [&](double x) { loads[k++].push_back(x); };
+    put(time_s(end));
+    for (const sim::MeanWingLoads& wing : mean) {
+      for (const double x : wing.force_N) put(x);
+      for (const double x : wing.moment_Nm) put(x);
+      put(wing.lift_N), put(wing.drag_N), put(wing.aerodynamic_power_W), put(wing.mechanical_power_W);
+    }
+  }
+
   void add_wings(double t_s) {
     if (!wings.due(t_s)) return;
     const std::uint32_t n = wings.first_index();
@@ -401,6 +452,7 @@ struct Recorder<T>::Storage {
     const std::int64_t end = sim::storage_of(fleet.batch()).steps;
     const std::int64_t begin = end - std::lround(fleet.period_s() * step_hz);
     bool sampled = false;
+    if (!loads.empty()) add_loads(begin, end);
     // Power belongs to the voltages that hold as the period begins: of an update at its first step, else of one before.
     const auto add_power_once = [&] {
       if (!std::exchange(sampled, true) && log.power) add_power(time_s(begin));
@@ -495,15 +547,8 @@ bool Recorder<T>::write(const std::filesystem::path& folder) const {
   if (!all) return false;
   write_flight_log(folder, *all);
   flightlog::write_truth(folder, kTruthNames, storage_->truth);
-  if (!storage_->joints.empty()) {
-    io::CsvWriter csv(folder / flightlog::log_file::kJoints, kJointNames);
-    std::vector<double> row(kJointNames.size());
-    for (std::size_t i = 0; i < storage_->joints[0].size(); ++i) {
-      for (std::size_t k = 0; k < row.size(); ++k) row[k] = storage_->joints[k][i];
-      csv.row(row);
-    }
-    csv.close();
-  }
+  if (!storage_->joints.empty()) write_columns(folder / flightlog::log_file::kJoints, kJointNames, storage_->joints);
+  if (!storage_->loads.empty()) write_columns(folder / flightlog::log_file::kWingLoads, kLoadNames, storage_->loads);
   return true;
 }
 
@@ -511,7 +556,7 @@ template <class T>
 double Recorder<T>::bytes_per_s(const FlyConfig& c) {
   const flight::FleetOptions& o = c.fleet;
   const std::size_t inputs = model::mixed_inputs(c.vehicle).size();
-  const std::size_t joints = c.vehicle.jointed ? kJointNames.size() : 0;
+  const std::size_t joints = (c.vehicle.jointed ? kJointNames.size() : 0) + (c.log.wing_loads ? kLoadNames.size() : 0);
   const double commands = inputs > 0 ? static_cast<double>(1 + inputs) * o.control_hz : 8 / c.vehicle.driver.hold_s;
   const double numbers = commands + 7 * o.sensors.imu.rate_hz + 8 * o.sensors.mocap.rate_hz +
                          static_cast<double>(kTruthNames.size() + 9 + joints) * o.control_hz;

@@ -18,6 +18,15 @@ struct Constants {
   T step, half_step, per_step, gravity, ground_z, ceiling_z;
 };
 
+/// What air and motor do to a wing in a step: the force of the air and its moment about the torso's origin, in B; lift and
+/// drag, across and against the velocity of the axis at r_cp in the air; power that the wing gives to the air, and that the
+/// motor gives behind its gear, before friction (docs/theory/model.md, section 3).
+template <class T>
+struct WingLoads {
+  Vec3<T> force_N, moment_Nm;
+  T lift_N, drag_N, aerodynamic_power_W, mechanical_power_W;
+};
+
 /// Effects in force in a block. All lanes share the set; magnitudes may be 0 in some lanes.
 template <class T>
 struct ActiveEffects {
@@ -33,7 +42,8 @@ struct ActiveEffects {
   ContactBlock<Element<T>> contact;    // of the first lane
   const StepPlan* world = nullptr;
   Touched<T>* touched = nullptr;
-  T rows[kEffectRows];  // parameters, then SideConstants of both sides
+  Sides<WingLoads<T>>* loads = nullptr;  // of every step, or null
+  T rows[kEffectRows];                   // parameters, then SideConstants of both sides
 
   const Sides<SideConstants<T>>& constants() const {
     return *reinterpret_cast<const Sides<SideConstants<T>>*>(rows + kEffectParameterRows);
@@ -212,6 +222,29 @@ FLAPPY_INLINE void read_meter(const Surroundings<T>& s, const Sides<Hinges<T>>& 
   current(hinges.right, s.constants.right).store(meter + 2 * stride);
 }
 
+/// Loads of one side. `velocity_B`: of its shoulder in the air, in B.
+template <int side, class T>
+FLAPPY_INLINE WingLoads<T> read_loads(const SideParameters<T>& p, const SideState<T>& q, const SideConstants<T>& f,
+                                      const Hinges<T>& h, const WingPose<T>& g, const WingWrench<T>& air,
+                                      const Vec3<T>& velocity_B) {
+  const Vec3<T> force = rotate_z(g.beta.sin, g.beta.cos, air.force_x_N, air.force_z_N);
+  const Vec3<T> moment = rotate_z(g.beta.sin, g.beta.cos, air.moment_Nm) + cross(p.shoulder_m, force);
+  const Vec3<T> v = rotate_back_z(g.beta.sin, g.beta.cos, velocity_B);
+  const Vec3<T> w{g.body_rate_L.x, g.body_rate_L.y, g.body_rate_L.z + g.beta_rate};
+  const T r = T(side) * p.span_to_pressure_m;
+  const T along_x = v.x - T(w.z * r), along_z = v.z + T(w.x * r);  // velocity of the axis at r_cp
+  const T inverse_speed = T(1) / sqrt(T(along_x * along_x + (along_z * along_z + T(kStillAir_m2_s2))));
+  const T across = T(air.force_z_N * along_x - air.force_x_N * along_z) * inverse_speed;
+  const T turning = air.moment_Nm.x * w.x + (air.moment_Nm.y * T(w.y + g.theta_rate) + air.moment_Nm.z * w.z);
+  const T motor_rad_s = T(side) * g.beta_rate + T(h.motor_rate_rad_s - q.stroke_rate_rad_s);
+  return {force,
+          moment,
+          where(along_x < T(0), T(-across), across),
+          -T(T(air.force_x_N * along_x + air.force_z_N * along_z) * inverse_speed),
+          -T(turning + (air.force_x_N * v.x + air.force_z_N * v.z)),
+          T(h.torque_per_V_Nm * T(h.voltage_V - f.back_emf_V_s * motor_rad_s)) * motor_rad_s};
+}
+
 /// Energy of a motor in a step in excess of that at `given_V` without effects: V i h, at the rate at the end of the
 /// step, which turns the wing; exactly 0 if no effect changes the motor. `slip_rad_s`: motor relative to wing.
 template <int side, class T>
@@ -382,6 +415,51 @@ FLAPPY_INLINE Acting<with_effects, T> acts_on(const Parameters<T>& p, const Stat
   }
 }
 
+/// Rows have positions and rates at the same time, but within a block positions lead by half a step: rates advance
+/// across its middle, positions with the new rates to the next middle (Verlet 1967, as leapfrog). Backward, a hinge on
+/// its stop stays there, so both shifts are exact inverses.
+template <bool with_effects, class L>
+FLAPPY_INLINE void shift_positions(const Parameters<L>& p, const L& reach_rad, const L& time_s, State<L>& x,
+                                   Vec3<L>& com_m) {
+  const auto shift = [&](const SideParameters<L>& side, SideState<L>& q) {
+    L lower_rad = side.rotation_lower_rad, upper_rad = side.rotation_upper_rad;
+    if constexpr (with_effects) widen_stops(reach_rad, lower_rad, upper_rad);
+    const auto shifted = [&](const L& angle, const L& rate, const L& lower, const L& upper) {
+      const auto stays = (time_s < L(0)) & on_stop(angle, lower, upper);
+      return where(stays, angle, clamp(L(angle + time_s * rate), lower, upper));
+    };
+    q.stroke_rad = shifted(q.stroke_rad, q.stroke_rate_rad_s, side.stroke_lower_rad, side.stroke_upper_rad);
+    q.rotation_rad = shifted(q.rotation_rad, q.rotation_rate_rad_s, lower_rad, upper_rad);
+  };
+  shift(p.left, x.left);
+  shift(p.right, x.right);
+  com_m = add_scaled(com_m, time_s, x.com_velocity_m_s);
+  x.attitude = rotated(x.attitude, L(0.5) * time_s * x.body_rate_rad_s);
+}
+
+/// Puts what is in force in a block before the lanes from `first` on. `own`: a copy of their parameters, and `touched`; both
+/// stay with `effects`.
+template <class T, class L>
+FLAPPY_INLINE void activate(const BlockEffects<T>& in_force, const StepPlan& plan, int first, Parameters<L>& own,
+                            Touched<L>& touched, ActiveEffects<L>& effects) {
+  effects.own = &own;
+  effects.set = in_force.set;
+  effects.kept = in_force.kept;
+  effects.states = in_force.states != nullptr ? in_force.states + first : nullptr;
+  effects.stride = kLanes<T>;
+  effects.meter = in_force.meter != nullptr ? in_force.meter + first : nullptr;
+  effects.walls = plan.walls;
+  effects.wall_count = plan.wall_count;
+  effects.contact = in_force.contact;
+  if (effects.contact.points > 0) {
+    effects.contact.rows += first;
+    effects.contact.memory += first;
+  }
+  effects.world = &plan;
+  effects.touched = &touched;
+  for (int i = 0; i < kEffectRows; ++i) effects.rows[i] = L::load(in_force.rows + i * kLanes<T> + first);
+}
+
 /// One physics step. `com_m`: centre of mass in W, integrated instead of the torso's origin as momentum belongs to it.
 template <bool with_effects, class T>
 FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const Voltages<T>& voltages, Vec3<T>& com_m,
@@ -400,6 +478,15 @@ FLAPPY_INLINE void physics_step(const Parameters<T>& vehicle, State<T>& x, const
 
   auto acting = acts_on<with_effects>(vehicle, x, voltages, R, pose, whole, com_m, effects, k);
   if constexpr (with_effects) apply_effects(effects, acting);
+  if constexpr (with_effects)
+    if (effects.loads != nullptr) {
+      const Surroundings<T>& s = acting.s;
+      const Sides<Hinges<T>>& hinges = acting.hinges;
+      *effects.loads = {read_loads<+1>(acting.p.left, x.left, s.constants.left, hinges.left, pose.left, acting.air.left,
+                                       s.shoulder_B_m_s.left),
+                        read_loads<-1>(acting.p.right, x.right, s.constants.right, hinges.right, pose.right,
+                                       acting.air.right, s.shoulder_B_m_s.right)};
+    }
   const Parameters<T>& p = acting.p;
   Sides<SideLoad<T>> load{
       load_side<+1>(p.left, x.left, pose.left.theta_rate, acting.air.left, acting.voltages.left_V, k.step),

@@ -111,28 +111,6 @@ class Prefetch {
   int count_ = 0;
 };
 
-/// Rows have positions and rates at the same time, but within a block positions lead by half a step: rates advance
-/// across its middle, positions with the new rates to the next middle (Verlet 1967, as leapfrog). Backward, a hinge on
-/// its stop stays there, so both shifts are exact inverses.
-template <bool with_effects, class L>
-FLAPPY_INLINE void shift_positions(const Parameters<L>& p, const L& reach_rad, const L& time_s, State<L>& x,
-                                   Vec3<L>& com_m) {
-  const auto shift = [&](const SideParameters<L>& side, SideState<L>& q) {
-    L lower_rad = side.rotation_lower_rad, upper_rad = side.rotation_upper_rad;
-    if constexpr (with_effects) widen_stops(reach_rad, lower_rad, upper_rad);
-    const auto shifted = [&](const L& angle, const L& rate, const L& lower, const L& upper) {
-      const auto stays = (time_s < L(0)) & on_stop(angle, lower, upper);
-      return where(stays, angle, clamp(L(angle + time_s * rate), lower, upper));
-    };
-    q.stroke_rad = shifted(q.stroke_rad, q.stroke_rate_rad_s, side.stroke_lower_rad, side.stroke_upper_rad);
-    q.rotation_rad = shifted(q.rotation_rad, q.rotation_rate_rad_s, lower_rad, upper_rad);
-  };
-  shift(p.left, x.left);
-  shift(p.right, x.right);
-  com_m = add_scaled(com_m, time_s, x.com_velocity_m_s);
-  x.attitude = rotated(x.attitude, L(0.5) * time_s * x.body_rate_rad_s);
-}
-
 /// Computes the torso's position from the centre of mass; then contact events, freezing, and storing of rows.
 template <class T, class L>
 FLAPPY_INLINE void finish(State<L>& x, const Vec3<L>& com_m, const Voltages<L>& voltages,
@@ -189,22 +167,7 @@ void step_block(Block<T>& block, BlockEffects<T> in_force, const StepPlan& plan,
     Touched<L> touched;
     if constexpr (with_effects) {
       own = p;
-      effects.own = &own;
-      effects.set = in_force.set;
-      effects.kept = in_force.kept;
-      effects.states = in_force.states != nullptr ? in_force.states + first : nullptr;
-      effects.stride = kLanes<T>;
-      effects.meter = in_force.meter != nullptr ? in_force.meter + first : nullptr;
-      effects.walls = plan.walls;
-      effects.wall_count = plan.wall_count;
-      effects.contact = in_force.contact;
-      if (effects.contact.points > 0) {
-        effects.contact.rows += first;
-        effects.contact.memory += first;
-      }
-      effects.world = &plan;
-      effects.touched = &touched;
-      for (int i = 0; i < kEffectRows; ++i) effects.rows[i] = L::load(in_force.rows + i * kLanes<T> + first);
+      activate(in_force, plan, first, own, touched, effects);
     }
     Vec3<L> com_m = x.position_m + rotation_matrix(x.attitude) * centre_of_mass(p, x);
     L reach_rad(0);

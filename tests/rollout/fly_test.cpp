@@ -5,9 +5,13 @@
 
 #include <cmath>
 #include <complex>
+#include <filesystem>
+#include <numeric>
 
 #include "flappy/vehicle_file.hpp"
+#include "flightlog/flight_log.hpp"
 #include "io/csv.hpp"
+#include "io/files.hpp"
 #include "io/sha256.hpp"
 #include "rollout/fly_fixture.hpp"
 #include "rollout/recorder.hpp"
@@ -147,6 +151,46 @@ TEST(Fly, HoversWithDrivenWings) {
           ": log.power: is asked for, but the wings of vehicle \"hummingbird_driven\" have no motors; accepted: "),
       std::string::npos)
       << what;
+}
+
+/// On a stand the sums of both wings are the impulse that the air gave: its mean over the flight, by the batch itself. Numbers of
+/// the file have nine digits or more, and lanes of single precision round each step to 6e-8.
+TEST(Fly, WritesTheLoadsOfEachWing) {
+  const Folder folder;
+  const auto config = test::source_path("configs/fly/bench.toml");
+  const std::vector<std::string> short_one = {"flight.duration_s=0.4"};
+  std::vector<std::string> with = short_one;
+  with.emplace_back("log.wing_loads=true");
+  fly(rollout::read_fly_config(config, short_one), {.count = 1, .log_folder = folder / "without"});
+  fly(rollout::read_fly_config(config, with), {.count = 1, .log_folder = folder / "with"});
+  const auto flight = folder / "with", other = folder / "without";
+  EXPECT_FALSE(std::filesystem::exists(other / "wing_loads.csv"));
+  // they change nothing of the flight, and are no part of the log
+  for (const char* name : {"forces.csv", "command.csv", "truth.csv"})
+    EXPECT_EQ(io::read_text(flight / name), io::read_text(other / name)) << name;
+  EXPECT_EQ(flightlog::read_flight_log(flight), flightlog::read_flight_log(other));
+  const io::CsvTable loads = io::read_csv(flight / "wing_loads.csv"), forces = io::read_csv(flight / "forces.csv");
+  EXPECT_EQ(loads.names.size(), 21u);
+  const auto mean = [](const std::vector<double>& x) {
+    return std::accumulate(x.begin(), x.end(), 0.0) / static_cast<double>(x.size());
+  };
+  // over beats the wings' own momentum returns: what is left of it, and the sensor's noise of 3 mN over the samples
+  ASSERT_EQ(loads.column("t_s").size(), forces.column("t_s").size());
+  const double lift_N = mean(loads.column("left_force_z_N")) + mean(loads.column("right_force_z_N"));
+  EXPECT_GT(lift_N, 0.05);
+  EXPECT_NEAR(mean(forces.column("force_z_N")), lift_N, 0.05 * lift_N);
+  for (const std::string side : {"left_", "right_"}) {
+    EXPECT_GT(mean(loads.column(side + "aerodynamic_power_W")), 0.1);
+    EXPECT_GT(mean(loads.column(side + "mechanical_power_W")), mean(loads.column(side + "aerodynamic_power_W")));
+    EXPECT_GT(mean(loads.column(side + "drag_N")), 0);
+  }
+  EXPECT_NE(message([&] {
+              rollout::read_fly_config(test::source_path("configs/fly/hummingbird_driven.toml"),
+                                       {"log.wing_loads=true"});
+            })
+                .find(": log.wing_loads: is asked for, but the wings of vehicle \"hummingbird_driven\" have no motors; "
+                      "accepted: no such log"),
+            std::string::npos);
 }
 
 TEST(Fly, StopsWhenAsked) {
