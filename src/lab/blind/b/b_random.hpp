@@ -20,6 +20,10 @@ enum class Stream : std::uint64_t {
   kWings,
   kStart,
   kSession,
+  kRig,
+  kRigConventions,
+  kForces,
+  kFilm,
   kEffect = 100,  ///< plus the number of the effect
 };
 

@@ -12,8 +12,6 @@ constexpr double kGyroStep_rad_s = 2 * 2000 * kTurn / 360 / 65536, kGyroRange_ra
 constexpr double kAccelStep_m_s2 = 2 * 16 * kGravity_m_s2 / 65536, kAccelRange_m_s2 = 16 * kGravity_m_s2;
 constexpr double kCurrentStep_A = 4.0 / 4096, kVoltageStep_V = 24.0 / 4096, kWingStep_rad = kTurn / 4096;
 
-double in_steps(double x, double step) { return step * std::round(x / step); }
-
 Vector3d normals(Random& random) { return {random.normal(), random.normal(), random.normal()}; }
 
 }  // namespace

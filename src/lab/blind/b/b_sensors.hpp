@@ -5,6 +5,7 @@
 // Declarations are exact, or within the habits of laboratories. The log's clock is 0 at its start.
 #pragma once
 
+#include <cmath>
 #include <deque>
 #include <optional>
 #include <vector>
@@ -15,6 +16,8 @@
 namespace flappy::blind::b {
 
 enum class Sample { kInstant, kMean, kHeld };
+
+inline double in_steps(double x, double step) { return step * std::round(x / step); }
 
 /// Matrix of a rotation vector.
 Matrix3d turned(const Vector3d& rotation_rad);

@@ -3,16 +3,11 @@
 #include <cmath>
 
 namespace flappy::blind::b {
-namespace {
-
-/// In any direction, of a length that is uniform up to `longest`.
 Vector3d any_way(Random& random, double longest) {
   const double up = random.uniform(-1, 1), heading = random.uniform(-kPi, kPi), length = random.uniform(0, longest);
   const double level = std::sqrt(1 - up * up);
   return length * Vector3d(level * std::cos(heading), level * std::sin(heading), up);
 }
-
-}  // namespace
 
 SessionChange draw_session(std::uint64_t seed, std::size_t session) {
   SessionChange c;
@@ -35,6 +30,8 @@ SessionChange draw_session(std::uint64_t seed, std::size_t session) {
   c.marker_m = any_way(random, 0.35e-3);
   c.mocap_late_s = within(0.4e-3);
   c.imu_late_s = within(0.1e-3);
+  c.clamp_turn_rad = any_way(random, 0.1 * kDegree);
+  c.clamp_m = any_way(random, 0.1e-3);
   return c;
 }
 

@@ -21,9 +21,14 @@ struct SessionChange {
   Vector3d imu_turn_rad{0, 0, 0};          ///< board pressed on its foam again: up to 0.2 deg, any way
   Vector3d marker_turn_rad{0, 0, 0};       ///< markers glued anew: up to 0.1 deg and 0.35 mm, any way
   Vector3d marker_m{0, 0, 0};
-  double mocap_late_s = 0;  ///< load of the network: up to 0.4 ms
-  double imu_late_s = 0;    ///< where the bus's poll falls after the start of the board: up to 0.1 ms
+  double mocap_late_s = 0;           ///< load of the network: up to 0.4 ms
+  double imu_late_s = 0;             ///< where the bus's poll falls after the start of the board: up to 0.1 ms
+  Vector3d clamp_turn_rad{0, 0, 0};  ///< clamped anew on the bench: up to 0.1 deg and 0.1 mm, any way
+  Vector3d clamp_m{0, 0, 0};
 };
+
+/// In any direction, of a length that is uniform up to `longest`.
+Vector3d any_way(Random& random, double longest);
 
 /// `session`: from 1 on; make_case changes nothing in session 0.
 SessionChange draw_session(std::uint64_t seed, std::size_t session);

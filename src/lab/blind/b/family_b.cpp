@@ -4,6 +4,7 @@
 #include <string>
 
 #include "io/files.hpp"
+#include "lab/blind/b/b_bench.hpp"
 #include "lab/blind/b/b_contrast.hpp"
 #include "lab/blind/b/b_effects.hpp"
 #include "lab/blind/b/b_escape.hpp"
@@ -21,9 +22,11 @@ class FamilyB final : public Family {
  public:
   std::string name() const override { return "b"; }
   const std::vector<FamilyEffect>& effects() const override { return family_effects(); }
+  bool has_bench() const override { return true; }
   FamilyFlight fly(const Assignment& a, std::size_t flight) const override {
     if (a.proposed) return fly_programme(a, flight, {kTrim_s, a.proposed->lasts_s});
     check_flight(flight);
+    if (a.bench) return run_on_bench(a, flight);
     return fly_programme(a, flight);
   }
   Contrast contrast(const Assignment& a, std::size_t flight, const std::string& effect,

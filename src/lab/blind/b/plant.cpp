@@ -140,7 +140,6 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
   rate[kQuaternion + 2] = 0.5 * (q[0] * w.y() + q[3] * w.x() - q[1] * w.z());
   rate[kQuaternion + 3] = 0.5 * (q[0] * w.z() + q[1] * w.y() - q[2] * w.x());
 
-  using Vector6d = Eigen::Matrix<double, 6, 1>;
   using Coupling = Eigen::Matrix<double, 6, 2>;
   const auto stacked = [](const Wrench& f) {
     Vector6d out;

@@ -11,6 +11,7 @@ namespace flappy::blind::b {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 struct Twist {
   Vector3d w, v;

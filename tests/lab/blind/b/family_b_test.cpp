@@ -274,6 +274,8 @@ TEST(FamilyBSession, DrawsWithinItsBounds) {
       {0.2 * kDegree, [](const auto& c) { return c.imu_turn_rad.norm(); }},
       {0.1 * kDegree, [](const auto& c) { return c.marker_turn_rad.norm(); }},
       {0.35e-3, [](const auto& c) { return c.marker_m.norm(); }},
+      {0.1 * kDegree, [](const auto& c) { return c.clamp_turn_rad.norm(); }},
+      {0.1e-3, [](const auto& c) { return c.clamp_m.norm(); }},
       {0.4e-3, [](const auto& c) { return c.mocap_late_s; }},
       {0.1e-3, [](const auto& c) { return c.imu_late_s; }}};
   for (std::size_t i = 0; i < uniform.size(); ++i)
