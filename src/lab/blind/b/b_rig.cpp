@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "lab/blind/b/b_sensors.hpp"
 #include "lab/blind/b/b_session.hpp"
@@ -19,12 +20,10 @@ constexpr long kStepsPerFrame = 10;   // 2000 frames/s of 20,000 steps/s
 
 static_assert(kStepsPerFrame * kStep_s * kFilm_hz > 0.999 && kStepsPerFrame * kStep_s * kFilm_hz < 1.001);
 
-/// How sensors are screwed on: straight, by right angles about z, or upside down.
-Eigen::Quaterniond mounting(std::size_t which) {
-  if (which < 4) return Eigen::Quaterniond(Eigen::AngleAxisd(static_cast<double>(which) * kPi / 2, Vector3d::UnitZ()));
-  return Eigen::Quaterniond(Eigen::AngleAxisd(kPi, which == 4 ? Vector3d::UnitX() : Vector3d::UnitY()));
-}
-constexpr std::size_t kMountings = 6;
+constexpr double kQuarter = std::numbers::sqrt2 / 2;
+/// How sensors are screwed on (w, x, y, z): straight, by right angles about z, or upside down.
+constexpr std::array<std::array<double, 4>, 6> kMountings = {
+    {{1, 0, 0, 0}, {kQuarter, 0, 0, kQuarter}, {0, 0, 0, 1}, {kQuarter, 0, 0, -kQuarter}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
 
 }  // namespace
 
@@ -60,7 +59,7 @@ RigTruth draw_rig(const Assignment& a, flightlog::RigHeader& header) {
 
   // All draws are made in any case, so that one convention does not shift the others.
   Random c(a.seed, 0, Stream::kRigConventions);
-  const Eigen::Quaterniond mounted = mounting(c.below(kMountings));
+  const std::array<double, 4>& mounted = kMountings[c.below(kMountings.size())];
   const Vector3d misturned = any_way(c, kMisturned_rad), misplaced = any_way(c, kMisplaced_m);
   std::array<double, 2> noise{};
   for (double& x : noise) x = kNoiseLow * std::pow(kNoiseHigh / kNoiseLow, c.uniform());
@@ -69,8 +68,8 @@ RigTruth draw_rig(const Assignment& a, flightlog::RigHeader& header) {
   const double clock = 1 + c.uniform(0, kFastClock), camera_late = c.uniform(-1, 1) / kFilm_hz;
   if (!a.conventions) return t;
 
-  header.attitude = {mounted.w(), mounted.x(), mounted.y(), mounted.z()};
-  t.turn = mounted.toRotationMatrix() * turned(misturned);
+  header.attitude = mounted;
+  t.turn = Eigen::Quaterniond(mounted[0], mounted[1], mounted[2], mounted[3]).toRotationMatrix() * turned(misturned);
   t.place_m += misplaced;
   header.latency_s = in_steps(t.late_s, kRoundedLatency_s);
   header.force_noise_N *= noise[0];
