@@ -6,7 +6,7 @@ namespace flappy::blind::c {
 namespace {
 
 // Gains were tested on the nominal robot and on 40 drawn ones.
-constexpr double kHover_V = 10.0, kClimb_V_s2_m = 0.75;  // V per m/s^2: mass over the slope of thrust by voltage
+constexpr double kClimb_V_s2_m = 0.75;  // V per m/s^2: mass over the slope of thrust by voltage
 constexpr double kPlace_1_s = 3.2, kSpeed_1_s = 6, kSpeedHold_1_s2 = 4, kHeight_1_s = 5, kClimb_1_s = 8,
                  kClimbHold_1_s2 = 6;
 constexpr double kMaxAcceleration = 4.5;

@@ -5,6 +5,8 @@
 
 namespace flappy::blind::c {
 
+inline constexpr double kHover_V = 10.0;  ///< amplitude at which the nominal robot carries its weight
+
 struct Target {
   Eigen::Vector3d position_W = Eigen::Vector3d::Zero();
   Eigen::Vector3d velocity_W = Eigen::Vector3d::Zero(), acceleration_W = Eigen::Vector3d::Zero();

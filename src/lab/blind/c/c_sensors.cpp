@@ -23,8 +23,9 @@ Eigen::Matrix3d turned(double angle, const Eigen::Vector3d& axis) {
 
 Sensors::Sensors(const Assignment& a, std::size_t flight, const Robot& robot, SensorParameters parameters)
     : f_(std::move(parameters)),
+      clamped_(a.bench),
       power_(a.power),
-      wings_(a.wings),
+      wings_(a.wings && !a.bench),
       imu_noise_(a.seed, "imu", stream_of(a, flight)),
       mocap_noise_(a.seed, "mocap", stream_of(a, flight)),
       power_noise_(a.seed, "power", stream_of(a, flight)),
@@ -50,8 +51,8 @@ Sensors::Sensors(const Assignment& a, std::size_t flight, const Robot& robot, Se
 
 void Sensors::after_step(const Robot& robot, double t_s) {
   ++count_;
-  imu(robot, t_s);
-  if (count_ % f_.mocap.steps == 0) mocap(robot, t_s);
+  if (!clamped_) imu(robot, t_s);
+  if (!clamped_ && count_ % f_.mocap.steps == 0) mocap(robot, t_s);
   if (power_ && count_ % f_.power.steps == 0) power(robot, t_s);
   if (wings_ && count_ % f_.wings.steps == 0) wings(robot, t_s);
 }

@@ -63,7 +63,7 @@ class Sensors {
   void wings(const Robot& robot, double t_s);
 
   SensorParameters f_;
-  bool power_, wings_;
+  bool clamped_, power_, wings_;  ///< a clamped robot's motion is not recorded
   Random imu_noise_, mocap_noise_, power_noise_, wing_noise_, walk_;
   double bias_magnitude_, rectification_, g_sensitivity_, delay_s_;
   Eigen::Vector3d warm_ = Eigen::Vector3d::Zero(), walked_ = Eigen::Vector3d::Zero(),

@@ -36,6 +36,10 @@ mjModel* compiled(const std::string& text) {
 Eigen::Map<Eigen::Vector3d> vector_at(mjtNum* at) { return Eigen::Map<Eigen::Vector3d>(at); }
 Eigen::Map<const Eigen::Vector3d> vector_of(const mjtNum* at) { return Eigen::Map<const Eigen::Vector3d>(at); }
 
+// Thousands of times the torso's own, so what it still gives way is as small a share. Far larger ones would hide the
+// support's force from the solver's tolerance.
+constexpr double kClampMass_kg = 1e3, kClampInertia_kg_m2 = 1;
+
 }  // namespace
 
 Mechanism::Mechanism(const RobotParameters& parameters, const Build& build, double step_s)
@@ -138,6 +142,22 @@ void Mechanism::step(const std::array<double, 2>& motor_Nm, const std::array<dou
   vector_at(d->qfrc_applied + 3) = R_WB * wrench.torque_W;
   mj_step2(m, d);
   if (held != nullptr) hold_torso(*held);
+  if (!clamped_) return;
+  // the step's change of velocity, not qacc: the integrator takes damping implicitly
+  support_.force_W = kClampMass_kg / m->opt.timestep * vector_of(d->qvel);
+  support_.torque_W = clamp_.R_WB * (kClampInertia_kg_m2 / m->opt.timestep * vector_of(d->qvel + 3));
+  move_torso(clamp_);
+}
+
+void Mechanism::clamp() {
+  clamped_ = true;
+  const Motion now = motion();
+  clamp_.position_W = now.position_W;
+  clamp_.q_WB = now.q_WB;
+  clamp_.R_WB = now.R_WB;
+  move_torso(clamp_);
+  // after the compilation, which derived the stops' softness from a torso that is free
+  for (int i = 0; i < 6; ++i) model_->dof_armature[i] = i < 3 ? kClampMass_kg : kClampInertia_kg_m2;
 }
 
 // M += J^T (m_A, I_A) J, virtual masses and moments of each ellipsoid, implicitly.

@@ -4,8 +4,14 @@
 // the wing's length and area, its middle 0.55 mean chords behind the leading edge. MuJoCo omits the force of the
 // virtual mass under acceleration [1]; only the effect added_mass adds it. Up to 3.13 MuJoCo's lift has a floor of 1e-15 in
 // a denominator, which takes lift from these wings below 0.8 m/s: other versions have other robots (Family::engine).
+// Clamped: with a mass A and a moment of inertia added to the six coordinates t of the torso, and w the others,
+//   (M_tt + A) a_t + M_tw a_w = f_t,
+// the torso stays where it is as A grows, and A a_t tends to f_t - M_tw a_w, which it exerts on its support [2]: weight
+// and air, less the rate of change of the wings' momentum. No second law is needed, and the stops yield as in flight.
 // [1] MuJoCo documentation, Computation, Fluid forces: ellipsoid model; after Andersen, Pesavento, Wang, J. Fluid Mech.
 // 541 (2005).
+// [2] Featherstone, Rigid Body Dynamics Algorithms (Springer 2008), chapter 9: hybrid dynamics, where the motion of some
+// coordinates is given and their forces are sought. A large A gives them to a share M_tt / A.
 #pragma once
 
 #include <mujoco/mujoco.h>
@@ -85,6 +91,12 @@ class Mechanism {
   void step(const std::array<double, 2>& motor_Nm, const std::array<double, 2>& spring_Nm, const Wrench& wrench,
             const Motion* held = nullptr);
 
+  /// Clamps the torso where it is, for good.
+  void clamp();
+  /// What the clamped robot exerted on its support in the previous step, about the torso's origin: its weight, the air's
+  /// forces, and less the rate of change of the wings' momentum.
+  const Wrench& support() const { return support_; }
+
  private:
   void add_virtual_mass();
   void hold_torso(const Motion& held);
@@ -95,6 +107,9 @@ class Mechanism {
   std::array<std::array<std::ptrdiff_t, kStrips>, 2> strips_{};
   std::array<std::array<double, 4>, 2> strip_quat_{};
   double added_mass_ = 0;
+  bool clamped_ = false;
+  Motion clamp_;
+  Wrench support_;
 };
 
 /// Ellipsoid of a wing: radius over wing length, and area over length times mean chord.

@@ -142,7 +142,7 @@ SensorParameters sensor_parameters(const Assignment& a, const Robot& robot) {
   if (a.power)
     h.power = flightlog::PowerHeader{Drive::kBattery_V, rate(f.power.steps), f.power.latency_s, f.power.voltage_noise,
                                      f.power.current_noise};
-  if (a.wings) h.wings = flightlog::WingsHeader{rate(f.wings.steps), f.wings.noise_rad};
+  if (a.wings && !a.bench) h.wings = flightlog::WingsHeader{rate(f.wings.steps), f.wings.noise_rad};
   h.changes = a.changes;
   if (a.conventions) declare_loosely(f, robot, Random(a.seed, "conventions"));
   if (a.session > 0) change(f, session_change(a));

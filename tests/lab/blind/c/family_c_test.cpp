@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "io/parallel.hpp"
+#include "lab/blind/c/c_bench.hpp"
 #include "lab/blind/c/c_contrast.hpp"
 #include "lab/blind/c/c_escape.hpp"
 #include "lab/blind/c/c_flight.hpp"
@@ -791,6 +792,402 @@ TEST(FamilyC, SameBytesOnAnyNumberOfThreads) {
   const auto one = flown(1);
   EXPECT_EQ(one, flown(2));
   EXPECT_NE(one[0].mocap.x_m, one[2].mocap.x_m);
+}
+
+/// What the wings of a clamped robot have, about the torso's origin, in B.
+struct Borne {
+  Eigen::Matrix<double, 6, 1> momentum = Eigen::Matrix<double, 6, 1>::Zero();
+  Eigen::Matrix<double, 6, 1> weight = Eigen::Matrix<double, 6, 1>::Zero();  ///< with the torso's
+  double potential_J = 0;
+};
+
+Borne borne(const Mechanism& mechanism) {
+  Borne sum;
+  const mjModel& m = mechanism.model();
+  const mjData& d = mechanism.data();
+  const Eigen::Vector3d origin(d.qpos), down(0, 0, -Mechanism::kGravity_m_s2);
+  for (int body = 1; body < m.nbody; ++body) {
+    mjtNum v[6];
+    mj_objectVelocity(&m, const_cast<mjData*>(&d), mjOBJ_BODY, body, v, 0);
+    const double mass = m.body_mass[body];
+    const Eigen::Vector3d at = Eigen::Vector3d(d.xipos + 3 * body) - origin, p = mass * Eigen::Vector3d(v + 3);
+    const Eigen::Matrix3d R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(d.ximat + 9 * body);
+    const Eigen::Vector3d spin =
+        R * Eigen::Vector3d(m.body_inertia + 3 * body).asDiagonal() * R.transpose() * Eigen::Vector3d(v);
+    sum.momentum.head<3>() += p;
+    sum.momentum.tail<3>() += at.cross(p) + spin;
+    sum.weight.head<3>() += mass * down;
+    sum.weight.tail<3>() += at.cross(mass * down);
+    sum.potential_J += mass * Mechanism::kGravity_m_s2 * at.z();
+  }
+  return sum;
+}
+
+TEST(FamilyC, ClampedRobotPressesOnItsStandByAirWeightAndMomentum) {
+  using Six = Eigen::Matrix<double, 6, 1>;
+  struct Errors {
+    double impulse = 0, mean = 0;
+  };
+  const auto errors = [](double step_s) {
+    Bench bench(drawn_parameters(nominal(), 4), step_s);
+    bench.mechanism.clamp();
+    const double beat_s = 1 / nominal().flapping_Hz;
+    Six first = Six::Zero(), owed = Six::Zero(), swing = Six::Zero(), off = Six::Zero(), mean = Six::Zero();
+    long beat = -1;
+    double count = 0;
+    bench.run({10, 0.5, 0.7, 0.05}, 20 * beat_s, false, [&](double now_s) {
+      const mjData& d = bench.mechanism.data();
+      const Borne now = borne(bench.mechanism);  // at the start of this step, as its forces are
+      if (static_cast<long>(now_s / beat_s) != beat) {
+        beat = static_cast<long>(now_s / beat_s);
+        first = now.momentum;
+        owed.setZero();
+      }
+      const Six change = now.momentum - first;
+      swing = swing.cwiseMax(change.cwiseAbs());
+      off = off.cwiseMax((owed - change).cwiseAbs());
+      Six pressed;
+      pressed << bench.mechanism.support().force_W, bench.mechanism.support().torque_W;
+      const Six acts = Eigen::Map<const Six>(d.qfrc_passive) + now.weight;
+      owed += step_s * (acts - pressed);
+      if (beat < 10) return;
+      mean += pressed - acts;
+      ++count;
+    });
+    EXPECT_EQ(Eigen::Vector3d(bench.mechanism.data().qpos).norm(), 0) << "it gave way";
+    Errors of;
+    of.impulse = std::max(off.head<3>().maxCoeff() / swing.head<3>().maxCoeff(),
+                          off.tail<3>().maxCoeff() / swing.tail<3>().maxCoeff());
+    of.mean = mean.head<3>().norm() / count / (nominal().mass_kg() * Mechanism::kGravity_m_s2);
+    return of;
+  };
+  // over a beat and, for the mean, over ten; the integrator is of first order in the step
+  const Errors coarse = errors(Mechanism::kStep_s), fine = errors(Mechanism::kStep_s / 4);
+  EXPECT_LT(coarse.impulse, 0.05);
+  EXPECT_LT(fine.impulse, 0.4 * coarse.impulse);
+  EXPECT_LT(coarse.mean, 0.01);
+}
+
+TEST(FamilyC, ClampedRobotDoesNoWorkOnItsStand) {
+  const auto lost = [](double step_s) {
+    Bench bench(nominal(), step_s);
+    bench.mechanism.clamp();
+    const int nv = static_cast<int>(bench.mechanism.model().nv);
+    Eigen::VectorXd before = Eigen::VectorXd::Zero(nv), carried(nv);
+    double work = 0, turned_over = 0, least = 0, most = 0, rest_J = 0;
+    bool begun = false;
+    bench.run({10, 0, 0, 0}, 10 / nominal().flapping_Hz, false, [&](double) {
+      const mjData& d = bench.mechanism.data();
+      mj_mulM(&bench.mechanism.model(), const_cast<mjData*>(&d), carried.data(), before.data());
+      const double potential_J = borne(bench.mechanism).potential_J;
+      if (!begun) rest_J = potential_J;
+      begun = true;
+      const double balance = 0.5 * before.dot(carried) + potential_J - rest_J - work;
+      least = std::min(least, balance);
+      most = std::max(most, balance);
+      Eigen::VectorXd after = Eigen::Map<const Eigen::VectorXd>(d.qvel, nv);
+      after.head<6>().setZero();
+      const Eigen::VectorXd force = Eigen::Map<const Eigen::VectorXd>(d.qfrc_applied, nv) +
+                                    Eigen::Map<const Eigen::VectorXd>(d.qfrc_passive, nv) +
+                                    Eigen::Map<const Eigen::VectorXd>(d.qfrc_constraint, nv);
+      const double done = step_s * 0.5 * force.tail(nv - 6).dot((before + after).tail(nv - 6));
+      work += done;
+      turned_over += std::abs(done);
+      before = after;
+    });
+    EXPECT_GT(turned_over, 1e-3);  // J
+    return (most - least) / turned_over;
+  };
+  const double coarse = lost(Mechanism::kStep_s), fine = lost(Mechanism::kStep_s / 4);
+  EXPECT_LT(coarse, 0.05);
+  EXPECT_LT(fine, 0.5 * coarse);
+}
+
+/// A rig that only its spring and its cross-talk move.
+RigParameters silent(RigParameters f) {
+  f.force_noise_N = f.moment_noise_Nm = f.drift_N_s = f.walk_N_root_s = 0;
+  f.force_digit_N = f.moment_digit_Nm = 1e-12;
+  return f;
+}
+
+std::array<const flightlog::Column*, 6> columns_of(const flightlog::ForcesStream& forces) {
+  return {&forces.force_x_N,   &forces.force_y_N,   &forces.force_z_N,
+          &forces.moment_x_Nm, &forces.moment_y_Nm, &forces.moment_z_Nm};
+}
+
+/// Half a second of `rest`, in which the sensor is zeroed, then `acts`.
+flightlog::ForcesStream loaded(const Robot& robot, const RigParameters& f, const Wrench& rest, const Wrench& acts,
+                               double until_s) {
+  Rig rig(plain(), 0, robot, f);
+  const long before = std::lround(0.5 / robot.step_s()), after = std::lround(until_s / robot.step_s());
+  for (long i = 1 - before; i <= after; ++i) rig.load(i <= 0 ? rest : acts, static_cast<double>(i) * robot.step_s());
+  flightlog::FlightLog log;
+  rig.finish(log, 1e9);
+  return *log.forces;
+}
+
+TEST(FamilyC, SensorReadsNothingAtRestAndDrifts) {
+  const Robot robot(plain(), 0);
+  const RigParameters f = rig_parameters(plain(), robot);
+  Wrench weight;
+  weight.force_W.z() = -0.12;
+  weight.torque_W.x() = 1e-4;
+  const flightlog::ForcesStream quiet = loaded(robot, silent(f), weight, weight, 0.5);
+  for (const flightlog::Column* column : columns_of(quiet))
+    for (const double value : *column) EXPECT_NEAR(value, 0, 3e-12);
+  // noise of the mean of a second and of that of the zero, 6 sd, and a second's drift
+  const flightlog::ForcesStream real = loaded(robot, f, weight, weight, 1);
+  const double samples = 0.5 * f.declared.rate_hz;
+  for (std::size_t i = 0; i < 6; ++i) {
+    const flightlog::Column& column = *columns_of(real)[i];
+    const double mean = std::accumulate(column.begin(), column.end(), 0.0) / static_cast<double>(column.size());
+    const double noise = i < 3 ? f.declared.force_noise_N : f.declared.moment_noise_Nm;
+    double square = 0;
+    for (const double value : column) square += (value - mean) * (value - mean);
+    EXPECT_LT(std::abs(mean), 6 * noise * std::sqrt(1.5 / samples) + (i < 3 ? 5e-3 : 5e-5) / 60) << i;
+    EXPECT_NEAR(std::sqrt(square / static_cast<double>(column.size())) / noise, 1, 0.1) << i;
+  }
+  RigParameters drifting = silent(f);
+  drifting.drift_N_s = f.drift_N_s;
+  const double after = std::abs(loaded(robot, drifting, weight, weight, 2).force_x_N.back()) / 2;  // N/s
+  EXPECT_GE(after * 60, 0.5e-3);
+  EXPECT_LE(after * 60, 6e-3);
+}
+
+TEST(FamilyC, SensorSwingsAtTheResonanceThatIsDrawn) {
+  const Robot robot(plain(), 0);
+  for (std::uint64_t seed = 0; seed < 8; ++seed) {
+    Assignment a = plain();
+    a.seed = seed;
+    RigParameters f = silent(rig_parameters(a, robot));
+    EXPECT_GE(f.declared.resonance_hz, 250);
+    EXPECT_LE(f.declared.resonance_hz, 700);
+    EXPECT_EQ(f.declared.resonance_hz, *std::ranges::min_element(f.natural_hz));
+    f.crosstalk.setIdentity();
+    f.position_m.setZero();
+    f.steps = 1;
+    Wrench acts;
+    acts.force_W.setConstant(0.1);
+    acts.torque_W.setConstant(1e-3);
+    const flightlog::ForcesStream swings = loaded(robot, f, {}, acts, 0.1);
+    for (std::size_t i = 0; i < 6; ++i) {
+      const flightlog::Column& column = *columns_of(swings)[i];
+      const double still = i < 3 ? 0.1 : 1e-3;
+      const double highest = *std::ranges::max_element(column) / still - 1;
+      EXPECT_NEAR(std::log(1 / highest), M_PI * f.damping[i] / std::sqrt(1 - f.damping[i] * f.damping[i]), 0.03)
+          << "the overshoot of a step";
+      std::vector<double> crossings;
+      for (std::size_t k = 1; k < column.size(); ++k)
+        if (column[k - 1] < still && column[k] >= still)
+          crossings.push_back(static_cast<double>(k) - (column[k] - still) / (column[k] - column[k - 1]));
+      ASSERT_GT(crossings.size(), 10U);
+      const double hz =
+          static_cast<double>(crossings.size() - 1) / (crossings.back() - crossings.front()) / robot.step_s();
+      EXPECT_NEAR(hz / f.natural_hz[i], 1, 5e-3) << i;
+    }
+  }
+}
+
+TEST(FamilyC, SensorStandsWhereItIsAndItsAxesTalkToEachOther) {
+  const Robot robot(plain(), 0);
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    Assignment a = plain();
+    a.seed = seed;
+    a.conventions = true;
+    RigParameters f = silent(rig_parameters(a, robot));
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j < 6; ++j) {
+        const auto range = [&](int k) { return k < 3 ? f.force_range_N : f.moment_range_Nm; };
+        const double share = std::abs(f.crosstalk(i, j)) * range(j) / range(i);
+        EXPECT_GE(share, i == j ? 1 : 1e-3);
+        EXPECT_LE(share, i == j ? 1 : 1e-2);
+      }
+    f.damping.fill(0.9);  // it comes to rest at once
+    Wrench acts;
+    acts.force_W = {0.01, -0.03, 0.1};
+    acts.torque_W = {2e-4, 1e-3, -5e-4};
+    const flightlog::ForcesStream forces = loaded(robot, f, {}, acts, 0.2);
+    Eigen::Matrix<double, 6, 1> read, truly;
+    for (std::size_t i = 0; i < 6; ++i) read[static_cast<int>(i)] = columns_of(forces)[i]->back();
+    truly = f.crosstalk.inverse() * read;
+    const Eigen::Vector3d force = f.R_BS * truly.head<3>();
+    const Eigen::Vector3d moment = f.R_BS * truly.tail<3>() + f.position_m.cross(force);
+    EXPECT_LT((force - acts.force_W).norm(), 1e-9);
+    EXPECT_LT((moment - acts.torque_W).norm(), 1e-10);
+    EXPECT_GT((read - truly).head<3>().norm(), 1e-5);
+    // as declared, the axes are off by their tilt and the cross-talk
+    const auto& q = f.declared.attitude;
+    const Eigen::Vector3d declared =
+        Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix() * Eigen::Vector3d(read.head<3>());
+    EXPECT_LT((declared - acts.force_W).norm(), 0.1 * acts.force_W.norm());
+  }
+}
+
+TEST(FamilyC, BenchIsDeclaredExactlyOrWithinHabits) {
+  std::array<int, 3> kinds{};
+  for (std::uint64_t seed = 0; seed < 24; ++seed) {
+    Assignment a = plain();
+    a.seed = seed;
+    const Robot robot(a, 0);
+    const RigParameters e = rig_parameters(a, robot);
+    EXPECT_EQ(e.declared.latency_s, e.latency_s);
+    EXPECT_EQ(Eigen::Vector3d(e.declared.position_m.data()), e.position_m);
+    EXPECT_EQ(e.declared.attitude, (std::array<double, 4>{1, 0, 0, 0}));
+    EXPECT_EQ(e.R_BS, Eigen::Matrix3d::Identity());
+    EXPECT_NEAR(e.declared.rate_hz * static_cast<double>(e.steps) * robot.step_s(), 1, 1e-12);
+    EXPECT_EQ(e.declared_film.noise_rad, 0.5 * kDegree);
+    EXPECT_EQ(std::abs(e.fast_sensor) + std::abs(e.fast_film) + std::abs(e.film.late_s), 0);
+    EXPECT_FALSE(e.mean);
+    a.conventions = true;
+    const RigParameters l = rig_parameters(a, robot);
+    EXPECT_EQ(l.natural_hz, e.natural_hz);
+    EXPECT_EQ(l.position_m, e.position_m);
+    const double half_s = l.mean ? 0.5 / e.declared.rate_hz : 0;
+    EXPECT_LE(std::abs(l.declared.latency_s - l.latency_s - half_s), 0.5e-3 + 1e-12);
+    EXPECT_GE(l.declared.latency_s, 0);
+    const double off_m = (Eigen::Vector3d(l.declared.position_m.data()) - l.position_m).norm();
+    EXPECT_GT(off_m, 0.09e-3);
+    EXPECT_LE(off_m, 0.5e-3 + 1e-12);
+    const auto& q = l.declared.attitude;
+    const Eigen::Matrix3d said = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
+    EXPECT_LT((said.cwiseAbs2() - said.cwiseAbs()).norm(), 1e-12) << "right angles";
+    const double tilt = Eigen::AngleAxisd(Eigen::Matrix3d(l.R_BS * said.transpose())).angle();
+    EXPECT_GT(tilt, 0.04 * kDegree);
+    EXPECT_LE(tilt, 0.3 * kDegree + 1e-9);
+    EXPECT_LE(std::abs(l.film.late_s), 0.5e-3);
+    EXPECT_LE(l.fast_sensor + l.fast_film, 50e-6);
+    for (const double ratio :
+         {l.declared.force_noise_N / e.declared.force_noise_N, l.declared_film.noise_rad / e.declared_film.noise_rad}) {
+      EXPECT_GE(ratio, 0.7);
+      EXPECT_LE(ratio, 1.5);
+    }
+    kinds[0] += said(2, 2) < 0;
+    kinds[1] += std::abs(said(0, 0)) < 0.5;
+    kinds[2] += l.declared.resonance_hz == 0;
+    a.session = 1;  // clamped again, declared as before
+    const RigParameters s = rig_parameters(a, robot);
+    EXPECT_EQ(s.declared, l.declared);
+    EXPECT_GT((s.position_m - l.position_m).norm(), 0);
+    EXPECT_LE((s.position_m - l.position_m).norm(), 0.1e-3 + 1e-12);
+    const double clamped = Eigen::AngleAxisd(Eigen::Matrix3d(s.R_BS * l.R_BS.transpose())).angle();
+    EXPECT_GT(clamped, 0);
+    EXPECT_LE(clamped, 0.1 * kDegree + 1e-9);
+  }
+  for (const int kind : kinds) EXPECT_TRUE(kind > 2 && kind < 22) << kind;
+}
+
+TEST(FamilyC, FilmHidesAFifthOfItsFramesInStretches) {
+  const Robot robot(plain(), 0);  // at rest: what varies is noise
+  Rig rig(plain(), 0, robot, rig_parameters(plain(), robot));
+  const long steps = std::lround(20 / robot.step_s());
+  for (long i = 1; i <= steps; ++i) rig.after_step(robot, static_cast<double>(i) * robot.step_s(), true);
+  flightlog::FlightLog log;
+  rig.finish(log, 1e9);
+  ASSERT_TRUE(log.wings && log.header.wings);
+  EXPECT_NEAR(log.header.wings->rate_hz, 2000, 1e-9);
+  const double frames = 20 * 2000, seen = static_cast<double>(log.wings->t_s.size());
+  EXPECT_NEAR(seen / frames, 0.8, 0.02);
+  double stretches = 0, square = 0;
+  for (std::size_t i = 1; i < log.wings->t_s.size(); ++i)
+    stretches += log.wings->t_s[i] - log.wings->t_s[i - 1] > 0.75e-3;
+  EXPECT_NEAR((frames - seen) / stretches, 8, 1.5) << "frames of a stretch";
+  for (const double angle : log.wings->right_rotation_rad) square += angle * angle;
+  EXPECT_NEAR(std::sqrt(square / seen) / (0.5 * kDegree), 1, 0.03);
+}
+
+TEST(FamilyC, BenchRunsHold37PointsAndAreFilmedInTen) {
+  std::size_t points = 0, filmed = 0, films = 0;
+  for (std::size_t run = 0; run < 3; ++run) {
+    const BenchProgramme programme(plain(), run, nominal());
+    Assignment later = plain();
+    later.session = 1;
+    const BenchProgramme again(later, run, nominal());
+    points += programme.points().size();
+    EXPECT_NEAR(programme.lasts_s(), 27, 2);
+    const auto of_this = std::ranges::count_if(programme.points(), [](const BenchPoint& p) { return p.filmed; });
+    filmed += static_cast<std::size_t>(of_this);
+    films += of_this > 0;
+    EXPECT_EQ(programme.inputs(-1e-3).amplitude_V, 0);
+    EXPECT_LT(programme.inputs(1).amplitude_V, programme.inputs(3).amplitude_V) << "up to hover";
+    for (std::size_t i = 0; i < programme.points().size(); ++i) {
+      const double begins_s = 2.0 * static_cast<double>(i);
+      EXPECT_EQ(programme.inputs(begins_s + 0.5).bias_V, programme.inputs(begins_s + 1.999).bias_V);
+      EXPECT_EQ(programme.filmed(begins_s + 1), programme.points()[i].filmed);
+      const double once = programme.inputs(begins_s + 1).amplitude_V, then = again.inputs(begins_s + 1).amplitude_V;
+      EXPECT_NE(once, then);
+      EXPECT_NEAR(once / then, 1, 0.07);
+    }
+    for (double t = 0; t < programme.lasts_s(); t += 1e-3) {
+      const Inputs now = programme.inputs(t);
+      EXPECT_LE(now.amplitude_V, 0.8 * nominal().amplitude_limit_V);
+      EXPECT_LE(std::abs(now.difference_V), 0.65 * nominal().difference_limit_V);
+      EXPECT_LE(std::abs(now.bias_V), 0.65 * nominal().bias_limit_V);
+      EXPECT_LE(std::abs(now.split_cycle), 0.65 * nominal().split_cycle_limit);
+    }
+  }
+  EXPECT_EQ(points, 37U);
+  EXPECT_EQ(filmed, 10U);
+  EXPECT_EQ(films, 2U);
+}
+
+TEST(FamilyC, BenchKeepsWingsOffTheStopsOfTheirStroke) {
+  const std::vector<Inputs> extremes = {{13.4, 0, 0, 0},   {12.4, 1.1, 0, 0}, {10.3, 1.55, 0, 0},
+                                        {11.3, 0, 1.1, 0}, {10.3, 0, 1.6, 0}, {10.3, 0, 0, 0.093}};
+  constexpr std::size_t robots = 8;
+  std::array<double, robots * 6> widest{};  // over where the stop is
+  io::parallel_for(widest.size(), 2, [&](std::size_t i) {
+    Bench bench(drawn_parameters(nominal(), i % robots));
+    bench.mechanism.clamp();
+    bench.run(extremes[i / robots], 6 / nominal().flapping_Hz, false, [&](double) {
+      for (std::size_t side = 0; side < 2; ++side) {
+        const Hinge& stroke = bench.parameters.sides[side].stroke;
+        const double angle = bench.mechanism.stroke(side);
+        widest[i] = std::max(widest[i], angle / (angle > 0 ? stroke.upper_rad : stroke.lower_rad));
+      }
+    });
+  });
+  for (std::size_t i = 0; i < widest.size(); ++i) {
+    EXPECT_LT(widest[i], 0.99) << "robot " << i % robots << ", inputs " << i / robots;
+    EXPECT_GT(widest[i], 0.4) << "robot " << i % robots << ", inputs " << i / robots;
+  }
+}
+
+TEST(FamilyC, BenchLogsOnlyWhatAClampedRobotHas) {
+  Assignment a = plain();
+  a.bench = a.own_parameters = true;
+  const flightlog::FlightLog log = run_on_bench(a, 0, 0.8).log;
+  EXPECT_EQ(flightlog::parse_flight_log(flightlog::flight_log_files(log), "log"), log);
+  EXPECT_EQ(log.header.mocap, flightlog::MocapHeader{});
+  EXPECT_EQ(log.header.imu, flightlog::ImuHeader{});
+  EXPECT_TRUE(log.mocap.t_s.empty() && log.imu.t_s.empty() && !log.wings && log.power && log.forces);
+  EXPECT_EQ(log.header.ambient.ground_z_m, -1);
+  EXPECT_EQ(log.header.ambient.ceiling_z_m, 1);
+  EXPECT_EQ(log.command.t_s.size(), 800U);
+  double up = 0;
+  for (const double force : log.forces->force_z_N) up += force / static_cast<double>(log.forces->t_s.size());
+  EXPECT_GT(up, 0.01) << "it pulls the sensor up";
+  const auto family = make_family_c();
+  EXPECT_TRUE(family->has_bench());
+  EXPECT_THROW(family->fly(a, 3), io::InputError);
+}
+
+TEST(FamilyC, BenchHasTheSameBytesOnAnyNumberOfThreads) {
+  const auto run = [](int threads) {
+    std::vector<flightlog::FlightLog> logs(3);
+    io::parallel_for(logs.size(), threads, [&](std::size_t i) {
+      Assignment a = with(i == 2 ? "gear_backlash" : "wind", 1);
+      a.bench = a.own_parameters = a.conventions = true;
+      a.seed = 3 + i / 2;
+      a.session = i % 2;
+      logs[i] = run_on_bench(a, 0, 4.2).log;
+    });
+    return logs;
+  };
+  const auto one = run(1);
+  EXPECT_EQ(one, run(2));
+  EXPECT_TRUE(one[0].wings && one[0].wings->t_s.size() > 200);
+  EXPECT_NE(one[0].forces->force_z_N, one[1].forces->force_z_N) << "another session";
+  EXPECT_EQ(one[0].header.rig, one[1].header.rig);
 }
 
 TEST(FamilyC, RefusesWhatItDoesNotKnow) {
