@@ -11,7 +11,8 @@
 namespace flappy::flightlog {
 namespace {
 
-void check_stream(const StreamStatistics& s, double flapping_Hz, Findings& findings) {
+/// `film`: a camera's memory holds a part of the flight, and a wing hides the other.
+void check_stream(const StreamStatistics& s, double flapping_Hz, bool film, Findings& findings) {
   const auto warn = [&](const std::string& text) { findings.push_back({s.name, Verdict::warning, text, {}}); };
   if (!s.declared_hz) return;
   const std::size_t before = findings.size();
@@ -21,17 +22,23 @@ void check_stream(const StreamStatistics& s, double flapping_Hz, Findings& findi
     warn(format("%.4g samples/s, %.4g declared: thinned out, repeated, or t_s not in seconds", s.rate_hz,
                 *s.declared_hz));
   const double missing = static_cast<double>(s.missing) / static_cast<double>(s.samples + s.missing);
-  if (missing > 0.01)
+  if (missing > 0.01 && !film)
     warn(format("%zu samples missing (%.1f %%), at most 1 %% expected: dropouts", s.missing, 100 * missing));
   // Gaps of three beats cannot be interpolated: the motion of the body within a beat is not smooth.
   const double longest_s = std::max(10 * interval, flapping_Hz > 0 ? 3 / flapping_Hz : 0);
-  if (s.longest_gap_s > longest_s)
+  if (s.longest_gap_s > longest_s && !film)
     warn(format("a gap of %.3g s, at most %.3g s expected: lost tracking or a lost link", s.longest_gap_s, longest_s));
   // Beyond this jitter, samples may change order.
   if (s.jitter_s > 0.3 * interval)
     warn(format("intervals vary by %.2g ms of %.2g ms: arrival times are not evenly spaced; a buffered link?",
                 1e3 * s.jitter_s, 1e3 * interval));
-  if (findings.size() == before) findings.push_back({s.name, Verdict::ok, "rate, gaps and intervals as declared", {}});
+  if (findings.size() > before) return;
+  findings.push_back(
+      {s.name,
+       Verdict::ok,
+       film ? format("%.3g s of frames with angles, at the declared rate", static_cast<double>(s.samples) * interval)
+            : "rate, gaps and intervals as declared",
+       {}});
 }
 
 /// Warns of samples that repeat the previous one to the last digit, which noise makes impossible.
@@ -119,7 +126,7 @@ CheckReport check_flight(const FlightLog& log) {
   CheckReport report;
   const auto add = [&](const char* name, const Column& t_s, std::optional<double> declared_hz) {
     report.streams.push_back(stream_statistics(name, t_s, declared_hz));
-    check_stream(report.streams.back(), h.flapping_Hz, report.findings);
+    check_stream(report.streams.back(), h.flapping_Hz, log.wings && &t_s == &log.wings->t_s, report.findings);
   };
   add("command", log.command.t_s, std::nullopt);
   if (h.rig) add("forces", log.forces->t_s, h.rig->rate_hz);

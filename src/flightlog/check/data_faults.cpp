@@ -73,7 +73,8 @@ std::vector<DataFault> missing(const std::vector<DeclaredStream>& streams) {
       if (line == 0 && (again || (*s.t_s)[i] - (*s.t_s)[i - 1] > 1.5 / s.rate_hz)) line = i + 2;
     }
     const double expected = s.rate_hz * std::max(end_s - begin_s, 0.0);
-    if (static_cast<double>(fresh) >= kMinShare * expected) {
+    // a film may hold seconds of a flight
+    if (static_cast<double>(fresh) >= kMinShare * (s.file == kWings ? static_cast<double>(s.t_s->size()) : expected)) {
       const StreamStatistics seen = stream_statistics(s.file, *s.t_s, s.rate_hz);
       if (std::abs(seen.rate_hz / s.rate_hz - 1) > kRateTolerance && s.file != kCommand)
         faults.push_back({s.file, 2,

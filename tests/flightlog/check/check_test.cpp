@@ -411,6 +411,22 @@ TEST(Check, NamesABatteryThatFreezes) {
   EXPECT_TRUE(warns([&](FlightLog& log) { freeze(log, 0.9); }, {})) << "2 s may be chance";
 }
 
+TEST(Check, ToleratesAFilmOfAPart) {
+  EXPECT_TRUE(warns(
+      [](FlightLog& log) {
+        flightlog::WingsStream& w = *log.wings;
+        const Column t_s = w.t_s;
+        for (Column* c :
+             {&w.t_s, &w.left_stroke_rad, &w.left_rotation_rad, &w.right_stroke_rad, &w.right_rotation_rad}) {
+          Column kept;
+          for (std::size_t i = 0; i < t_s.size(); ++i)
+            if (i * 10 / t_s.size() % 5 == 1 && i % 50 > 10) kept.push_back((*c)[i]);
+          *c = kept;
+        }
+      },
+      {}));
+}
+
 TEST(Check, NamesFaultsOfPowerAndWings) {
   EXPECT_TRUE(warns([](FlightLog& log) { log.header.power->battery_nominal_V = 3.7; }, {"battery: 3.7 V nominal"}));
   EXPECT_TRUE(

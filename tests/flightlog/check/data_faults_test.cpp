@@ -235,6 +235,20 @@ TEST(DataFaults, OfSyntheticLogs) {
   }
 }
 
+// A camera's memory holds seconds, and a wing hides the other.
+TEST(DataFaults, AFilmMayHoldAPartOfAFlight) {
+  const FlightLog log = synthetic_log({.duration_s = 10});
+  const auto filmed = [&](const std::function<bool(std::size_t)>& keeps) {
+    FlightLog film = log;
+    flightlog::WingsStream& w = *film.wings;
+    thin({&w.t_s, &w.left_stroke_rad, &w.left_rotation_rad, &w.right_stroke_rad, &w.right_rotation_rad}, keeps);
+    return describe(data_faults(film, "a"));
+  };
+  const std::size_t n = log.wings->t_s.size();
+  EXPECT_EQ(filmed([&](std::size_t i) { return i * 10 / n % 5 == 1 && i % 50 > 10; }), "") << "2 s, a fifth hidden";
+  EXPECT_NE(filmed([&](std::size_t i) { return i % 2 == 0; }).find("declared: thinned out"), std::string::npos);
+}
+
 TEST(DataFaults, OfFlights) {
   if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   for (const std::size_t flight : {0, 1, 2}) {
