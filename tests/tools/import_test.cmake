@@ -73,6 +73,29 @@ expect_match("mocap.csv" "${mocap}" "^t_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,1,-3,2,1[.0
 expect_refused("--set mocap.body=box: mocap.body: \"box\" is no rigid body of the recording; accepted: robot"
   ${export} --out ${WORK}/refused --set mocap.body=box)
 
+# ---- the same of QTM and Vicon, by the commands of docs/reference/import.md
+
+string(JOIN "\t" names Frame Time "robot X" Y Z Roll Pitch Yaw Residual "Rot[0]" "Rot[1]" "Rot[2]" "Rot[3]" "Rot[4]" "Rot[5]" "Rot[6]" "Rot[7]" "Rot[8]")
+set(qtm "NO_OF_FRAMES\t10\nFREQUENCY\t100\nDATA_INCLUDED\t6D\nBODY_NAMES\trobot\n${names}\n")
+set(vicon "Objects\n100\n,,Global Angle (Quaternion) robot:robot,,,,,,\nFrame,Sub Frame,RX,RY,RZ,RW,TX,TY,TZ\n,,,,,,mm,mm,mm\n")
+foreach(i RANGE 9)
+  math(EXPR frame "${i} + 1")
+  string(APPEND qtm "${frame}\t0.0${i}000\t100${i}.000\t-3000.000\t2000.000\t0\t0\t0\t0.4\t1\t0\t0\t0\t1\t0\t0\t0\t1\t\n")
+  string(APPEND vicon "${frame},0,0,0,0,1,100${i},-3000,2000\n")
+endforeach()
+foreach(kind IN ITEMS qtm vicon)
+  set(take ${WORK}/${kind}/take.csv)
+  if(kind STREQUAL qtm)
+    set(take ${WORK}/${kind}/take.tsv)
+  endif()
+  file(WRITE ${take} "${${kind}}")
+  run(import ${WORK}/export/motors.csv ${take} --mapping ${SOURCE}/configs/mapping/motion_capture.toml
+    --set mocap.world=enu --set mocap.frame=flu --out ${WORK}/of_${kind})
+  expect_equal("stderr of ${kind}" "${err}" "")
+  file(READ ${WORK}/of_${kind}/mocap.csv mocap)
+  expect_match("mocap.csv of ${kind}" "${mocap}" "^t_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,1,-3,2,1,0,0,0\n0.01,1.001[0-9]*,-3,2,1,0,0,0\n")
+endforeach()
+
 # ---- one sample from before its clock was there: the flight is the others, and every program ends
 
 file(WRITE ${WORK}/zero/mapping.toml "schema = 1
@@ -111,6 +134,21 @@ string(REPLACE "t_s,u\n" "t_s,u\n-1700000000,9\n" imported "${imported}")
 file(WRITE ${WORK}/of_zero/command.csv "${imported}")
 expect_refused("${WORK}/of_zero/command.csv:3: t_s: 0 comes 1.7e+09 s after that of the line before; accepted: gaps of at most 600 s within a flight"
   check ${WORK}/of_zero)
+
+# ---- a log of ArduPilot as text
+
+file(READ ${WORK}/zero/mapping.toml mapping_of_log)
+string(REPLACE "channel = \"*\"\ntime = \"field\"\ntime_field = \"t\"" "channel = \"POSE\"" mapping_of_log "${mapping_of_log}")
+file(WRITE ${WORK}/ardupilot/mapping.toml "${mapping_of_log}")
+set(rows "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nFMT, 129, 43, POSE, Qffffffff, TimeUS,u,x,y,z,qw,qx,qy,qz\n")
+foreach(i RANGE 9)
+  string(APPEND rows "POSE, ${i}0000, 0.${i}, 1.${i}, 2, 3, 1, 0, 0, 0\n")
+endforeach()
+file(WRITE ${WORK}/ardupilot/flight.log "${rows}")
+run(import ${WORK}/ardupilot/flight.log --mapping ${WORK}/ardupilot/mapping.toml --out ${WORK}/of_ardupilot)
+expect_equal("stderr" "${err}" "")
+file(READ ${WORK}/of_ardupilot/mocap.csv mocap)
+expect_match("mocap.csv" "${mocap}" "^t_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,1,2,3,1,0,0,0\n0.01,1.1,2,3,1,0,0,0\n")
 
 # ---- no output replaces what is read
 

@@ -77,19 +77,27 @@ const std::vector<double>& field_of(const Channel& channel, const io::Table& tab
   return field_of(channel, table, key, fields.front());
 }
 
+[[noreturn]] void fail_without_capture(const StreamMapping& s) {
+  s.table.fail("body", "is given for a table without the head of a motion-capture program",
+               "columns, or an export with its head");
+}
+
+std::string worlds_of(const Capture& capture) {
+  return capture.program == "Motive" ? "\"y_up\" (the program's default), \"enu\" (z up)" : "\"enu\" (z up), \"y_up\"";
+}
+
 /// The field of a column that a body of an export has. InputError for a body that is not there, and where the file does
 /// not say which way its axes point, or what its rotations are.
 const std::vector<double>& field_of_body(const Channel& channel, const StreamMapping& s, const std::string& field) {
   const Capture* capture = channel.capture();
-  if (!capture) s.table.fail("body", "is given for a table that no motion-capture program wrote", "columns");
+  if (!capture) fail_without_capture(s);
   if (std::ranges::find(capture->bodies, s.body) == capture->bodies.end())
     s.table.fail("body",
                  "\"" + s.body + "\" is no rigid body of the recording" +
                      (std::ranges::find(capture->markers, s.body) == capture->markers.end() ? "" : ", but a marker"),
                  listed(capture->bodies) + io::did_you_mean(s.body, capture->bodies));
   const std::string which = capture->program + "'s files do not say which axis ";
-  if (!capture->says_up && !s.says_world)
-    s.table.fail("world", "is missing: " + which + "is up", "\"y_up\" (the program's default), \"enu\" (z up)");
+  if (!capture->says_up && !s.says_world) s.table.fail("world", "is missing: " + which + "is up", worlds_of(*capture));
   if (!capture->says_up && !s.says_axes)
     s.table.fail("frame", "is missing: " + which + "of the body is forward",
                  "\"fur\" (x forward, y up), \"luf\" (z forward, y up), \"flu\" (x forward, z up), \"frd\"");
@@ -118,7 +126,7 @@ std::vector<double> field_of_marker(const Channel& channel, const StreamMapping&
   const Capture* capture = channel.capture();
   if (capture && !capture->says_up && !s.says_world)
     s.table.fail("world", "is missing: " + capture->program + "'s files do not say which axis is up",
-                 "\"y_up\" (the program's default), \"enu\" (z up)");
+                 worlds_of(*capture));
   for (const std::string& field : fields)
     if (const auto* found = channel.column(field)) {
       std::vector<double> values = *found;
@@ -740,7 +748,12 @@ std::string usable(const StreamReport& report) {
 Stream read_stream(const Channels& channels, const StreamMapping& mapping, const Clocks& clocks, const Span& span,
                    bool shared, const FlightHeader& header, const Stream* mocap) {
   const Channel& channel = channel_of(channels, mapping, mapping.channel, "channel");
-  if (all_missing(raw_times(channel, mapping)) && !channel.received_ns().empty())
+  if (!mapping.body.empty() && !channel.capture()) fail_without_capture(mapping);
+  const bool timeless = all_missing(raw_times(channel, mapping)) && !channel.received_ns().empty();
+  if (timeless && mapping.time == TimeOf::field)
+    mapping.table.fail("time_field", "no sample has a time there",
+                       "a field of numbers, or of dates as 2026-05-04T10:15:00, 04.05.2026 10:15:00");
+  if (timeless)
     mapping.table.fail("time",
                        mapping.time == TimeOf::stamp ? "samples of this channel have no stamp"
                                                      : "samples of this channel do not say when they were received",

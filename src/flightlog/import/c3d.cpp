@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "flightlog/import/bytes.hpp"
 #include "io/files.hpp"
@@ -281,10 +282,13 @@ class C3dReader {
   void add_points(std::size_t frames) {
     if (points_ == 0) return;
     Row row = {{"t", 0}, {"frame", 0}};
-    for (const std::string& label : labels("POINT", points_))
+    const std::vector<std::string> names = labels("POINT", points_);
+    for (const std::string& label : names)
       for (const char* part : {".x", ".y", ".z", ".residual"}) row.push_back({label + part, 0});
     declare(channel_, row);
+    channels_.describe(channel_, {"C3D", false, {}, names});
     if (!channels_.wants(channel_)) return;
+    const std::vector<std::size_t> of_markers = add_markers(names, row);
     for (std::size_t f = 0; f < frames; ++f) {
       row[0].value = static_cast<double>(f) / rate_Hz_;
       row[1].value = first_ + static_cast<double>(f);
@@ -300,8 +304,24 @@ class C3dReader {
         for (std::size_t k = 0; k < 4 && !seen; ++k)
           row[2 + 4 * p + k].value = std::numeric_limits<double>::quiet_NaN();
       }
-      channels_.add(channel_, kNoTime, kNoTime, row);
+      for (std::size_t k = 0; k < of_markers.size(); ++k)
+        row[row.size() - of_markers.size() + k].value = row[of_markers[k]].value;
+      add(channel_, row);
     }
+  }
+
+  /// Adds the wanted fields of markers as a mapping calls them, `nose.x_m`, behind a row; returns which of its numbers
+  /// they are.
+  std::vector<std::size_t> add_markers(const std::vector<std::string>& names, Row& row) const {
+    std::vector<std::size_t> copied;
+    const std::set<std::string>* wanted = channels_.wanted(channel_);
+    for (std::size_t p = 0; wanted && p < names.size(); ++p)
+      for (std::size_t k = 0; k < 3; ++k)
+        if (const std::string field = names[p] + std::array{".x_m", ".y_m", ".z_m"}[k]; wanted->contains(field)) {
+          row.push_back({field, 0});
+          copied.push_back(2 + 4 * p + k);
+        }
+    return copied;
   }
 
   void add_analog(std::size_t frames) {
@@ -329,7 +349,7 @@ class C3dReader {
           const double raw = real_ ? numbers_.real(at) : no_sign ? numbers_.word(at) : numbers_.integer(at);
           row[1 + k].value = (raw - offsets[k]) * scales[k] * all;
         }
-        channels_.add(channel, kNoTime, kNoTime, row);
+        add(channel, row);
       }
   }
 
@@ -360,7 +380,7 @@ class C3dReader {
       row[0].value = static_cast<double>(f) / (rate_Hz_ * ratio);
       for (std::size_t k = 0; k < used; ++k)
         odd += !rotation(at + f * size + 4 * kRotationNumbers * k, &row[1 + 7 * k]);
-      channels_.add(channel, kNoTime, kNoTime, row);
+      add(channel, row);
     }
     if (odd > 0) warn("has " + std::to_string(odd) + " rotations whose matrix is none: taken as missing");
   }
@@ -380,6 +400,12 @@ class C3dReader {
     for (std::size_t k = 0; k < values.size(); ++k)
       items[k].value = seen && sound ? values[k] : std::numeric_limits<double>::quiet_NaN();
     return sound || !seen;
+  }
+
+  /// Adds a row whose first number is its time, s.
+  void add(const std::string& channel, const Row& row) {
+    const double t_ns = 1e9 * row[0].value;
+    channels_.add(channel, kNoTime, t_ns < kLatest_ns ? std::llround(t_ns) : kNoTime, row);
   }
 
   void declare(const std::string& channel, const Row& row) {

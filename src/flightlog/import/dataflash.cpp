@@ -367,7 +367,12 @@ class DataflashText : public DataflashReader {
 bool is_dataflash(std::string_view bytes) { return bytes.starts_with("\xA3\x95\x80"); }
 
 bool is_dataflash_text(std::string_view bytes) {
-  return bytes.starts_with("FMT, 128, 89") || bytes.starts_with("FMT,128,89");
+  constexpr std::size_t kLooked = 4096;  // above its formats a log may say which firmware and board wrote it
+  const std::string_view head = bytes.substr(0, kLooked);
+  for (const std::string_view first : {"FMT, 128, 89", "FMT,128,89"})
+    if (const std::size_t at = head.find(first); at == 0 || (at != std::string_view::npos && head[at - 1] == '\n'))
+      return true;
+  return false;
 }
 
 void read_dataflash(std::string_view bytes, const std::string& name, Channels& channels,

@@ -1,6 +1,7 @@
 #include "flightlog/import/matlab.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <functional>
 #include <limits>
@@ -163,6 +164,19 @@ struct MatlabColumns {
 
 bool is_matlab(std::string_view bytes) {
   return bytes.starts_with("MATLAB 5.0 MAT-file") || bytes.starts_with("MATLAB 7.3 MAT-file");
+}
+
+bool is_matlab_4(std::string_view bytes) {
+  constexpr std::size_t kWords = 5, kMaxName = 64;  // MATLAB's names have at most 63 letters
+  if (bytes.size() < 4 * kWords) return false;
+  std::array<std::uint32_t, kWords> words;  // kind, rows, columns, whether complex, letters of the name
+  for (std::size_t k = 0; k < kWords; ++k) words[k] = number_at<std::uint32_t>(bytes.data() + 4 * k);
+  if (words[0] >= 5000)  // of a machine with the other byte order
+    for (std::uint32_t& word : words) word = __builtin_bswap32(word);
+  const std::uint32_t kind = words[0], letters = words[4];
+  return kind < 5000 && kind / 100 % 10 == 0 && kind / 10 % 10 <= 5 && kind % 10 <= 2 && words[3] <= 1 && letters > 1 &&
+         letters <= kMaxName && bytes.size() >= 4 * kWords + letters &&
+         bytes.substr(4 * kWords, letters).find('\0') == letters - 1;
 }
 
 void read_matlab(const std::filesystem::path& file, std::string_view bytes, Channels& channels,

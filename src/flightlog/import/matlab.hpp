@@ -16,6 +16,8 @@
 namespace flappy::flightlog {
 
 bool is_matlab(std::string_view bytes);
+/// Whether bytes are a file of version 4, which begins with its first variable: five integers and a name.
+bool is_matlab_4(std::string_view bytes);
 
 /// Adds the channels of a file that has these bytes, without times of receipt and stamps. Warns of what holds no plain
 /// numbers, as a datetime, and of what is damaged. InputError where the file cannot be read.

@@ -58,7 +58,8 @@ MocapExport motive(std::string_view text, const TableHead& head, const std::stri
   MocapExport e;
   e.program = "Motive";
   e.says_up = false;
-  const std::map<std::string, std::string> said = pairs_of(split(first_line(text), ','));
+  const std::string_view first = first_line(text);
+  const std::map<std::string, std::string> said = pairs_of(split(first, separator_of(first)));
   const auto value = [&](const std::string& key, const std::string& fallback) {
     const auto found = said.find(key);
     return found == said.end() ? fallback : found->second;
@@ -169,8 +170,11 @@ MocapExport qtm(std::string_view text, const TableHead& head) {
       const auto at = column(name + " X");
       if (!at || *at + 2 >= head.columns.size()) continue;
       MocapBody b{name, {*at, *at + 1, *at + 2}, kPerMillimetre};
-      const bool whole = *at + kOfBody.size() <= head.columns.size() && head.columns[*at + 7].name == kOfBody[7] &&
-                         head.columns[*at + 15].name == kOfBody[15];
+      const auto is = [&](std::size_t k) {  // with or without the body's name
+        const std::string& own = head.columns[*at + k].name;
+        return own == kOfBody[k] || own == name + " " + kOfBody[k];
+      };
+      const bool whole = *at + kOfBody.size() <= head.columns.size() && is(7) && is(15);
       if (whole) b.kind = Rotation::matrix;
       for (std::size_t k = 0; whole && k < 9; ++k) b.rotation.push_back(*at + 7 + k);
       e.bodies.push_back(std::move(b));
@@ -202,6 +206,7 @@ std::pair<std::string, std::string> kind_and_name(std::string text) {
 MocapExport vicon(std::string_view text, const TableHead& head, const std::string& name) {
   MocapExport e;
   e.program = "Vicon";
+  e.first_frame = 1;
   Lines lines(text);
   lines.next();
   if (const auto rate = lines.next()) e.rate_hz = to_number(first_cell(rate->text, head.separator), true);
@@ -240,11 +245,20 @@ MocapExport vicon(std::string_view text, const TableHead& head, const std::strin
   return e;
 }
 
-constexpr std::array kTitles = {"Objects", "Segments", "Trajectories", "Devices", "Joints", "Model Outputs"};
+constexpr std::array<std::string_view, 6> kTitles = {"Objects", "Segments", "Trajectories",
+                                                     "Devices", "Joints",   "Model Outputs"};
 
-bool is_title(std::string_view line) {
-  const std::string cell = first_cell(line, separator_of(line));
-  return std::ranges::find(kTitles, cell) != kTitles.end() && used(split(line, separator_of(line))) == 1;
+/// The title that stands alone in a line, before separators at most; empty for another line.
+std::string_view title_of(std::string_view line) {
+  const auto title = std::ranges::find_if(kTitles, [&](std::string_view t) {
+    return line.starts_with(t) && line.find_first_not_of(" \t,;", t.size()) == std::string_view::npos;
+  });
+  return title == kTitles.end() ? std::string_view() : *title;
+}
+
+bool is_motive(std::string_view text) {
+  constexpr std::string_view kBegins = "Format Version";
+  return text.starts_with(kBegins) && text.find_first_of(",;\t") == kBegins.size();
 }
 
 }  // namespace
@@ -297,6 +311,16 @@ std::int64_t MocapExport::stamp_ns(const RowSplitter& cells, std::size_t index) 
   return std::abs(t_s) * 1e9 < kLatest_ns ? std::llround(1e9 * t_s) : kNoTime;
 }
 
+std::size_t first_lines_of(std::string_view text) {
+  return is_motive(text) ? 1 : title_of(first_line(text)).empty() ? 0 : 2;
+}
+
+std::string_view below_first_lines(std::string_view text) {
+  Lines lines(text);
+  for (std::size_t k = first_lines_of(text); k > 0; --k) lines.next();
+  return lines.rest();
+}
+
 bool is_qtm(std::string_view text) {
   constexpr std::string_view kFirst = "FILE_VERSION\t", kFrames = "NO_OF_FRAMES\t";
   return text.starts_with(kFrames) || (text.starts_with(kFirst) && text.find(kFrames) != std::string_view::npos);
@@ -337,9 +361,9 @@ std::vector<TextBlock> blocks_of(std::string_view text) {
   while (const auto line = lines.next()) {
     const std::string cell = first_cell(line->text, separator_of(line->text));
     const bool rate = std::isfinite(to_number(cell, true)) && used(split(line->text, separator_of(line->text))) == 1;
-    if (rate && is_title(above)) {
-      blocks.push_back({first_cell(above, separator_of(above)), above, line->number - 2});
-    } else if (blocks.empty() && !is_blank(line->text) && !is_title(line->text)) {
+    if (rate && !title_of(above).empty()) {
+      blocks.push_back({std::string(title_of(above)), above, line->number - 2});
+    } else if (blocks.empty() && !is_blank(line->text) && title_of(line->text).empty()) {
       return {{"", text, 0}};
     }
     above = line->text;
@@ -353,9 +377,9 @@ std::vector<TextBlock> blocks_of(std::string_view text) {
 }
 
 std::optional<MocapExport> mocap_export_of(std::string_view text, const TableHead& head, const std::string& name) {
-  if (text.starts_with("Format Version,")) return motive(text, head, name);
+  if (is_motive(text)) return motive(text, head, name);
   if (is_qtm(text)) return qtm(text, head);
-  if (is_title(first_line(text))) return vicon(text, head, name);
+  if (!title_of(first_line(text)).empty()) return vicon(text, head, name);
   return std::nullopt;
 }
 

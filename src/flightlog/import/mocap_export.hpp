@@ -56,6 +56,11 @@ struct MocapExport {
 /// Names of the fields of a body, after that of the body.
 std::vector<std::string> fields_of(const MocapBody& body);
 
+/// Lines at the begin of an export that belong to no table: Motive's first, title and rate of a block of Vicon's.
+std::size_t first_lines_of(std::string_view text);
+/// The text below them.
+std::string_view below_first_lines(std::string_view text);
+
 bool is_qtm(std::string_view text);
 /// The head of a TSV of QTM, whose names stand in a line or in the head alone. InputError for one without frames.
 TableHead qtm_head(std::string_view text, const std::string& name);

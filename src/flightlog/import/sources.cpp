@@ -100,6 +100,7 @@ const OtherKind kOtherKinds[] = {
     {"ustar"sv, 257, {".tar", ".tgz"}, "a tar archive", "tar xf FILE"},
     {"\x89HDF\r\n"sv, 0, {".h5", ".hdf5"}, "an HDF5 file", "export it as CSV"},
     {"MATLAB "sv, 0, {".mat"}, "a MATLAB file compressed by gzip", "gunzip FILE"},  // plain ones were recognised before
+    {"# Created by Octave"sv, 0, {}, "a text file of Octave", "save -v7 FILE"},
     {"PAR1"sv, 0, {".parquet"}, "a Parquet file", "pandas.read_parquet(FILE).to_csv(...)"},
     {"\x93NUMPY"sv, 0, {".npy"}, "a NumPy array", "numpy.savetxt with header= and delimiter=\",\""},
     {"H Product:Blackbox flight data recorder"sv,
@@ -112,6 +113,13 @@ const OtherKind kOtherKinds[] = {
     {"\xFE\xFF"sv, 0, {}, "text in UTF-16", "iconv -f UTF-16 -t UTF-8 FILE"},
 };
 
+/// In small letters, as cards name their files in capitals.
+std::string in_small_letters(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
 /// InputError for files that are no text, recognised by their first bytes or by the ending of their names.
 void require_text(const fs::path& file, const std::string& ending, std::string_view bytes) {
   constexpr std::string_view kAccepted = "a bag, a ULog, a usdlog, a log of ArduPilot, a MATLAB file, a C3D or a CSV";
@@ -119,6 +127,9 @@ void require_text(const fs::path& file, const std::string& ending, std::string_v
     if (bytes.substr(std::min(kind.at, bytes.size())).starts_with(kind.begins))
       throw io::InputError(file.string() + ": is " + std::string(kind.what) + "; accepted: " + std::string(kAccepted) +
                            ", as made by: " + std::string(kind.remedy));
+  if (is_matlab_4(bytes))
+    throw io::InputError(file.string() + ": is a MATLAB file of version 4; accepted: " + std::string(kAccepted) +
+                         ", as made by: save with -v7");
   std::vector<std::string_view> named = {".ulg", ".c3d"};
   for (const OtherKind& kind : kOtherKinds) named.insert(named.end(), kind.endings);
   if (std::ranges::find(named, ending) != named.end())
@@ -137,7 +148,7 @@ void read_bytes(const fs::path& file, const fs::path& plain, std::string_view by
   if (is_dataflash(bytes)) return read_dataflash(bytes, file.string(), channels, warnings);
   if (is_dataflash_text(bytes)) return read_dataflash_text(bytes, file.string(), channels, warnings);
   if (is_c3d(bytes)) return read_c3d(bytes, file.string(), plain.stem().string(), channels, warnings);
-  require_text(file, plain.extension().string(), bytes);
+  require_text(file, in_small_letters(plain.extension().string()), bytes);
   if (is_sparse_points(bytes))
     return read_sparse_points(bytes, file.string(), plain.stem().string(), channels, warnings);
   read_table(bytes, file.string(), plain.stem().string(), channels, warnings);

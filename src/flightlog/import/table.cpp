@@ -33,7 +33,8 @@ class TableReader {
         name_(std::move(name)),
         channel_(std::move(channel)),
         channels_(channels),
-        head_(is_qtm(text) ? qtm_head(text, name_) : head_of(text, name_, above)),
+        head_(is_qtm(text) ? qtm_head(text, name_)
+                           : head_of(below_first_lines(text), name_, above + first_lines_of(text))),
         labels_(head_.columns),
         export_(mocap_export_of(text, head_, name_)) {
     std::vector<std::string> fields;
@@ -154,7 +155,9 @@ class TableReader {
   }
 
   void add(const RowSplitter& cells, std::size_t line) {
-    std::size_t width = cells.size();
+    std::size_t width = cells.size(), filled = 0;
+    while (filled < width && cells[filled].empty()) ++filled;
+    if (filled == width) return;                                 // as a spreadsheet leaves at the end
     while (width > named_ && cells[width - 1].empty()) --width;  // ignore separators at the end
     if (width < named_ || width > std::max(named_, head_.columns.size()))
       return other_width_.add(line, std::to_string(width) + (width == 1 ? " cell for " : " cells for ") +

@@ -30,6 +30,17 @@ Contents contents(const Cells& cells, char separator) {
   return c;
 }
 
+/// Whether a line is a row of empty cells.
+bool holds_separators(std::string_view line) { return used(split(line, separator_of(line))) == 0; }
+
+/// The unit in brackets at the end of a name, as in "x (mm)" or "time [us]"; empty where it has none that is known.
+std::string unit_in(const std::string& name) {
+  const std::size_t open = name.find_last_of("([");
+  if (open == 0 || open == std::string::npos || (name.back() != ')' && name.back() != ']')) return {};
+  const std::string unit = name.substr(open + 1, name.size() - open - 2);
+  return recorded_unit(unit) ? unit : "";
+}
+
 /// Whether a row of so many cells belongs to these names; separators at its end do not count.
 bool fits(const Cells& row, const Cells& names) {
   const std::size_t named = used(names);
@@ -41,16 +52,17 @@ class HeadFinder {
   HeadFinder(std::string_view text, std::size_t above) {
     Lines lines(text, above);
     while (const auto line = lines.next()) {
-      if (is_blank(line->text) || is_comment(line->text)) continue;
+      if (is_blank(line->text) || is_comment(line->text) || holds_separators(line->text)) continue;
       lines_.push_back(*line);
       if (lines_.size() == kHeadLines + kRowsLooked) break;
     }
   }
 
-  /// The line of names among the lines, of which there is one at least: the first, where none is clear.
+  /// The line of names among the lines, of which there is one at least: the first, where none is clear. A first line that
+  /// begins with an empty cell may be a row of groups above one of numbers, as IDs: then names further below count.
   std::size_t names() const {
     for (std::size_t i = 0; i < std::min(kHeadLines, lines_.size()); ++i)
-      if (are_names(i)) return i;
+      if (are_names(i) && (i > 0 || !split(lines_[0].text, separator_of(lines_[0].text)).front().empty())) return i;
     return 0;
   }
 
@@ -58,7 +70,7 @@ class HeadFinder {
     const char separator = separator_of(lines_[i].text);
     const Cells names = split(lines_[i].text, separator);
     TableHead head{separator, lines_[i].number, lines_[i].number, {}};
-    for (const std::string& name : names) head.columns.push_back({name, {}, {}});
+    for (const std::string& name : names) head.columns.push_back({name, {}, unit_in(name)});
     const std::vector<Cells> groups = groups_above(i, names, separator);
     for (const Cells& row : groups) head.columns.resize(std::max(head.columns.size(), row.size()));
     for (std::size_t k = 0; k < head.columns.size(); ++k)
@@ -79,12 +91,12 @@ class HeadFinder {
   bool empty() const { return lines_.empty(); }
 
  private:
-  /// Names are words, and rows of more numbers than words follow: at once, and most of the lines below are such.
+  /// Names are words, most of them, and rows of more numbers than words follow: at once, and most of the lines below are such.
   bool are_names(std::size_t i) const {
     const char separator = separator_of(lines_[i].text);
     const Cells names = split(lines_[i].text, separator);
     const Contents said = contents(names, separator);
-    if (said.words == 0) return false;
+    if (said.words <= said.numbers) return false;
     const std::size_t first = i + (units_below(i, names, separator).empty() ? 1 : 2);
     // A first line may have one faulty row at once; below it, a line of words and numbers above words is a group.
     const std::size_t needed = i == 0 ? 1 : std::clamp<std::size_t>(lines_.size() - first, 1, 2);
@@ -145,7 +157,7 @@ std::string_view comment_above(std::string_view text) {
 TableHead head_of(std::string_view text, const std::string& name, std::size_t above) {
   const HeadFinder finder(text, above);
   if (finder.empty())
-    throw io::InputError(name + ": " + (text.empty() ? "is empty" : "holds no table") +
+    throw io::InputError(name + ": " + (text.empty() && above == 0 ? "is empty" : "holds no table") +
                          "; accepted: a line of column names, then rows of numbers");
   const std::string_view comment = comment_above(text);
   const char of_comment = separator_of(comment);
@@ -155,7 +167,7 @@ TableHead head_of(std::string_view text, const std::string& name, std::size_t ab
   const auto is_number = [&](const std::string& cell) { return std::isfinite(to_number(cell, separator != ',')); };
   if (said.size() == first.size() && std::ranges::any_of(first, is_number)) {
     TableHead head{separator, 0, 0, {}};
-    for (const std::string& column : said) head.columns.push_back({column, {}, {}});
+    for (const std::string& column : said) head.columns.push_back({column, {}, unit_in(column)});
     return head;
   }
   const std::size_t names = finder.names();

@@ -3,7 +3,7 @@
 // Names stand in the last comment ("# t,x") before the first row, or in the first line that rows of as many numbers
 // follow. What is above them is skipped: text, or rows of groups, which tell columns of one name apart; such a row
 // begins with an empty cell or is as wide as the names, and an empty cell in it repeats the group to its left. A row of
-// words right below the names holds their units.
+// words right below the names holds their units, or a name ends with its own in brackets.
 #pragma once
 
 #include <cstddef>

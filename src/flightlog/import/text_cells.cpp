@@ -34,14 +34,17 @@ bool skip(std::string_view& text, char c) {
   return true;
 }
 
-/// "2026-05-04": s from 1970.
+/// "2026-05-04", "2026/05/04", "04.05.2026": s from 1970.
 std::optional<double> date_s(std::string_view& text) {
-  const auto year = digits(text, 4);
-  if (!year || !skip(text, '-')) return std::nullopt;
+  const bool day_first = text.size() > 2 && text[2] == '.';
+  const char between = day_first ? '.' : text.size() > 4 && text[4] == '/' ? '/' : '-';
+  const auto first = digits(text, day_first ? 2 : 4);
+  if (!first || !skip(text, between)) return std::nullopt;
   const auto month = digits(text, 2);
-  if (!month || !skip(text, '-')) return std::nullopt;
-  const auto day = digits(text, 2);
-  if (!day) return std::nullopt;
+  if (!month || !skip(text, between)) return std::nullopt;
+  const auto last = digits(text, day_first ? 4 : 2);
+  if (!last) return std::nullopt;
+  const auto &year = day_first ? last : first, &day = day_first ? first : last;
   const std::chrono::year_month_day date{std::chrono::year(*year), std::chrono::month(static_cast<unsigned>(*month)),
                                          std::chrono::day(static_cast<unsigned>(*day))};
   if (!date.ok()) return std::nullopt;
@@ -79,9 +82,19 @@ std::optional<double> zone_s(std::string_view text) {
   return sign * (3600.0 * *hours + 60.0 * *minutes);
 }
 
-bool is_list(std::string_view text) {
-  return text.size() >= 2 &&
-         ((text.front() == '[' && text.back() == ']') || (text.front() == '(' && text.back() == ')'));
+constexpr std::string_view kOpen = "[({", kClose = "])}";
+
+/// What stands between the brackets of a list; as Python prints an array, also behind its type. Nothing for another text.
+std::optional<std::string_view> list_in(std::string_view text) {
+  if (text.starts_with("array(") && text.ends_with(')')) {
+    const std::size_t open = text.find('['), close = text.rfind(']');
+    if (open >= close || close == std::string_view::npos) return std::nullopt;
+    return text.substr(open + 1, close - open - 1);
+  }
+  if (text.size() < 2 || kOpen.find(text.front()) == std::string_view::npos ||
+      kOpen.find(text.front()) != kClose.find(text.back()))
+    return std::nullopt;
+  return text.substr(1, text.size() - 2);
 }
 
 }  // namespace
@@ -198,14 +211,23 @@ std::optional<double> to_time_s(std::string_view text) {
 
 double list_element(std::string_view text, std::size_t index) {
   if (std::isnan(to_number(text, false))) return kMissing;
-  if (!is_list(text)) return kNoNumber;
-  text = text.substr(1, text.size() - 2);
-  constexpr std::string_view kBetween = ", ;\t\r\n";
+  const auto list = list_in(text);
+  if (!list) return kNoNumber;
+  text = *list;
+  constexpr std::string_view kBetween = ", ;\t\r\n[]";
   for (std::size_t k = 0;; ++k) {
     text.remove_prefix(std::min(text.find_first_not_of(kBetween), text.size()));
     if (text.empty()) return kNoNumber;
     const std::size_t end = std::min(text.find_first_of(kBetween), text.size());
-    if (k == index) return to_number(text.substr(0, end), false);
+    if (k == index) {
+      std::string_view element = text.substr(0, end);
+      if (element.starts_with("np.") &&
+          element.ends_with(')')) {  // "np.float64(0.1)", as NumPy prints its numbers in a list
+        element.remove_prefix(std::min(element.find('(') + 1, element.size()));
+        element.remove_suffix(element.empty() ? 0 : 1);
+      }
+      return to_number(element, false);
+    }
     text.remove_prefix(end);
   }
 }

@@ -55,6 +55,8 @@ class Lines {
   /// `above` lines stand before the text.
   explicit Lines(std::string_view text, std::size_t above = 0) : rest_(text), number_(above) {}
   std::optional<Line> next();
+  /// The text below the lines that were taken.
+  std::string_view rest() const { return rest_; }
 
  private:
   std::string_view rest_;
@@ -79,12 +81,13 @@ std::size_t used(const Cells& cells);
 double to_number(std::string_view text, bool decimal_comma);
 
 /// A cell that holds a date, a time of day, or both, by ISO 8601: s from 1970 in UTC, or from midnight. "2026-05-04",
-/// "10:15:00.25", "2026-05-04T10:15:00+02:00", also with a blank in place of T; without a zone it is taken as UTC.
+/// "10:15:00.25", "2026-05-04T10:15:00+02:00", also with a blank in place of T; without a zone it is taken as UTC. Dates
+/// may also be "2026/05/04" and "04.05.2026"; "04/05/2026" is not told from the 5th of April.
 /// Nothing where it holds something else.
 std::optional<double> to_time_s(std::string_view text);
 
-/// Element `index`, from 0, of a list in a cell: "[0.1, 0.2]", "(0.1; 0.2)", "[0.1 0.2]"; of an empty cell kMissing, of a
-/// cell that is no list, or of a list without it, kNoNumber.
+/// Element `index`, from 0, of a list in a cell: "[0.1, 0.2]", "(0.1; 0.2)", "{0.1 0.2}", "array([0.1, 0.2])", of rows one
+/// after the other "[[0.1, 0.2]]"; of an empty cell kMissing, of a cell that is no list, or of a list without it, kNoNumber.
 double list_element(std::string_view text, std::size_t index);
 
 /// Whether a cell is neither empty nor a number, a time or a list.

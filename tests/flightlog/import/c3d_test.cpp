@@ -79,6 +79,22 @@ TEST(C3d, ReadsEveryProcessorAndStorage) {
     }
 }
 
+TEST(C3d, ReadsSamplesWithoutSign) {
+  C3dText text(Processor::intel, false);
+  text.group(1, "POINT").integers(1, "USED", {1}).reals(1, "SCALE", {1}).reals(1, "RATE", {100});
+  text.integers(1, "FRAMES", {3}).texts(1, "LABELS", {"a"}).texts(1, "UNITS", {"mm"}).group(2, "ANALOG");
+  text.integers(2, "USED", {1}).reals(2, "RATE", {100}).reals(2, "GEN_SCALE", {1}).reals(2, "SCALE", {2});
+  text.texts(2, "FORMAT", {"UNSIGNED"}).integers(2, "OFFSET", {32768}).texts(2, "LABELS", {"Fz"});
+  text.integers(1, "DATA_START", {text.data_block()});
+  std::string data;
+  for (const int raw : {30000, 32768, 40000})
+    data += text.word(1) + text.word(2) + text.word(3) + text.word(0) + text.word(raw);
+  const Channels channels = read(text.file(1, 1, 1, 3, 1, 100, data));
+  EXPECT_EQ(*channels.find("f.analog")->column("Fz"), (Column{-5536, 0, 14464}));
+  EXPECT_EQ(channels.find("f")->stamp_ns(), (std::vector<std::int64_t>{0, 10'000'000, 20'000'000}));
+  EXPECT_EQ(channels.find("f.analog")->stamp_ns(), channels.find("f")->stamp_ns());
+}
+
 TEST(C3d, CountsFramesBeyondSixteenBits) {
   constexpr int kMany = 70000;
   const auto made = [&](const auto& count) {

@@ -115,6 +115,8 @@ TEST(Dataflash, ReadsText) {
       "MSG, 3000, 12.34, hello, world\n"
       "IMU, 4000, 0\nBOO, 1\n";
   ASSERT_TRUE(is_dataflash_text(text));
+  EXPECT_TRUE(is_dataflash_text("\r\nArduPlane V2.74\r\nFree RAM: 2048\r\n" + text));
+  EXPECT_FALSE(is_dataflash_text("type,FMT, 128, 89\n"));
   Lines warnings;
   const Channels channels = read(text, &warnings);
   EXPECT_EQ(*channels.find("IMU[0]")->column("AccX"), (Column{0.5, 1.5}));

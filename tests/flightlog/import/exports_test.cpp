@@ -7,7 +7,10 @@
 #include <numbers>
 
 #include "flightlog/import/assemble.hpp"
+#include "flightlog/import/c3ds.hpp"
+#include "flightlog/import/mats.hpp"
 #include "flightlog/import/sources.hpp"
+#include "flightlog/import/ulogs.hpp"
 #include "flightlog/rotation.hpp"
 #include "io/temporary_folder.hpp"
 #include "io/text.hpp"
@@ -41,6 +44,11 @@ class Recording {
   void add(const std::string& name, const std::string& text) {
     write(name, text);
     files_.push_back(folder_ / name);
+  }
+  /// A place for a file of the recording that the caller writes.
+  std::filesystem::path place(const std::string& name) {
+    files_.push_back(folder_ / name);
+    return files_.back();
   }
   Imported import(const std::string& streams) {
     warnings.clear();
@@ -138,6 +146,12 @@ Pose pose(int i) {
 }
 constexpr int kFrames = 20, kLost = 7;
 
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+    text.replace(at, from.size(), to);
+  return text;
+}
+
 std::string numbers(const char* separator, std::initializer_list<double> values, int digits = 9) {
   std::string text;
   for (const double v : values) text += separator + io::format("%.*f", digits, v);
@@ -229,7 +243,7 @@ std::string vicon(const std::string& title, const std::string& kind, const std::
     const double one = unit == "deg" ? 180 / std::numbers::pi : 1;
     const Eigen::Vector3d r =
         one * (vector ? logarithm(at.q) : Eigen::Vector3d(at.q.toRotationMatrix().eulerAngles(0, 1, 2)));
-    text += std::to_string(i) + ",0" + (quaternion ? ",0,0,0,1,1,2,3" : ",0,0,0,1,2,3");
+    text += std::to_string(i + 1) + ",0" + (quaternion ? ",0,0,0,1,1,2,3" : ",0,0,0,1,2,3");
     if (i == kLost) text += more;
     else if (quaternion) text += numbers(",", {at.q.x(), at.q.y(), at.q.z(), at.q.w()});
     else text += numbers(",", {r.x(), r.y(), r.z()});
@@ -278,9 +292,49 @@ TEST(Exports, OfMotiveGiveTheMotion) {
                    "body = \"robot\"\nworld = \"enu\"\nframe = \"flu\"\n");
 }
 
+/// A first line that a spreadsheet fills up with separators, other separators, and no empty line below the first.
+TEST(Exports, OfMotiveMayBeSavedByASpreadsheet) {
+  const std::string plain = motive("1.23", "Quaternion", "Millimeters");
+  std::string filled = replaced(plain, "Global\r\n\r\n", "Global,,,,,,,,\r\n" + std::string(30, ',') + "\r\n");
+  expect_motion_of("take.csv", filled, kYUp);
+  std::string more = "Global";  // wider than the table
+  for (int k = 0; k < 20; ++k) more += ",Key,value";
+  expect_motion_of("take.csv", replaced(plain, "Global\r\n\r\n", more + "\r\n"), kYUp);
+  for (const char* separator : {";", "\t"}) {
+    expect_motion_of("take.csv", replaced(plain, ",", separator), kYUp);
+    expect_motion_of("take.csv", replaced(replaced(plain, ",", separator), ".", ","), kYUp);  // decimal commas
+  }
+}
+
+/// Motive without its head: a table by the names of its columns, which stand in line 5.
+TEST(Exports, OfMotiveWithoutHeadAreTables) {
+  std::string text = motive("1.23", "Quaternion", "Meters", true);
+  text.erase(0, text.find("\r\n\r\n") + 4);
+  Recording r;
+  r.add("take.csv", text);
+  expect_motion(
+      r.import(stream("time = \"field\"\ntime_field = \"Time (Seconds)\"\ncolumns = { x_m = \"robot Position X\", y_m "
+                      "= \"robot Position Y\", z_m = \"robot Position Z\", qw = \"W 2\", qx = \"robot Rotation X\", qy "
+                      "= \"robot Rotation Y\", qz = \"robot Rotation Z\" }\n")));
+  EXPECT_EQ(r.refusal(stream(kYUp)),
+            "m.toml:16:8: mocap.body: is given for a table without the head of a motion-capture program; accepted: "
+            "columns, or an export with its head");
+}
+
 TEST(Exports, OfQtmGiveTheMotion) {
   for (const bool names : {true, false})
     for (const bool zeros : {true, false}) expect_motion_of("take.tsv", qtm(names, zeros), "body = \"robot\"\n");
+  // each column with the body's name; decimal commas
+  std::string text = qtm(true, true);
+  for (const char* part : {"Y", "Z", "Roll", "Pitch", "Yaw", "Residual", "Rot[0]", "Rot[1]", "Rot[2]", "Rot[3]",
+                           "Rot[4]", "Rot[5]", "Rot[6]", "Rot[7]", "Rot[8]"})
+    for (const char* body : {"box ", "robot "}) {
+      const std::size_t at = text.find(std::string("\t") + part + (std::string_view(part) == "Rot[8]" ? "" : "\t"),
+                                       text.find(std::string(body) + "X"));
+      text.insert(at + 1, body);
+    }
+  expect_motion_of("take.tsv", text, "body = \"robot\"\n");
+  expect_motion_of("take.tsv", replaced(qtm(true, false), ".", ","), "body = \"robot\"\n");
 }
 
 TEST(Exports, OfViconGiveTheMotion) {
@@ -293,6 +347,14 @@ TEST(Exports, OfViconGiveTheMotion) {
   // several blocks, each a channel
   const std::string devices = "Devices\n1000\n,,Force,,\nFrame,Sub Frame,Fx,Fy\n,,N,N\n1,0,2,3\n1,1,2,3\n1,2,2,3\n\n";
   expect_motion_of("take.csv", devices + vicon("Objects", "Quaternion", ""), "body = \"robot\"\n", "take/Objects");
+  const std::string model = replaced(replaced(devices, "Devices", "Model Outputs"), ",N,N", ",deg,deg");
+  expect_motion_of("take.csv", vicon("Objects", "Quaternion", "") + "\n" + model, "body = \"robot\"\n", "take/Objects");
+  // other separators; lines that a spreadsheet fills up with them
+  const std::string plain = vicon("Objects", "Quaternion", "");
+  expect_motion_of("take.csv", replaced(replaced(plain, ",", ";"), ".", ","), "body = \"robot\"\n");
+  const std::string filled(15, ',');
+  expect_motion_of("take.csv", "Objects" + filled + "\n100" + filled + plain.substr(plain.find("100\n") + 3),
+                   "body = \"robot\"\n");
 }
 
 TEST(Exports, SayWhatAMappingLacks) {
@@ -315,7 +377,9 @@ TEST(Exports, SayWhatAMappingLacks) {
   EXPECT_EQ(r.refusal(stream(kYUp + kPose)),
             "m.toml:19:11: mocap.columns: is given with body; accepted: one of the two");
   EXPECT_EQ(r.refusal("[mocap]\nchannel = \"motors\"\ntime = \"field\"\ntime_field = \"t\"\n" + kNoise + kYUp),
-            "m.toml:18:8: mocap.body: is given for a table that no motion-capture program wrote; accepted: columns");
+            "m.toml:18:8: mocap.body: is given for a table without the head of a motion-capture program; accepted: "
+            "columns, or an export with its "
+            "head");
   Recording v;
   v.add("take.csv", vicon("Objects", "", "rad"));
   EXPECT_EQ(v.refusal(stream("body = \"robot\"\n")),
@@ -418,7 +482,7 @@ std::string nexus(bool at_rest = false) {
   // at rest: B's origin at (1, 2, 0.03), turned by 0.5 rad
   const Pose rest{{1, 2, 0.03}, exponential({0, 0, 0.5})};
   for (int i = 0; i < kFrames; ++i)
-    text += std::to_string(i) + ",0" + marker_cells(at_rest ? rest : pose(i), at_rest ? 0 : i, ",", false) + "\n";
+    text += std::to_string(i + 1) + ",0" + marker_cells(at_rest ? rest : pose(i), at_rest ? 0 : i, ",", false) + "\n";
   return text;
 }
 
@@ -461,6 +525,163 @@ TEST(Exports, AtRestGiveThePlacesOfMarkers) {
   EXPECT_EQ(r.refusal(stream("") +
                       "[mocap.markers]\nnose = [0.0, 0.0, 0.0]\nleft = [0.1, 0.0, 0.0]\ntail = [0.2, 0.0, 0.0]\n"),
             "m.toml:16:1: mocap.markers: are in one line; accepted: at least 3 that are not");
+}
+
+// ---- one flight, eleven files
+
+/// Markers as Motive has them, in mm, z up.
+std::string motive_markers() {
+  std::string text =
+      "Format Version,1.23,Take Name,hover,Export Frame Rate,100.000000,Total Exported Frames,20,Rotation "
+      "Type,Quaternion,Length Units,Millimeters,Coordinate Space,Global\r\n\r\n";
+  Lines rows = {",Type", ",Name", ",ID", ",", "Frame,Time (Seconds)"};
+  for (const std::string& name : kMarkers)
+    for (const char* axis : {"X", "Y", "Z"}) {
+      const Lines cells = {"Marker", name, "1", "Position", axis};
+      for (std::size_t k = 0; k < rows.size(); ++k) rows[k] += "," + cells[k];
+    }
+  for (const std::string& row : rows) text += row + "\r\n";
+  for (int i = 0; i < kFrames; ++i)
+    text += std::to_string(i) + numbers(",", {0.01 * i}, 6) + marker_cells(pose(i), i, ",", false) + "\r\n";
+  return text;
+}
+
+std::string c3d() {
+  test::C3dText text(test::Processor::intel, true);
+  text.group(1, "POINT").integers(1, "USED", {4}).reals(1, "SCALE", {-0.1}).reals(1, "RATE", {100});
+  text.integers(1, "FRAMES", {kFrames}).texts(1, "LABELS", kMarkers).texts(1, "UNITS", {"mm"});
+  text.integers(1, "DATA_START", {text.data_block()});
+  std::string data;
+  for (int i = 0; i < kFrames; ++i)
+    for (const Eigen::Vector3d& place : kPlaces) {
+      const Eigen::Vector3d p = 1e3 * (pose(i).p + pose(i).q * place);
+      data += text.real(p.x()) + text.real(p.y()) + text.real(p.z()) + text.real(i == kLost ? -1 : 0x0301);
+    }
+  return text.file(4, 0, 0, kFrames, -0.1, 100, data);
+}
+
+/// Times, places and quaternions column by column, not numbers where the robot was lost.
+struct MotionColumns {
+  Column t, position, quaternion;
+  MotionColumns() : position(3 * kFrames), quaternion(4 * kFrames) {
+    for (int i = 0; i < kFrames; ++i) {
+      const Pose at = pose(i);
+      const std::array<double, 4> q = {at.q.w(), at.q.x(), at.q.y(), at.q.z()};
+      t.push_back(0.01 * i);
+      for (int k = 0; k < 4; ++k) {
+        if (k < 3) position[k * kFrames + i] = i == kLost ? std::nan("") : at.p[k];
+        quaternion[k * kFrames + i] = i == kLost ? std::nan("") : q[k];
+      }
+    }
+  }
+};
+
+std::string matlab(bool packed) {
+  const MotionColumns motion;
+  test::MatText mat;
+  const std::string flight = mat.structs("flight", 1, {"t", "position", "q"},
+                                         {mat.column("", motion.t), mat.doubles("", {kFrames, 3}, motion.position),
+                                          mat.doubles("", {kFrames, 4}, motion.quaternion)});
+  return mat.add(packed ? mat.compressed(flight) : flight).text;
+}
+
+void write_matlab_73(const std::filesystem::path& file) {
+  using test::Mat73;
+  const MotionColumns motion;
+  Mat73 mat(file);
+  const hid_t flight = Mat73::group(mat.file, "flight");
+  Mat73::add(flight, "t", {kFrames, 1}, motion.t);
+  Mat73::add(flight, "position", {kFrames, 3}, motion.position, "double", H5T_STR_NULLTERM, true);
+  Mat73::add(flight, "q", {kFrames, 4}, motion.quaternion);
+  H5Gclose(flight);
+}
+
+/// What a log on board has of each frame but the lost one: time in us, then floats.
+template <class Begin>
+std::string on_board(const Begin& begin) {
+  std::string text;
+  for (int i = 0; i < kFrames; ++i) {
+    if (i == kLost) continue;
+    const Pose at = pose(i);
+    text += begin() + test::UlogText::bytes(static_cast<std::uint64_t>(10'000 * i));
+    for (const double v : {at.p.x(), at.p.y(), at.p.z(), at.q.w(), at.q.x(), at.q.y(), at.q.z()})
+      text += test::UlogText::bytes(static_cast<float>(v));
+  }
+  return text;
+}
+
+std::string dataflash() {
+  const auto fmt = [](int type, int size, std::string name, std::string letters, std::string columns) {
+    name.resize(4), letters.resize(16), columns.resize(64);
+    return std::string("\xA3\x95\x80") + static_cast<char>(type) + static_cast<char>(size) + name + letters + columns;
+  };
+  return fmt(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns") +
+         fmt(129, 3 + 8 + 7 * 4, "POSE", "Qfffffff", "TimeUS,x,y,z,qw,qx,qy,qz") +
+         on_board([] { return "\xA3\x95\x81"; });
+}
+
+std::string usdlog() {
+  std::string text = "\xBC" + test::UlogText::bytes(std::uint16_t{2}) + test::UlogText::bytes(std::uint16_t{1}) +
+                     test::UlogText::bytes(std::uint16_t{5}) + "estPose" + '\0' +
+                     test::UlogText::bytes(std::uint16_t{7});
+  for (const char* name : {"x", "y", "z", "qw", "qx", "qy", "qz"}) text += std::string(name) + "(f)" + '\0';
+  text += on_board([] { return test::UlogText::bytes(std::uint16_t{5}); });
+  const auto sum = crc32(0, reinterpret_cast<const Bytef*>(text.data()), static_cast<uInt>(text.size()));
+  return text + test::UlogText::bytes(static_cast<std::uint32_t>(sum));
+}
+
+std::string plain_table() {
+  std::string text = "t,x,y,z,qw,qx,qy,qz\n";
+  for (int i = 0; i < kFrames; ++i) {
+    const Pose at = pose(i);
+    if (i == kLost) continue;
+    text += numbers("", {0.01 * i}, 3) +
+            numbers(",", {at.p.x(), at.p.y(), at.p.z(), at.q.w(), at.q.x(), at.q.y(), at.q.z()}) + "\n";
+  }
+  return text;
+}
+
+TEST(Exports, OneFlightInElevenFilesIsOneMotion) {
+  const std::string field = "time = \"field\"\ntime_field = \"t\"\n", body = "body = \"robot\"\n",
+                    arrays = field +
+                             "columns = { x_m = \"position[0]\", y_m = \"position[1]\", z_m = \"position[2]\", qw = "
+                             "\"q[0]\", qx = \"q[1]\", qy = \"q[2]\", qz = \"q[3]\" }\n";
+  // text has 9 digits; singles have 24 bits, which turn markers 5 cm apart by 2^-24 * 1.5 / 0.05 each
+  constexpr double kText = 1e-8, kSingle = 2e-7, kSingleMarkers = 4 * 1.5 / 0.05 * 6e-8;
+  struct File {
+    std::string name, text, channel, mapping;
+    double tolerance;
+  };
+  const std::vector<File> files = {
+      {"take.csv", motive("1.23", "Quaternion", "Meters"), "take", kYUp, kText},
+      {"take.csv", motive_markers(), "take", "world = \"enu\"\n" + kInBody, kText},
+      {"take.tsv", qtm_3d(true), "take", kInBody, kText},
+      {"take.tsv", qtm(true, true), "take", body, kText},
+      {"take.csv", vicon("Objects", "Quaternion", ""), "take", body, kText},
+      {"take.c3d", c3d(), "take", "world = \"enu\"\n" + kInBody, kSingleMarkers},
+      {"take.mat", matlab(false), "flight", arrays, 1e-12},
+      {"take.mat", "", "flight", arrays, 1e-12},  // version 7.3
+      {"log.bin", dataflash(), "POSE", kPose, kSingle},
+      {"log00", usdlog(), "estPose", kPose, kSingle},
+      {"camera.csv", plain_table(), "camera", field + kPose, kText},
+  };
+  ASSERT_EQ(files.size(), 11u);
+  for (const File& file : files) {
+    SCOPED_TRACE(file.name + file.text.substr(0, 60));
+    Recording r;
+    if (file.text.empty()) write_matlab_73(r.place(file.name));
+    else r.add(file.name, file.text);
+    expect_motion(r.import(stream(file.mapping, file.channel)), file.tolerance);
+    EXPECT_EQ(r.warnings, Lines());
+  }
+  Recording packed;  // version 7
+  packed.add("take.mat", matlab(true));
+  expect_motion(packed.import(stream(arrays, "flight")), 1e-12);
+  Recording c3d_without_up;
+  c3d_without_up.add("take.c3d", c3d());
+  EXPECT_EQ(c3d_without_up.refusal(stream("") + kInBody),
+            "m.toml:11:1: mocap.world: is missing: C3D's files do not say which axis is up; accepted: \"enu\" (z up), "
+            "\"y_up\"");
 }
 
 }  // namespace

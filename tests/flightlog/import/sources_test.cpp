@@ -152,6 +152,14 @@ TEST(Sources, SayWhatOtherFilesAre) {
                 ", as made by: blackbox_decode FILE, of that firmware's blackbox-tools");
   EXPECT_EQ(refusal("take.mat.gz", gzipped("MATLAB 5.0 MAT-file, Platform: GLNXA64")),
             ": is a MATLAB file compressed by gzip" + accepted + ", as made by: gunzip FILE");
+  // one variable "t" of 1 x 1: kind, rows, columns, whether complex, letters of the name
+  for (const std::string& first : {std::string("\0\0\0\0\1\0\0\0\1\0\0\0\0\0\0\0\2\0\0\0", 20),
+                                   std::string("\0\0\3\xE8\0\0\0\1\0\0\0\1\0\0\0\0\0\0\0\2", 20)})
+    EXPECT_EQ(refusal("old.mat", first + std::string("t\0", 2) + std::string(8, '\0')),
+              ": is a MATLAB file of version 4" + accepted + ", as made by: save with -v7");
+  EXPECT_EQ(refusal("old.mat", "# Created by Octave 8.4.0, Mon May 04 10:15:00 2026 UTC\n# name: t\n"),
+            ": is a text file of Octave" + accepted + ", as made by: save -v7 FILE");
+  EXPECT_EQ(refusal("LOG00001.BFL", "H Data version:2\n"), ": does not begin as a .bfl file" + accepted);
   EXPECT_EQ(refusal("any.zip", "any bytes"), ": does not begin as a .zip file" + accepted);
   EXPECT_EQ(refusal("bytes.csv", std::string("t,x\n\0\1", 6)), ": holds bytes that are no text" + accepted);
   EXPECT_EQ(refusal("bag.mcap.gz", gzipped("\x89MCAP0\r\n...")),

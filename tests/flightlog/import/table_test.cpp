@@ -52,6 +52,40 @@ TEST(Table, ReadsWhatSeparatesCells) {
   expect_rows("t,x\r0.5,9\r0.75,-2e-3\r");
 }
 
+TEST(Table, FindsNamesBelowIdsAndEmptyRows) {
+  expect_rows(",Body,Body\n,robot,robot\n,1,1\n,Position,Position\nt,x,y\n0.5,9,0\n0.75,-2e-3,0\n");
+  expect_rows("Name,hover,Date,today,Who,me\n,,\nt,x\n0.5,9\n0.75,-2e-3\n,\n");
+  expect_rows(
+      "Channels\t7\t\nSamples\t40\t40\nDate\t2026/05/04\t2026/05/04\n***\t\t\nt\tx\ty\n0.5\t9\t1\n0.75\t-2e-3\t1\n");
+}
+
+TEST(Table, ReadsListsAsTheyArePrinted) {
+  const auto second = [](const std::string& cell) {
+    Channels channels(Wanted{{"f", std::set<std::string>{"p[1]"}}});
+    Lines warnings;
+    read_table("t,p\n1," + cell + "\n2," + cell + "\n", "f.csv", "f", channels, warnings);
+    return channels.find("f")->column("p[1]")->at(1);
+  };
+  for (const char* cell :
+       {"\"[1, 2.5]\"", "[1 2.5]", "(1;2.5)", "\"{1,2.5}\"", "\"array([1, 2.5])\"", "\"[[1, 2.5]]\"",
+        "\"[np.float64(1), np.float64(2.5)]\"", "\"array('d', [1, 2.5])\"", "\"array([1, 2.5], dtype=float32)\""})
+    EXPECT_EQ(second(cell), 2.5) << cell;
+  for (const char* cell : {"[1 2.5", "[1 2.5)", "array(1)", "\"1, 2.5\""})
+    EXPECT_TRUE(std::isinf(second(cell))) << cell;
+}
+
+TEST(Table, TakesUnitsInNames) {
+  Channels channels;
+  Lines warnings;
+  read_table("time [us],x (mm),pitch(deg),y [px],q[1]\n1,2,3,4,5\n2,2,3,4,5\n", "f.csv", "f", channels, warnings);
+  const Channel& found = *channels.find("f");
+  EXPECT_EQ(found.unit("time [us]"), "us");
+  EXPECT_EQ(found.unit("x (mm)"), "mm");
+  EXPECT_EQ(found.unit("pitch(deg)"), "deg");
+  EXPECT_EQ(found.unit("y [px]"), "");
+  EXPECT_EQ(found.unit("q[1]"), "");
+}
+
 TEST(Table, ReadsQuotes) {
   expect_rows("\"t\",\"x\"\n0.5,9\n0.75,-2e-3\n");
   expect_rows("\"t\",\"x\"\n\"0.5\",\"9\"\n\"0.75\",\"-2e-3\"\n");
@@ -196,6 +230,9 @@ TEST(Table, ReadsDatesAndTimesOfDayWhereATimeIsWanted) {
   // 2026-05-04 is 20,577 days after 1970-01-01 (date -u -d 2026-05-04 +%s)
   constexpr double kMidnight = 1777852800;
   EXPECT_EQ(days("2026-05-04"), kMidnight);
+  EXPECT_EQ(days("2026/05/04"), kMidnight);
+  EXPECT_EQ(days("04.05.2026"), kMidnight);
+  EXPECT_EQ(days("04.05.2026 10:15:00"), kMidnight + 36900);
   EXPECT_EQ(days("2026-05-04T10:15:00"), kMidnight + 36900);
   EXPECT_EQ(days("2026-05-04 10:15:00.25"), kMidnight + 36900.25);
   EXPECT_EQ(days("2026-05-04T10:15:00,5Z"), kMidnight + 36900.5);
@@ -204,7 +241,7 @@ TEST(Table, ReadsDatesAndTimesOfDayWhereATimeIsWanted) {
   EXPECT_EQ(days("10:15:00.125"), 36900.125);
   EXPECT_EQ(days("1777852800.5"), kMidnight + 0.5);
   for (const char* none : {"2026-13-04", "2026-02-30", "2026-05-04T10", "2026-05-04T10:61", "2026-05-04T10:15+2",
-                           "04.05.2026", "10:15:00 AM"})
+                           "04/05/2026", "10:15:00 AM"})
     EXPECT_EQ(days(none), kInfinity) << none;
   // two columns; and where no time is wanted, a date is no number
   const Channels two = whole("day clock x\n2026-05-04 10:15:00.5 1\n", {"day", "clock", "x"});
