@@ -180,11 +180,7 @@ TEST(Matlab, OutlivesAnyDamage) {
   std::mt19937 random(1);
   const auto below = [&](std::size_t n) { return std::uniform_int_distribution<std::size_t>(0, n - 1)(random); };
   std::size_t refused = 0, warned = 0;
-#ifdef __SANITIZE_ADDRESS__  // which makes each child slow
-  constexpr int kDamages = 20;
-#else
   constexpr int kDamages = 200;
-#endif
   for (int i = 0; i < kDamages; ++i) {
     std::string bytes = whole[i % 3];
     if (i % 4 == 0) bytes.resize(below(bytes.size()));

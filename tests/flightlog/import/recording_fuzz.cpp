@@ -1,12 +1,15 @@
-// Any bytes must be read as a recording as far as they go, or refused: MCAP, messages in CDR with their definitions, ULog, usdlog. The
-// first byte says which. Built with libFuzzer (FLAPPY_LIBFUZZER) this searches for bytes that break it; otherwise it replays the files
-// and folders it is given.
+// Any bytes must be read as a recording as far as they go, or refused: MCAP, messages in CDR with their definitions, ULog,
+// usdlog, DataFlash, C3D, tables and exports of motion capture. The first byte says which. Built with libFuzzer
+// (FLAPPY_LIBFUZZER) this searches for bytes that break it; otherwise it replays the files and folders it is given.
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <string_view>
 
+#include "flightlog/import/c3d.hpp"
+#include "flightlog/import/dataflash.hpp"
 #include "flightlog/import/message_rows.hpp"
+#include "flightlog/import/table.hpp"
 #include "flightlog/import/ulog.hpp"
 #include "flightlog/import/usdlog.hpp"
 #include "flightlog/ros/bag.hpp"
@@ -53,6 +56,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     if (data[0] == 'm') read_mcap(bytes);
     if (data[0] == 'c') read_message(bytes);
+    Channels all;
+    std::vector<std::string> ignored;
+    if (data[0] == 'f' && is_dataflash(bytes)) read_dataflash(bytes, "fuzz", all, ignored);
+    if (data[0] == 'l' && is_dataflash_text(bytes)) read_dataflash_text(bytes, "fuzz", all, ignored);
+    if (data[0] == '3' && is_c3d(bytes)) read_c3d(bytes, "fuzz", "fuzz", all, ignored);
+    if (data[0] == 't') read_table(bytes, "fuzz", "fuzz", all, ignored);
     if (data[0] == 'u' || (data[0] == 'd' && is_usdlog(bytes))) {
       Channels channels;
       std::vector<std::string> warnings;

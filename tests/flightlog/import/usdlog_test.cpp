@@ -4,6 +4,7 @@
 #include <zlib.h>
 
 #include <cmath>
+#include <map>
 
 #include "flightlog/import/ulogs.hpp"
 #include "refusal.hpp"
@@ -66,6 +67,36 @@ TEST(Usdlog, ReadsSeveralKindsOfEvents) {
   EXPECT_EQ(other.stamp_ns(), (std::vector<std::int64_t>{12'345'000}));
   EXPECT_EQ(*other.column("idA"), (std::vector<double>{7}));
   EXPECT_EQ(*other.column("half"), (std::vector<double>{-2.5}));
+}
+
+/// Blocks of their own rates side by side: what the firmware logs on each event of its estimator and of its rotors.
+TEST(Usdlog, KeepsBlocksOfDifferentRatesApart) {
+  std::string text = "\xBC" + bytes(std::uint16_t{2}) + bytes(std::uint16_t{3}) + bytes(std::uint16_t{0}) +
+                     named("fixedFrequency") + bytes(std::uint16_t{1}) + named("acc.z(f)") + bytes(std::uint16_t{1}) +
+                     named("estPose") + bytes(std::uint16_t{2}) + named("x(f)") + named("qw(f)") +
+                     bytes(std::uint16_t{4}) + named("rpm") + bytes(std::uint16_t{2}) + named("m1(H)") + named("m2(H)");
+  std::map<std::string, std::vector<std::int64_t>> expected_ns;
+  for (std::uint64_t t_us = 0; t_us < 100'000; t_us += 500) {
+    const auto begin = [&](std::uint16_t id, const char* name) {
+      expected_ns[name].push_back(static_cast<std::int64_t>(1000 * t_us));
+      return bytes(id) + bytes(t_us);
+    };
+    const auto t_s = static_cast<float>(1e-6 * static_cast<double>(t_us));
+    if (t_us % 2000 == 0) text += begin(0, "fixedFrequency") + bytes(9.81f + t_s);
+    if (t_us % 9500 == 0) text += begin(1, "estPose") + bytes(t_s) + bytes(1.0f);
+    if (t_us % 1500 == 0)
+      text += begin(4, "rpm") + bytes(static_cast<std::uint16_t>(t_us / 100)) + bytes(std::uint16_t{7});
+  }
+  Lines warnings;
+  const Channels channels = read(with_checksum(text), &warnings);
+  EXPECT_EQ(warnings, Lines());
+  EXPECT_EQ(channels.names(), (Lines{"estPose", "fixedFrequency", "rpm"}));
+  for (const auto& [name, stamps_ns] : expected_ns) EXPECT_EQ(channels.find(name)->stamp_ns(), stamps_ns) << name;
+  const auto& x_m = *channels.find("estPose")->column("x");
+  const auto& m1_rpm = *channels.find("rpm")->column("m1");
+  for (std::size_t k = 0; k < x_m.size(); ++k) EXPECT_NEAR(x_m[k], 0.0095 * static_cast<double>(k), 1e-8);
+  for (std::size_t k = 0; k < m1_rpm.size(); ++k) EXPECT_EQ(m1_rpm[k], 15.0 * static_cast<double>(k));
+  EXPECT_EQ(channels.find("fixedFrequency")->column("m1"), nullptr);
 }
 
 TEST(Usdlog, TimesOfVersionOneAreMilliseconds) {
