@@ -298,7 +298,7 @@ TEST(Exports, OfMotiveMayBeSavedByASpreadsheet) {
   std::string filled = replaced(plain, "Global\r\n\r\n", "Global,,,,,,,,\r\n" + std::string(30, ',') + "\r\n");
   expect_motion_of("take.csv", filled, kYUp);
   std::string more = "Global";  // wider than the table
-  for (int k = 0; k < 20; ++k) more += ",Key,value";
+  for (int k = 0; k < 20; ++k) more += io::format(",Key %d,value %d", k, k);
   expect_motion_of("take.csv", replaced(plain, "Global\r\n\r\n", more + "\r\n"), kYUp);
   for (const char* separator : {";", "\t"}) {
     expect_motion_of("take.csv", replaced(plain, ",", separator), kYUp);
