@@ -129,7 +129,7 @@ struct Smoother::Filtered {
   std::vector<Correction> correction;
 };
 
-Smoother::Smoother(const FlightLog& log, const std::filesystem::path& folder)
+Smoother::Smoother(const FlightLog& log, const std::filesystem::path& folder, bool with_covariance)
     : gravity_m_s2_(log.header.gravity_m_s2),
       longest_unseen_s_(kLongestUnseenFrames / log.header.mocap.rate_hz),
       arm_m_(log.header.imu.position_m.data()) {
@@ -141,7 +141,7 @@ Smoother::Smoother(const FlightLog& log, const std::filesystem::path& folder)
                          std::to_string(poses.size()) + " poses; accepted: streams that overlap");
   lay_nodes(poses);
   const Noise noise(log.header);
-  smooth(filter(poses, noise), noise);
+  smooth(filter(poses, noise), noise, with_covariance);
 }
 
 void Smoother::read_imu(const FlightLog& log) {
@@ -316,25 +316,27 @@ auto Smoother::filter(const std::vector<Pose>& poses, const Noise& noise) -> Fil
 }
 
 /// Goes backward with the adjoint lambda and its covariance Lambda: state + P lambda, covariance P - P Lambda P.
-void Smoother::smooth(const Filtered& filtered, const Noise& noise) {
+void Smoother::smooth(const Filtered& filtered, const Noise& noise, bool with_covariance) {
   Eigen::Matrix<double, 15, 1> lambda = Eigen::Matrix<double, 15, 1>::Zero();
   Covariance of_lambda = Covariance::Zero();
-  covariance_.resize(pose_node_.size());
+  if (with_covariance) covariance_.resize(pose_node_.size());
   std::size_t pose = pose_node_.size();
   for (std::size_t i = nodes_.size(); i-- > 0;) {
     const Covariance& p = filtered.covariance[i];
     displace(nodes_[i].state, p * lambda);
-    for (std::size_t k = pose; k-- > 0 && pose_node_[k] == i;) covariance_[k] = p - p * of_lambda * p;
+    for (std::size_t k = pose; with_covariance && k-- > 0 && pose_node_[k] == i;)
+      covariance_[k] = p - p * of_lambda * p;
     for (; pose > 1 && pose_node_[pose - 1] == i; --pose) {
       const Correction& c = filtered.correction[pose - 2];
       lambda += c.h.transpose() * (c.inverse * c.off - c.gain.transpose() * lambda);
+      if (!with_covariance) continue;
       const Covariance kept = Covariance::Identity() - c.gain * c.h;
       of_lambda = kept.transpose() * of_lambda * kept + c.h.transpose() * c.inverse * c.h;
     }
     if (i == 0) break;
     const Transition& f = filtered.transition[i - 1];
     lambda = f.transposed_of(lambda);
-    of_lambda = f.transposed_of(Covariance(f.transposed_of(of_lambda).transpose()));
+    if (with_covariance) of_lambda = f.transposed_of(Covariance(f.transposed_of(of_lambda).transpose()));
   }
   const State& first = nodes_.front().state;
   normalised_innovation_[2] = std::max((first.gyro_bias.array().square() / noise.gyro_bias_rad2_s2.array()).mean(),

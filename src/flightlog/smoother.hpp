@@ -38,8 +38,9 @@ class Smoother {
   using Covariance = Eigen::Matrix<double, 15, 15>;
 
   /// io::InputError, naming `folder`, for declared inputs in place of voltages (then a gyro may be missing), and where
-  /// fewer than two poses lie within the time of the IMU, latencies taken off.
-  Smoother(const FlightLog& log, const std::filesystem::path& folder);
+  /// fewer than two poses lie within the time of the IMU, latencies taken off. `with_covariance`: for covariance(); it
+  /// takes as long as all else.
+  Smoother(const FlightLog& log, const std::filesystem::path& folder, bool with_covariance = false);
 
   /// Time of the first and of the last pose that the IMU covers.
   double begin_s() const { return nodes_.front().t_s; }
@@ -63,7 +64,7 @@ class Smoother {
   TorsoMotion at(double t_s) const;
   Eigen::Vector3d gyro_bias_rad_s(double t_s) const { return nodes_[node_before(t_s)].state.gyro_bias; }
   Eigen::Vector3d accel_bias_m_s2(double t_s) const { return nodes_[node_before(t_s)].state.accel_bias; }
-  /// Covariance of the smoothed errors at pose `i`.
+  /// Covariance of the smoothed errors at pose `i`; only of a smoother made with it.
   const Covariance& covariance(std::size_t i) const { return covariance_[i]; }
 
   /// Whether the IMU has no gap in this time and motion capture none longer than four of its intervals.
@@ -96,7 +97,7 @@ class Smoother {
   std::vector<Pose> read_poses(const FlightLog& log) const;
   void lay_nodes(const std::vector<Pose>& poses);
   Filtered filter(const std::vector<Pose>& poses, const Noise& noise);
-  void smooth(const Filtered& filtered, const Noise& noise);
+  void smooth(const Filtered& filtered, const Noise& noise, bool with_covariance);
 
   Eigen::Vector3d mean(const SplineOfMeans& signal, double from_s, double to_s) const;
   std::size_t node_before(double t_s) const;

@@ -207,7 +207,7 @@ TEST(Smoother, CovariancesAreHonest) {
     Biases bias{sensors.three(), 0.2 * sensors.three()};
     for (int i = 0; i < 3; ++i) bias.gyro[i] *= h.imu.gyro_bias_sd_rad_s[static_cast<std::size_t>(i)];
     const flightlog::FlightLog log = sensors.log(h, 6, bias, true, 0.001);
-    const flightlog::Smoother smoother(log, "flight");
+    const flightlog::Smoother smoother(log, "flight", true);
     innovations[0] += smoother.angle_normalised_innovation() / kFlights;
     innovations[1] += smoother.position_normalised_innovation() / kFlights;
     const Motions m;
@@ -258,7 +258,7 @@ TEST(Smoother, GoesOnOverGaps) {
   for (auto* c :
        {&log.mocap.x_m, &log.mocap.y_m, &log.mocap.z_m, &log.mocap.qw, &log.mocap.qx, &log.mocap.qy, &log.mocap.qz})
     for (std::size_t i = 400; i < 405; ++i) (*c)[i] = (*c)[399];  // a tracker that repeats itself: 2.72 to 2.76 s
-  const flightlog::Smoother smoother(log, "flight");
+  const flightlog::Smoother smoother(log, "flight", true);
   EXPECT_FALSE(smoother.covers(0.9, 1.005));
   EXPECT_TRUE(smoother.covers(0.9, 0.995));
   EXPECT_TRUE(smoother.covers(1.03, 1.9));
@@ -336,7 +336,7 @@ TEST(Smoother, OfSimulatedFlightsHasHonestCovariances) {
   double bias_off = 0;
   for (const std::string name : {"0000", "0001", "0002", "0003"}) {
     const std::filesystem::path flight = options.log_folder / name;
-    const flightlog::Smoother smoother(flightlog::read_flight_log(flight), flight);
+    const flightlog::Smoother smoother(flightlog::read_flight_log(flight), flight, true);
     const io::CsvTable truth = io::read_csv(flight / "truth.csv");
     const auto at = [&](std::size_t row, const char* a, const char* b, const char* c) {
       return Vector3d(truth.column(a)[row], truth.column(b)[row], truth.column(c)[row]);

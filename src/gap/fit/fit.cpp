@@ -1,6 +1,7 @@
 #include "gap/fit/fit.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -69,24 +70,42 @@ Fit Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directio
     vehicles.push_back(hypothesis.vehicle(down));
   }
   const std::vector<VectorXd> shifts = around(hypothesis, at, directions, known, vehicles);
-  std::vector<Residuals> rows = residuals(*flights_, vehicles, threads_);
-  Fit l{at, std::move(directions), std::move(rows[0]), {}, known, 1, {}};
+  Fit l{at, std::move(directions), {}, {}, known, 1, {}};
   std::vector<std::size_t> flown;
   for (Index d = first; d < l.directions.reach.size(); ++d) {
     const BasisCoefficients* linear = linear_column(hypothesis, d);
     if (linear == nullptr) flown.push_back(l.columns.size());
     l.columns.push_back(linear == nullptr ? BasisCoefficients() : *linear);
   }
-  io::parallel_for(flown.size(), threads_, [&](std::size_t n) {
-    Residuals &up = rows[1 + 2 * n], &down = rows[2 + 2 * n];
+  // each residual is reduced as it comes; of two sides of a direction, by the one that comes second
+  struct Sides {
+    Residuals rows[2];
+    std::atomic<int> here = 0;
+  };
+  std::vector<Sides> sides(flown.size());
+  std::vector<SufficientStatistics> there(shifts.size());
+  for_residuals(*flights_, vehicles, threads_, [&](std::size_t i, Residuals rows) {
+    if (i == 0) {
+      l.residual = std::move(rows);
+      return;
+    }
+    const std::size_t n = (i - 1) / 2;
+    if (n >= sides.size()) {
+      if (!rows.empty()) there[i - 1 - 2 * sides.size()] = evidence_->statistics(rows);
+      return;
+    }
+    sides[n].rows[(i - 1) % 2] = std::move(rows);
+    if (sides[n].here.fetch_add(1) == 0) return;
+    Residuals up = std::move(sides[n].rows[0]);
+    const Residuals down = std::move(sides[n].rows[1]);
     if (up.empty() || down.empty() || !(spans[n] > 0)) return;
     for (std::size_t f = 0; f < up.size(); ++f)
-      for (std::size_t i = 0; i < up[f].size(); ++i) up[f][i] = (down[f][i] - up[f][i]) / spans[n];
+      for (std::size_t k = 0; k < up[f].size(); ++k) up[f][k] = (down[f][k] - up[f][k]) / spans[n];
     l.columns[flown[n]] = evidence_->basis_coefficients(up);
   });
   if (l.residual.empty()) return l;
   l.statistics = evidence_->statistics(l.residual);
-  average({rows.begin() + static_cast<std::ptrdiff_t>(rows.size() - shifts.size()), rows.end()}, shifts, l);
+  average(std::move(there), shifts, l);
   return l;
 }
 
@@ -120,14 +139,13 @@ std::vector<VectorXd> Fitter::around(const Hypothesis& hypothesis, const VectorX
 }
 
 /// The residual at one point is rough, so statistics are averaged over points around. The columns take each point back
-/// to the fit; nothing is averaged if one is missing.
-void Fitter::average(const std::vector<Residuals>& rows, const std::vector<VectorXd>& shifts, Fit& fit) const {
+/// to the fit; nothing is averaged if one is missing. `around`: statistics at the points, empty where a simulation
+/// diverges.
+void Fitter::average(std::vector<SufficientStatistics> around, const std::vector<VectorXd>& shifts, Fit& fit) const {
   for (Index d = 0; !shifts.empty() && d < shifts[0].size(); ++d)
     if (shifts[0][d] != 0 && fit.columns[static_cast<std::size_t>(d)].size() == 0) return;
-  std::vector<SufficientStatistics> around(rows.size());
-  io::parallel_for(rows.size(), threads_, [&](std::size_t i) {
-    if (rows[i].empty()) return;
-    around[i] = evidence_->statistics(rows[i]);
+  io::parallel_for(around.size(), threads_, [&](std::size_t i) {
+    if (around[i].sums.empty()) return;
     BasisCoefficients back = BasisCoefficients::Zero(kGroups, evidence_->basis().size());
     for (Index d = 0; d < shifts[i].size(); ++d)
       if (shifts[i][d] != 0) back += shifts[i][d] * fit.columns[static_cast<std::size_t>(d)];

@@ -177,7 +177,7 @@ class Fitter {
   std::vector<Eigen::VectorXd> around(const Hypothesis& hypothesis, const Eigen::VectorXd& at,
                                       const Directions& directions, const std::vector<BasisCoefficients>& known,
                                       std::vector<VehicleHypothesis>& vehicles) const;
-  void average(const std::vector<Residuals>& rows, const std::vector<Eigen::VectorXd>& shifts, Fit& fit) const;
+  void average(std::vector<SufficientStatistics> around, const std::vector<Eigen::VectorXd>& shifts, Fit& fit) const;
   Reduced reduce(const Fit& fit, const Regressors& regressors) const;
   Posterior solve(const Fit& fit, const Regressors& regressors, Reduced reduced, double damping = 0) const;
   double cost(const Regressors& nuisances, const Eigen::MatrixXd& sums, const SufficientStatistics& residual,

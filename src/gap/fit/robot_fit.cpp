@@ -404,10 +404,9 @@ void RobotFit::find_magnitudes() {
     for (VehicleHypothesis& v : s.further) vehicles.push_back(std::move(v));
     for (VehicleHypothesis& v : s.near) vehicles.push_back(std::move(v));
   }
-  std::vector<Residuals> rows = residuals(flights_, vehicles, threads_);
-  std::vector<BasisCoefficients> changes(rows.size());  // [vehicle] for the whole step
-  io::parallel_for(rows.size(), threads_, [&](std::size_t i) {
-    if (!rows[i].empty()) changes[i] = change(std::move(rows[i]), 1);
+  std::vector<BasisCoefficients> changes(vehicles.size());  // [vehicle] for the whole step
+  for_residuals(flights_, vehicles, threads_, [&](std::size_t i, Residuals rows) {
+    if (!rows.empty()) changes[i] = change(std::move(rows), 1);
   });
   std::size_t i = 0;
   for (const MagnitudeStep& s : steps) {
@@ -466,10 +465,9 @@ void RobotFit::find_nuisances() {
     steps.push_back(other ? -1 : 1);
     vehicles.push_back(other ? no_effects_.vehicle(parameters_.at, std::pair{d, -1.0}) : std::move(v));
   }
-  std::vector<Residuals> rows = residuals(flights_, vehicles, threads_);
-  std::vector<BasisCoefficients> changes(rows.size(), BasisCoefficients::Zero(kGroups, evidence().basis().size()));
-  io::parallel_for(rows.size(), threads_, [&](std::size_t i) {
-    if (!rows[i].empty()) changes[i] = change(std::move(rows[i]), steps[i]);
+  std::vector<BasisCoefficients> changes(vehicles.size(), BasisCoefficients::Zero(kGroups, evidence().basis().size()));
+  for_residuals(flights_, vehicles, threads_, [&](std::size_t i, Residuals rows) {
+    if (!rows.empty()) changes[i] = change(std::move(rows), steps[i]);
   });
   sensor_errors_.assign(changes.begin(), changes.begin() + static_cast<std::ptrdiff_t>(all.size()));
   minors_.assign(changes.begin() + static_cast<std::ptrdiff_t>(all.size()), changes.end());

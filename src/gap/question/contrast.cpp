@@ -173,11 +173,15 @@ VectorXd Contrast::next_effects(const Fitter& fitter, const Hypothesis& hypothes
   parameters.directions.axes.conservativeResize(Eigen::NoChange, shared);
   const Regressors r = fitter.regressors(parameters);
   const VectorXd prior_mean = r.prior_mean();
+  const auto reduced_by = [&](const Residuals& residual, const MatrixXd* known) {
+    return fitter.evidence().reduce(fitter.evidence().statistics(residual), r.columns, fitter.all_flights(), sd, known);
+  };
+  const auto k = static_cast<Index>(r.columns.size());
+  const MatrixXd known = reduced_by(fit.residual, nullptr).sums.topLeftCorner(k, k);
   std::vector<double> values(tries.size(), -std::numeric_limits<double>::infinity());
   io::parallel_for(tries.size(), fitter.threads(), [&](std::size_t i) {
     if (rest[i].empty()) return;
-    const Reduced reduced =
-        fitter.evidence().reduce(fitter.evidence().statistics(rest[i]), r.columns, fitter.all_flights(), sd);
+    const Reduced reduced = reduced_by(rest[i], &known);
     values[i] = Evidence::posterior(reduced, r.all, prior_mean, false).log_evidence -
                 0.5 * tries[i].tail(effects).squaredNorm();
   });

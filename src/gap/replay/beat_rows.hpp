@@ -26,6 +26,7 @@ class BeatProjection {
 
   std::size_t beats() const { return covered_.size(); }
   bool covers(std::size_t beat) const { return covered_[beat] != 0; }
+  bool operator==(const BeatProjection&) const = default;
   /// Adds the coefficients of `width` signals to `rows`, [beat][coefficient][signal], in covered beats. `samples`:
   /// [sample][signal].
   void project(const double* samples, std::size_t width, double* rows) const;
@@ -40,6 +41,7 @@ class BeatProjection {
   struct Weight {
     std::size_t sample, beat;
     double f[kCoefficients];
+    bool operator==(const Weight&) const = default;
   };
   std::vector<Weight> weights_;
   std::vector<char> covered_;

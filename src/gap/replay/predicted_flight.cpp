@@ -31,6 +31,23 @@ const char* channel_unit(int channel) {
   return channel < kRotateX ? "m/s^2" : "rad/s";
 }
 
+std::vector<Rows> PredictedFlight::compare(const std::vector<ComparedVehicle>& vehicles) const {
+  std::vector<Rows> list;
+  while (list.size() < vehicles.size()) {
+    const EffectValues& undone = vehicles[list.size()].undone;
+    std::vector<const VehicleHypothesis*> together;
+    for (std::size_t i = list.size(); i < vehicles.size() && vehicles[i].undone == undone; ++i)
+      together.push_back(vehicles[i].vehicle);
+    const std::shared_ptr<const PredictedFlight> other = undone.empty() ? nullptr : corrected(undone);
+    const PredictedFlight& seen = other ? *other : *this;
+    for (Rows& rows : seen.predict(together)) {
+      for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = seen.measured()[i] - rows[i];
+      list.push_back(std::move(rows));
+    }
+  }
+  return list;
+}
+
 FlightList Flights::all() const {
   FlightList list = references;
   list.insert(list.end(), tests.begin(), tests.end());

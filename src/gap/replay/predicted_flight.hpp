@@ -64,6 +64,12 @@ struct VehicleHypothesis {
   EffectValues file_effects;  ///< effects of the vehicle file: all that the vehicle has in reference flights
 };
 
+/// A vehicle as one lane of PredictedFlight::compare.
+struct ComparedVehicle {
+  const VehicleHypothesis* vehicle;
+  EffectValues undone;  ///< effects and errors of sensors that are undone in the log; none if beat-averaged
+};
+
 /// Kinds of functions of the regime (gap/evidence/evidence.hpp). Each has a prior of its own (Shares).
 enum class BasisFunction {
   constant,
@@ -125,8 +131,11 @@ class PredictedFlight {
   virtual const Rows& signal() const = 0;
   /// [vehicle] Rows that the sensors of each vehicle would have measured; empty if its simulation diverges. All effects
   /// of `vehicle` are simulated but, of a vehicle with wings, those of sensors, which are undone in the log instead
-  /// (corrected()). residuals() calls it.
+  /// (compare()).
   virtual std::vector<Rows> predict(const std::vector<const VehicleHypothesis*>& vehicles) const = 0;
+  /// [vehicle] What the flight measured, less what each vehicle predicts; empty if its simulation diverges. Takes as
+  /// many vehicles as predict(). residuals() calls it.
+  virtual std::vector<Rows> compare(const std::vector<ComparedVehicle>& vehicles) const;
   /// Rows that the declared noise of the sensors alone would give: one realisation for each seed.
   virtual Rows declared_noise(std::uint64_t seed) const = 0;
   /// Functions of the regime, without the constant, offsets of flights, and products(). RegimeBasis centres them.
@@ -143,8 +152,7 @@ class PredictedFlight {
   virtual bool is_averaged() const = 0;
   /// Null for beat-averaged vehicles.
   virtual const Recording* recording() const { return nullptr; }
-  /// The same beats with another log (Recording's second constructor). Null for beat-averaged vehicles. For
-  /// corrected(), and for tests.
+  /// The same beats with another log (Recording's second constructor). Null for beat-averaged vehicles. For tests.
   virtual std::shared_ptr<const PredictedFlight> with_log(const flightlog::FlightLog& /*log*/) const { return nullptr; }
   /// The same beats with the given effects and errors of sensors undone in the log. Null for beat-averaged vehicles,
   /// whose prediction includes the effects of their sensors.

@@ -77,6 +77,11 @@ Recording::Recording(const Recording& other, flightlog::FlightLog flight_log)
       begin_s(other.begin_s),
       last_s(other.last_s),
       beats(other.beats),
+      phase_t_s_(other.phase_t_s_),
+      phase_beats_(other.phase_beats_),
+      phase_offset_(other.phase_offset_),
+      phase_hz_(other.phase_hz_),
+      phase_from_s_(other.phase_from_s_),
       first_beat_(other.first_beat_) {
   if (!log.header.rig) smoother.emplace(log, other.name);
   prepare(name);
@@ -91,6 +96,13 @@ void Recording::prepare(const std::string& place) {
   read_voltages();
   find_phase();
   read_regimes();
+}
+
+void Recording::drop_streams() {
+  log.command = {}, log.imu = {}, log.mocap = {}, log.wings.reset();
+  smoother.reset();
+  for (std::vector<double>* times : {&end_s, &phase_t_s_, &phase_beats_}) *times = {};
+  force_m_s2 = {};
 }
 
 void Recording::lay_grid() {
@@ -204,7 +216,12 @@ void Recording::read_voltages() {
 /// The phase of the beat as logged, or that of the sine that fits the voltages best.
 void Recording::find_phase() {
   const flightlog::CommandStream& c = log.command;
-  if (c.phase_rad) {
+  // corrected clocks may move the grid by a step; the beats have to stay the same
+  const bool as_before = phase_from_s_.has_value(), found = as_before && (c.phase_rad || *phase_from_s_ == begin_s);
+  phase_from_s_ = begin_s;
+  if (found) {
+    // commands are the same in every copy
+  } else if (c.phase_rad) {
     double turns = 0;
     for (std::size_t i = 0; i < c.t_s.size(); ++i) {
       if (i > 0) turns += std::remainder((*c.phase_rad)[i] - (*c.phase_rad)[i - 1], kTurn) / kTurn;
@@ -233,10 +250,11 @@ void Recording::find_phase() {
       }
     }
   }
-  const bool as_before = beats > 0;  // corrected clocks may move the grid by a step; the beats have to stay the same
   if (!as_before) first_beat_ = std::floor(beat_at(begin_s));
-  phase_offset_ -= first_beat_;
-  for (double& b : phase_beats_) b -= first_beat_;
+  if (!found) {
+    phase_offset_ -= first_beat_;
+    for (double& b : phase_beats_) b -= first_beat_;
+  }
   double from_s = begin_s;
   for (std::size_t k = 0; k < intervals(); ++k) {
     beat.push_back(beat_at((from_s + end_s[k]) / 2));

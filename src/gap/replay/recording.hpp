@@ -48,7 +48,7 @@ struct Recording {
   double mass_kg = 0;             ///< of the robot, by the vehicle file
   Eigen::Vector3d inertia_kg_m2;  ///< moments of inertia of the torso, by the vehicle file
   flightlog::FlightLog log;
-  std::optional<flightlog::Smoother> smoother;  ///< none: the robot was clamped
+  std::optional<flightlog::Smoother> smoother;  ///< none: the robot was clamped, or drop_streams() was called
   sim::World world;
 
   // The grid: intervals of the IMU, each rounded to whole physics steps of kPredictionStep_s. A gap of the IMU is cut
@@ -82,7 +82,9 @@ struct Recording {
   /// were undone. Its times are those of regular clocks already (flightlog::on_its_clocks).
   Recording(const Recording& other, flightlog::FlightLog flight_log);
 
-  bool clamped() const { return !smoother; }
+  /// Frees the streams and the smoother, for a copy that is replayed only.
+  void drop_streams();
+  bool clamped() const { return log.header.rig.has_value(); }
   double interval_s(std::size_t k) const { return steps[k] * kPredictionStep_s; }
   std::size_t intervals() const { return steps.size(); }
   /// Time in beats since beat 0 began; its fraction is the phase of the beat. Negative before.
@@ -99,6 +101,7 @@ struct Recording {
   void read_regimes();
   std::vector<double> phase_t_s_, phase_beats_;  ///< unwrapped phase of the commands; empty: not logged
   double phase_offset_ = 0, phase_hz_ = 0;       ///< fitted to the voltages where no phase is logged
+  std::optional<double> phase_from_s_;           ///< begin_s for which these are; none: not found yet
   double first_beat_ = 0;                        ///< number, counted by the command's phase, of the beat that is beat 0
 };
 

@@ -13,11 +13,11 @@ using V = Lanes<Flown, kWidth<Flown>>;
 
 FLAPPY_INLINE V all(double x) { return V(static_cast<Flown>(x)); }
 
-FLAPPY_INLINE Vec3<V> vector(const double (&v)[3]) { return {all(v[0]), all(v[1]), all(v[2])}; }
-FLAPPY_INLINE Quaternion<V> quaternion(const double (&q)[4]) { return {all(q[0]), all(q[1]), all(q[2]), all(q[3])}; }
-
-FLAPPY_INLINE Vec3<V> load(Flown (*rows)[sim::kLanes<Flown>], int first) {
+FLAPPY_INLINE Vec3<V> load(const Flown (*rows)[sim::kLanes<Flown>], int first) {
   return {V::load(rows[0] + first), V::load(rows[1] + first), V::load(rows[2] + first)};
+}
+FLAPPY_INLINE Quaternion<V> load_quaternion(const Flown (*rows)[sim::kLanes<Flown>], int first) {
+  return {V::load(rows[0] + first), V::load(rows[1] + first), V::load(rows[2] + first), V::load(rows[3] + first)};
 }
 FLAPPY_INLINE void store(const Vec3<V>& v, Flown (*rows)[sim::kLanes<Flown>], int first) {
   v.x.store(rows[0] + first);
@@ -25,36 +25,36 @@ FLAPPY_INLINE void store(const Vec3<V>& v, Flown (*rows)[sim::kLanes<Flown>], in
   v.z.store(rows[2] + first);
 }
 
-void reset_block(sim::Block<Flown>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
-                 const double imu_position_m[3], double gravity_m_s2, ResetBlockState& kept) {
+void reset_block(sim::Block<Flown>& block, const TorsoRows* from, const TorsoRows& to, double interval_s,
+                 const Flown (*imu_position_m)[kVehicles], double gravity_m_s2, ResetBlockState& kept) {
   const V per_interval(1 / interval_s);
-  const Vec3<V> imu{all(imu_position_m[0]), all(imu_position_m[1]), all(imu_position_m[2])};
   for (int first = 0; first < sim::kLanes<Flown>; first += kWidth<Flown>) {
+    const Vec3<V> imu = load(imu_position_m, first);
+    const Quaternion<V> attitude = load_quaternion(to.attitude, first);
     const auto p = sim::load_rows<Parameters<V>>(block.parameters, first);
     auto x = sim::load_rows<State<V>>(block.state, first);
     if (from != nullptr) {
       const flight::Truth<V> flown = flight::truth_of(p, x);
-      const Quaternion<V> begin = quaternion(from->attitude);
+      const Quaternion<V> begin = load_quaternion(from->attitude, first);
       const Vec3<V> turn = flight::rotation_vector(flight::from_to(begin, flown.attitude));
       Vec3<V> force = per_interval * (flight::point_velocity(flown, imu) - load(kept.imu_velocity_m_s, first));
       force.z += all(gravity_m_s2);
       const Matrix3<V> halfway = rotation_matrix(rotated(begin, all(0.25) * turn));
-      const Vec3<V> missed =
-          per_interval * flight::rotation_vector(flight::from_to(flown.attitude, quaternion(to.attitude)));
+      const Vec3<V> missed = per_interval * flight::rotation_vector(flight::from_to(flown.attitude, attitude));
       store(all(-1) * per_interval * missed, kept.rows + kAngularAcceleration, first);
       store(transpose_times(halfway, force), kept.rows + kSpecificForce, first);
       x.left.stroke_rad.store(kept.rows[kStroke] + first);
       x.right.stroke_rad.store(kept.rows[kStroke + 1] + first);
       x.body_rate_rad_s = x.body_rate_rad_s + missed;
     } else {
-      x.body_rate_rad_s = vector(to.body_rate_rad_s);
+      x.body_rate_rad_s = load(to.body_rate_rad_s, first);
     }
-    x.position_m = vector(to.position_m);
-    x.attitude = quaternion(to.attitude);
+    x.position_m = load(to.position_m, first);
+    x.attitude = attitude;
     const Matrix3<V> R = rotation_matrix(x.attitude);
     const auto whole = whole_vehicle<V>(
         p, {place_wing<+1>(p.left, x.left, x.body_rate_rad_s), place_wing<-1>(p.right, x.right, x.body_rate_rad_s)});
-    const Vec3<V> velocity = vector(to.velocity_m_s);
+    const Vec3<V> velocity = load(to.velocity_m_s, first);
     x.com_velocity_m_s = velocity + R * (cross(x.body_rate_rad_s, whole.com) + whole.com_rate);
     store(velocity + R * cross(x.body_rate_rad_s, imu), kept.imu_velocity_m_s, first);
     sim::store_rows(x, block.state, first);

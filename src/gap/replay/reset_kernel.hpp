@@ -1,5 +1,6 @@
-// The reset at the end of an IMU interval, for a block of vehicles that replay one motion (reset_prediction.hpp).
-// Compiled for each instruction set. A lane is one vehicle of the block.
+// The reset at the end of an IMU interval, for a block of vehicles that replay one flight (reset_prediction.hpp). Each
+// has a recorded motion of its own, as errors of sensors that are undone in a log differ. Compiled for each instruction
+// set. A lane is one vehicle of the block.
 #pragma once
 
 #include "sim/block.hpp"
@@ -15,6 +16,14 @@ inline constexpr std::size_t kVehicles = sim::kLanes<Flown>;
 struct TorsoAt {
   double position_m[3] = {0, 0, 0}, attitude[4] = {1, 0, 0, 0}, velocity_m_s[3] = {0, 0, 0},
          body_rate_rad_s[3] = {0, 0, 0};
+};
+
+/// TorsoAt of each vehicle of a block.
+struct TorsoRows {
+  alignas(64) Flown position_m[3][kVehicles];  ///< [axis][lane]
+  alignas(64) Flown attitude[4][kVehicles];
+  alignas(64) Flown velocity_m_s[3][kVehicles];
+  alignas(64) Flown body_rate_rad_s[3][kVehicles];
 };
 
 /// Index of a row in ResetBlockState::rows: what the sensors of each vehicle would have measured over an interval.
@@ -34,9 +43,9 @@ struct ResetBlockState {
 /// Computes the rows of the interval from `from` to `to`, then resets every torso to the recorded motion at `to`; wings
 /// keep their state. The body rate is not set to the recorded one: the mean rate is added by which the simulated
 /// rotation fell short of the recorded attitude at `to`.
-/// `from` null: the start of a flight; no rows, and the body rate is the recorded one.
-using ResetBlock = void (*)(sim::Block<Flown>& block, const TorsoAt* from, const TorsoAt& to, double interval_s,
-                            const double imu_position_m[3], double gravity_m_s2, ResetBlockState& kept);
+/// `from` null: the start of a flight; no rows, and the body rate is the recorded one. `imu_position_m`: [axis][lane].
+using ResetBlock = void (*)(sim::Block<Flown>& block, const TorsoRows* from, const TorsoRows& to, double interval_s,
+                            const Flown (*imu_position_m)[kVehicles], double gravity_m_s2, ResetBlockState& kept);
 
 /// Loads of the wings on a held torso since the last call, and the momentum that its wings had then.
 struct ClampedBlockState {

@@ -252,19 +252,51 @@ bool ResetPrediction::covers(std::size_t beat, int channel) const {
   return imu_.covers(beat);
 }
 
+/// A vehicle, and the flight whose recorded motion it replays: this one, or a copy of it with errors undone.
+struct ResetPrediction::Lane {
+  const VehicleHypothesis* vehicle;
+  const ResetPrediction* seen;
+};
+
 struct ResetPrediction::Replay {
   std::vector<Flown> samples;  ///< [interval][signal][lane]
   std::vector<double> power;   ///< [sample of power.csv][metered][lane]
   std::array<bool, kVehicles> diverged{};
 };
 
-/// Lanes beyond the given vehicles repeat the last one.
-ResetPrediction::Replay ResetPrediction::replay(const std::vector<const VehicleHypothesis*>& vehicles) const {
+namespace {
+
+/// Recorded motion at a bound of intervals. `recordings`: [lane].
+void put_torso(const std::vector<const Recording*>& recordings, std::size_t bound, TorsoRows& rows) {
+  const bool one = std::ranges::all_of(recordings, [&](const Recording* r) { return r == recordings.front(); });
+  for (std::size_t lane = 0; lane < kVehicles; ++lane) {
+    const TorsoAt& t = recordings[lane]->torso[bound];
+    const auto put = [&](const auto& values, auto& to) {
+      for (std::size_t i = 0; i < std::size(values); ++i) {
+        if (one) std::fill_n(to[i], kVehicles, static_cast<Flown>(values[i]));
+        else to[i][lane] = static_cast<Flown>(values[i]);
+      }
+    };
+    put(t.position_m, rows.position_m);
+    put(t.attitude, rows.attitude);
+    put(t.velocity_m_s, rows.velocity_m_s);
+    put(t.body_rate_rad_s, rows.body_rate_rad_s);
+    if (one) return;
+  }
+}
+
+}  // namespace
+
+/// Lanes beyond the given ones repeat the last one.
+ResetPrediction::Replay ResetPrediction::replay(const std::vector<Lane>& lanes) const {
   const Recording& r = recording_;
   const ResetBlock reset = *reset_block_kernels[sim::place_of("")];
   const ClampedBlock clamped = *clamped_block_kernels[sim::place_of("")];
+  const auto lane_of = [&](std::size_t i) -> const Lane& { return lanes[std::min(i, lanes.size() - 1)]; };
   const auto driven = [&](std::size_t i) {
-    model::Vehicle vehicle = vehicles[std::min(i, vehicles.size() - 1)]->vehicle;
+    model::Vehicle vehicle = lane_of(i).vehicle->vehicle;
+    // they do not act in a simulation, but would have the block step as slowly as one with effects
+    for (const auto& [id, values] : sensor_effects(vehicle.effects)) vehicle.effects.erase(id);
     apply(r.log.header.changes, vehicle);
     vehicle.air_density_kg_m3 *= r.density_ratio;
     vehicle.driver.hold_s = kPredictionStep_s;
@@ -273,21 +305,27 @@ ResetPrediction::Replay ResetPrediction::replay(const std::vector<const VehicleH
   sim::Batch<Flown> batch(kVehicles, driven(0), {kPredictionStep_s, 1, r.world, {}});
   if (r.log.power) sim::storage_of(batch).keep_effects(0);  // the meter needs their rows
   std::vector<ShiftedVoltage> shifted;
+  std::vector<const Recording*> recordings;
+  alignas(64) Flown imu_m[3][kVehicles];
   for (std::size_t i = 0; i < kVehicles; ++i) {
     batch.set_vehicle(i, driven(i));
     batch.reset(i, {}, r.clamped() ? sim::Start::welded : sim::Start::flying);
     // the lag is that of the sensors of a flight
-    shifted.emplace_back(r.clamped() ? 0 : vehicles[std::min(i, vehicles.size() - 1)]->lag_s / kPredictionStep_s);
+    shifted.emplace_back(r.clamped() ? 0 : lane_of(i).vehicle->lag_s / kPredictionStep_s);
+    recordings.push_back(&lane_of(i).seen->recording_);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      imu_m[axis][i] = static_cast<Flown>(recordings[i]->log.header.imu.position_m[axis]);
   }
   auto& storage = sim::storage_of(batch);
   sim::Block<Flown>& block = storage.blocks[0];
   sim::StepPlan plan = storage.plan();
   plan.steps_per_update = 1;
   ResetBlockState kept;
-  const double* imu_m = r.log.header.imu.position_m.data();
+  TorsoRows torso[2];
   ClampedBlockState momenta;
+  put_torso(recordings, 0, torso[0]);
   if (r.clamped()) clamped(block, 0, momenta, kept);
-  else reset(block, nullptr, r.torso[0], 1, imu_m, r.world.gravity_m_s2, kept);
+  else reset(block, nullptr, torso[0], 1, imu_m, r.world.gravity_m_s2, kept);
 
   const int longest = *std::ranges::max_element(r.steps);
   std::vector<Flown> voltages_V(static_cast<std::size_t>(longest) * 2 * kVehicles);
@@ -314,7 +352,8 @@ ResetPrediction::Replay ResetPrediction::replay(const std::vector<const VehicleH
           kept.rows[kAngularAcceleration + i][lane] /= static_cast<Flown>(r.inertia_kg_m2[i]);
         }
     } else {
-      reset(block, &r.torso[k], r.torso[k + 1], r.interval_s(k), imu_m, r.world.gravity_m_s2, kept);
+      put_torso(recordings, k + 1, torso[(k + 1) % 2]);
+      reset(block, &torso[k % 2], torso[(k + 1) % 2], r.interval_s(k), imu_m, r.world.gravity_m_s2, kept);
     }
     std::copy_n(&kept.rows[0][0], kSample, &result.samples[k * kSample]);
     for (; metered < power_step_.size() && power_step_[metered] + 1 < step; ++metered) {
@@ -331,10 +370,10 @@ ResetPrediction::Replay ResetPrediction::replay(const std::vector<const VehicleH
   return result;
 }
 
-std::vector<Rows> ResetPrediction::predict(const std::vector<const VehicleHypothesis*>& vehicles) const {
+std::vector<Rows> ResetPrediction::fly(const std::vector<Lane>& lanes) const {
   const Recording& r = recording_;
   const ProjectBlock project = *project_block_kernels[sim::place_of("")];
-  const Replay seen = replay(vehicles);
+  const Replay seen = replay(lanes);
   std::vector<Flown> together(r.beats * kCoefficients * kSample, 0);
   imu_.for_each([&](std::size_t sample, std::size_t beat, const double(&weights)[kCoefficients]) {
     project(&seen.samples[sample * kSample], weights, kCoefficients, kSignals,
@@ -343,21 +382,60 @@ std::vector<Rows> ResetPrediction::predict(const std::vector<const VehicleHypoth
   Rows metered_together(r.log.power ? r.beats * kCoefficients * kMetered * kVehicles : 0, 0);
   if (r.log.power) power_.project(seen.power.data(), kMetered * kVehicles, metered_together.data());
   const Eigen::Matrix3Xd none = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(r.beats));
-  std::vector<Rows> result(vehicles.size());
-  for (std::size_t lane = 0; lane < vehicles.size(); ++lane) {
+  std::vector<Rows> result(lanes.size());
+  for (std::size_t lane = 0; lane < lanes.size(); ++lane) {
     if (seen.diverged[lane]) continue;
     Rows& rows = result[lane];
     rows.resize(r.beats * kRowsPerBeat);
     put_channels(together, r.beats, kSignals, kVehicles, lane, 0, rows);
-    if (!r.clamped()) smooth_forces(rows, none);
+    if (!r.clamped()) lanes[lane].seen->smooth_forces(rows, none);
     if (r.log.power) put_channels(metered_together, r.beats, kMetered, kVehicles, lane, kBattery, rows);
+  }
+  return result;
+}
+
+std::vector<Rows> ResetPrediction::predict(const std::vector<const VehicleHypothesis*>& vehicles) const {
+  std::vector<Lane> lanes;
+  for (const VehicleHypothesis* v : vehicles) lanes.push_back({v, this});
+  return fly(lanes);
+}
+
+bool ResetPrediction::shares_grid(const ResetPrediction& other) const {
+  return recording_.steps == other.recording_.steps && recording_.left_V == other.recording_.left_V &&
+         recording_.right_V == other.recording_.right_V && imu_ == other.imu_ && power_ == other.power_ &&
+         power_step_ == other.power_step_ && power_late_ == other.power_late_;
+}
+
+std::vector<Rows> ResetPrediction::compare(const std::vector<ComparedVehicle>& vehicles) const {
+  std::vector<std::shared_ptr<const ResetPrediction>> seen;
+  for (std::size_t i = 0; i < vehicles.size(); ++i)
+    seen.push_back(i > 0 && vehicles[i].undone == vehicles[i - 1].undone ? seen.back()
+                                                                         : without_errors(vehicles[i].undone));
+  std::vector<Rows> result(vehicles.size());
+  std::vector<char> flown(vehicles.size(), 0);
+  for (std::size_t first = 0; first < vehicles.size(); ++first) {
+    if (flown[first]) continue;
+    std::vector<Lane> lanes;
+    std::vector<std::size_t> of;
+    for (std::size_t i = first; i < vehicles.size(); ++i) {
+      if (flown[i] || (seen[i] != seen[first] && !seen[first]->shares_grid(*seen[i]))) continue;
+      lanes.push_back({vehicles[i].vehicle, seen[i].get()});
+      of.push_back(i);
+      flown[i] = 1;
+    }
+    std::vector<Rows> rows = seen[first]->fly(lanes);
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      const Rows& measured = seen[of[k]]->measured_;
+      for (std::size_t i = 0; i < rows[k].size(); ++i) rows[k][i] = measured[i] - rows[k][i];
+      result[of[k]] = std::move(rows[k]);
+    }
   }
   return result;
 }
 
 std::vector<ImuResidual> ResetPrediction::imu_residuals(const VehicleHypothesis& vehicle) const {
   const Recording& r = recording_;
-  const Replay seen = replay({&vehicle});
+  const Replay seen = replay(std::vector<Lane>{{&vehicle, this}});
   std::vector<ImuResidual> list;
   for (std::size_t k = 0; !seen.diverged[0] && k < r.intervals(); ++k) {
     const auto sample = r.smoother->imu_sample(r.end_s[k] - r.interval_s(k) / 2);
@@ -482,22 +560,36 @@ std::shared_ptr<const PredictedFlight> ResetPrediction::with_log(const flightlog
 void ResetPrediction::forget() const {
   PredictedFlight::forget();
   const std::scoped_lock lock(mutex_);
-  corrected_.clear();
+  undone_.clear();
+}
+
+EffectValues ResetPrediction::undone_of(EffectValues given) const {
+  if (recording_.clamped()) return {};  // it has none of these sensors
+  for (const std::string& id : recording_.log.header.changes.without) given.erase(id);
+  return given;
 }
 
 std::shared_ptr<const PredictedFlight> ResetPrediction::corrected(const EffectValues& given) const {
-  if (recording_.clamped()) return {std::shared_ptr<const PredictedFlight>(), this};  // it has none of these sensors
-  EffectValues sensors = given;
-  for (const std::string& id : recording_.log.header.changes.without) sensors.erase(id);
+  const EffectValues undone = undone_of(given);
+  if (undone.empty()) return {std::shared_ptr<const PredictedFlight>(), this};
+  return with_log(without(undone, recording_.log));
+}
+
+/// For compare(): this flight, or a copy that can be replayed.
+std::shared_ptr<const ResetPrediction> ResetPrediction::without_errors(const EffectValues& given) const {
+  const EffectValues undone = undone_of(given);
+  if (undone.empty()) return {std::shared_ptr<const ResetPrediction>(), this};
   {
     const std::scoped_lock lock(mutex_);
-    for (const auto& [effects, flight] : corrected_)
-      if (effects == sensors) return flight;
+    for (const auto& [effects, flight] : undone_)
+      if (effects == undone) return flight;
   }
-  std::shared_ptr<const PredictedFlight> flight = with_log(without(sensors, recording_.log));
+  const auto flight = std::make_shared<ResetPrediction>(Recording(recording_, without(undone, recording_.log)));
+  flight->recording_.drop_streams();
+  flight->signal_ = {};
   const std::scoped_lock lock(mutex_);
-  corrected_.emplace_front(sensors, flight);
-  if (corrected_.size() > kMaxCorrected) corrected_.pop_back();
+  undone_.emplace_front(undone, flight);
+  if (undone_.size() > kMaxUndone) undone_.pop_back();
   return flight;
 }
 

@@ -47,6 +47,9 @@ class ResetPrediction final : public PredictedFlight {
   const Rows& signal() const override { return signal_; }
   /// Takes 1 to kVehicles vehicles (reset_kernel.hpp). Changes that the log's header declares are made to each.
   std::vector<Rows> predict(const std::vector<const VehicleHypothesis*>& vehicles) const override;
+  /// Vehicles share a block even if different errors are undone for each, unless these move the grid or the beats that
+  /// count. Caches the last kMaxUndone logs; several threads may call it.
+  std::vector<Rows> compare(const std::vector<ComparedVehicle>& vehicles) const override;
   /// Residuals of single samples, for flappy-gap mcap: in valid intervals with a sample, once the wings have spun up;
   /// empty if the simulation diverges.
   std::vector<ImuResidual> imu_residuals(const VehicleHypothesis& vehicle) const;
@@ -58,20 +61,25 @@ class ResetPrediction final : public PredictedFlight {
   bool is_averaged() const override { return false; }
   const Recording* recording() const override { return &recording_; }
   std::shared_ptr<const PredictedFlight> with_log(const flightlog::FlightLog& log) const override;
-  /// Leaves alone what the log's header says the robot flew without. Caches the last kMaxCorrected results; several
-  /// threads may call it.
+  /// Leaves alone what the log's header says the robot flew without.
   std::shared_ptr<const PredictedFlight> corrected(const EffectValues& given) const override;
   void forget() const override;
-  /// Logs that are kept. Size: of a cache.
-  static constexpr std::size_t kMaxCorrected = 8;
+  /// Logs that are kept: a fit asks for that of its point again. Size: of a cache.
+  static constexpr std::size_t kMaxUndone = 2;
 
  private:
   /// value(recording, regime) of each beat.
   template <class Value>
   std::vector<double> each(const Value& value) const;
   Rows rows_of(const std::vector<double>& samples) const;
+  struct Lane;
   struct Replay;
-  Replay replay(const std::vector<const VehicleHypothesis*>& vehicles) const;
+  /// All lanes have the grid of this flight.
+  Replay replay(const std::vector<Lane>& lanes) const;
+  std::vector<Rows> fly(const std::vector<Lane>& lanes) const;
+  EffectValues undone_of(EffectValues given) const;
+  std::shared_ptr<const ResetPrediction> without_errors(const EffectValues& undone) const;
+  bool shares_grid(const ResetPrediction& other) const;
 
   void lay_power(std::size_t first_beat);
   void put_power(const std::vector<double>& samples, Rows& rows) const;
@@ -90,7 +98,8 @@ class ResetPrediction final : public PredictedFlight {
   std::vector<double> power_late_;
   Rows measured_, signal_;
   mutable std::mutex mutex_;
-  mutable std::deque<std::pair<EffectValues, std::shared_ptr<const PredictedFlight>>> corrected_;
+  /// Copies without streams (Recording::drop_streams), the latest first.
+  mutable std::deque<std::pair<EffectValues, std::shared_ptr<const ResetPrediction>>> undone_;
 };
 
 }  // namespace flappy::gap

@@ -4,8 +4,8 @@
 
 #include <deque>
 #include <map>
+#include <memory>
 #include <mutex>
-#include <optional>
 #include <tuple>
 #include <vector>
 
@@ -17,14 +17,16 @@ class ResidualMemo {
  public:
   /// VehicleHypothesis::variates, lag_s and sensors.
   using Key = std::tuple<std::vector<double>, double, EffectValues>;
-  /// The residual rows of the flight, empty if the simulation diverged; none: not known. All functions are thread-safe.
-  std::optional<std::vector<double>> find(const Key& key) const {
+  /// The residual rows of the flight, empty if the simulation diverged.
+  using Known = std::shared_ptr<const std::vector<double>>;
+  /// Null: not known. All functions are thread-safe.
+  Known find(const Key& key) const {
     const std::scoped_lock lock(mutex_);
     const auto at = known_.find(key);
-    return at == known_.end() ? std::nullopt : std::optional(at->second);
+    return at == known_.end() ? nullptr : at->second;
   }
   /// Forgets the oldest of more than kMaxKept.
-  void keep(const Key& key, std::vector<double> rows) {
+  void keep(const Key& key, Known rows) {
     const std::scoped_lock lock(mutex_);
     if (!known_.insert_or_assign(key, std::move(rows)).second) return;
     order_.push_back(key);
@@ -39,11 +41,11 @@ class ResidualMemo {
   }
 
  private:
-  /// A quarter of a megabyte each for a flight of 10 s; a linearisation of all parameters takes some 120. Size: of a
-  /// cache.
-  static constexpr std::size_t kMaxKept = 256;
+  /// Half a megabyte each for a flight of 10 s. The fits of effects ask again for the parameters and the points around
+  /// them, nine in all. Size: of a cache.
+  static constexpr std::size_t kMaxKept = 32;
   mutable std::mutex mutex_;
-  std::map<Key, std::vector<double>> known_;
+  std::map<Key, Known> known_;
   std::deque<Key> order_;
 };
 

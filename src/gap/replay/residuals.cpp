@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 #include <map>
+#include <numeric>
 
 #include "gap/replay/reset_kernel.hpp"
 #include "io/parallel.hpp"
@@ -10,20 +11,9 @@
 namespace flappy::gap {
 namespace {
 
-/// [vehicle][flight].
-std::vector<Residuals> predict_all(const FlightList& flights, const std::vector<const VehicleHypothesis*>& vehicles,
-                                   int threads) {
-  const std::size_t blocks = (vehicles.size() + kVehicles - 1) / kVehicles;
-  std::vector<Residuals> result(vehicles.size(), Residuals(flights.size()));
-  io::parallel_for(blocks * flights.size(), threads, [&](std::size_t job) {
-    const std::size_t flight = job % flights.size(), first = job / flights.size() * kVehicles;
-    const std::size_t last = std::min(first + kVehicles, vehicles.size());
-    std::vector<Rows> rows = flights[flight]->predict(
-        {vehicles.begin() + static_cast<std::ptrdiff_t>(first), vehicles.begin() + static_cast<std::ptrdiff_t>(last)});
-    for (std::size_t i = 0; i < rows.size(); ++i) result[first + i][flight] = std::move(rows[i]);
-  });
-  return result;
-}
+/// So many flights of a block has each thread to fly before residuals are used: more would need more memory, and with
+/// fewer, threads would wait for each other. Size: of a loop.
+constexpr std::size_t kJobsOfThread = 4;
 
 /// Errors undone in the log: none for a beat-averaged vehicle, which predicts with its effects of sensors.
 EffectValues sensors_of(const VehicleHypothesis& h) {
@@ -32,82 +22,86 @@ EffectValues sensors_of(const VehicleHypothesis& h) {
   return sensors;
 }
 
-/// With the effects of a vehicle in reference flights, too.
-std::vector<Residuals> residuals_with_effects(const FlightList& flights, const std::vector<VehicleHypothesis>& vehicles,
-                                              int threads) {
-  // vehicles with the same errors of sensors share a corrected log
-  std::map<EffectValues, std::vector<std::size_t>> by_sensors;
-  for (std::size_t i = 0; i < vehicles.size(); ++i) by_sensors[sensors_of(vehicles[i])].push_back(i);
-  std::vector<Residuals> list(vehicles.size());
-  const auto compare = [&](const FlightList& seen, const std::vector<std::size_t>& which, int at_once) {
-    std::vector<const VehicleHypothesis*> these;
-    for (const std::size_t i : which) these.push_back(&vehicles[i]);
-    std::vector<Residuals> predicted = predict_all(seen, these, at_once);
-    for (std::size_t k = 0; k < which.size(); ++k) {
-      Residuals& s = predicted[k];
-      const bool whole = std::ranges::none_of(s, [](const Rows& rows) { return rows.empty(); });
-      for (std::size_t f = 0; whole && f < seen.size(); ++f)
-        for (std::size_t i = 0; i < s[f].size(); ++i) s[f][i] = seen[f]->measured()[i] - s[f][i];
-      if (whole) list[which[k]] = std::move(s);
-    }
-  };
-  std::vector<std::pair<EffectValues, std::vector<std::size_t>>> corrected;
-  for (auto& [sensors, which] : by_sensors) {
-    if (sensors.empty()) compare(flights, which, threads);
-    else corrected.emplace_back(sensors, which);
-  }
-  // fewer corrected logs than threads: each log gets several threads for its flights
-  const int at_once =
-      std::max(1, io::thread_count(threads) / static_cast<int>(std::max<std::size_t>(1, corrected.size())));
-  io::parallel_for(corrected.size(), threads, [&](std::size_t k) {
-    FlightList seen(flights.size());
-    io::parallel_for(flights.size(), at_once,
-                     [&](std::size_t f) { seen[f] = flights[f]->corrected(corrected[k].first); });
-    compare(seen, corrected[k].second, at_once);
+/// Residuals of vehicles with their effects. Blocks are filled whatever the errors of the sensors.
+std::vector<Residuals> compare(const FlightList& flights, const std::vector<const VehicleHypothesis*>& vehicles,
+                               int threads) {
+  std::vector<ComparedVehicle> compared;
+  for (const VehicleHypothesis* v : vehicles) compared.push_back({v, sensors_of(*v)});
+  const std::size_t blocks = (vehicles.size() + kVehicles - 1) / kVehicles;
+  std::vector<Residuals> list(vehicles.size(), Residuals(flights.size()));
+  io::parallel_for(blocks * flights.size(), threads, [&](std::size_t job) {
+    const std::size_t flight = job % flights.size(), first = job / flights.size() * kVehicles;
+    const std::size_t last = std::min(first + kVehicles, vehicles.size());
+    std::vector<Rows> rows = flights[flight]->compare(
+        {compared.begin() + static_cast<std::ptrdiff_t>(first), compared.begin() + static_cast<std::ptrdiff_t>(last)});
+    for (std::size_t i = 0; i < rows.size(); ++i) list[first + i][flight] = std::move(rows[i]);
   });
   return list;
 }
 
-/// Residuals without the effects of the vehicles; those that are not known are computed and kept.
-std::vector<Residuals> residuals_of_references(const FlightList& references,
-                                               const std::vector<VehicleHypothesis>& vehicles, int threads) {
-  std::map<ResidualMemo::Key, Residuals> by_key;  // empty rows: not known, or a simulation that diverges
+/// Rows of all references.
+using OfReferences = std::vector<ResidualMemo::Known>;
+
+/// [vehicle] Without the effects of the vehicles; those that are not known are computed and kept.
+std::vector<OfReferences> compare_references(const FlightList& references,
+                                             const std::vector<const VehicleHypothesis*>& vehicles, int threads) {
+  const auto key = [](const VehicleHypothesis& v) { return ResidualMemo::Key{v.variates, v.lag_s, v.sensors}; };
+  std::map<ResidualMemo::Key, OfReferences> by_key;
   std::vector<VehicleHypothesis> open;
-  std::vector<Residuals*> of_open;
-  for (const VehicleHypothesis& v : vehicles) {
-    const auto [at, fresh] = by_key.try_emplace({v.variates, v.lag_s, v.sensors});
+  std::vector<OfReferences*> of_open;
+  for (const VehicleHypothesis* v : vehicles) {
+    const auto [at, fresh] = by_key.try_emplace(key(*v));
     if (!fresh) continue;
-    for (const auto& f : references)
-      if (std::optional<Rows> known = f->memo().find(at->first)) at->second.push_back(std::move(*known));
-    if (at->second.size() == references.size()) continue;
-    open.push_back(v);
-    open.back().vehicle.effects = v.file_effects;
+    for (const auto& f : references) at->second.push_back(f->memo().find(at->first));
+    if (std::ranges::none_of(at->second, [](const auto& known) { return known == nullptr; })) continue;
+    open.push_back(*v);
+    open.back().vehicle.effects = v->file_effects;
     of_open.push_back(&at->second);
   }
-  std::vector<Residuals> computed = residuals_with_effects(references, open, threads);
-  for (std::size_t i = 0; i < open.size(); ++i) {
-    *of_open[i] = computed[i].empty() ? Residuals(references.size()) : std::move(computed[i]);
-    for (std::size_t f = 0; f < references.size(); ++f)
-      references[f]->memo().keep({open[i].variates, open[i].lag_s, open[i].sensors}, (*of_open[i])[f]);
-  }
-  std::vector<Residuals> list;
-  for (const VehicleHypothesis& v : vehicles) {
-    list.push_back(by_key.at({v.variates, v.lag_s, v.sensors}));
-    if (std::ranges::any_of(list.back(), &Rows::empty)) list.back().clear();
-  }
+  std::vector<const VehicleHypothesis*> pointers;
+  for (const VehicleHypothesis& v : open) pointers.push_back(&v);
+  std::vector<Residuals> computed = compare(references, pointers, threads);
+  for (std::size_t i = 0; i < open.size(); ++i)
+    for (std::size_t f = 0; f < references.size(); ++f) {
+      (*of_open[i])[f] = std::make_shared<const Rows>(std::move(computed[i][f]));
+      references[f]->memo().keep(key(open[i]), (*of_open[i])[f]);
+    }
+  std::vector<OfReferences> list;
+  for (const VehicleHypothesis* v : vehicles) list.push_back(by_key.at(key(*v)));
   return list;
 }
 
 }  // namespace
 
-std::vector<Residuals> residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads) {
-  std::vector<Residuals> list = residuals_of_references(flights.references, vehicles, threads);
-  std::vector<Residuals> of_tests = residuals_with_effects(flights.tests, vehicles, threads);
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    const bool diverged = list[i].size() < flights.references.size() || of_tests[i].size() < flights.tests.size();
-    if (diverged) list[i].clear();
-    else std::ranges::move(of_tests[i], std::back_inserter(list[i]));
+void for_residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads,
+                   const std::function<void(std::size_t, Residuals)>& use) {
+  // vehicles without effects first: a block steps faster if none of its vehicles has an effect
+  std::vector<std::size_t> order(vehicles.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_partition(order, [&](std::size_t i) {
+    return sensor_effects(vehicles[i].vehicle.effects).size() == vehicles[i].vehicle.effects.size();
+  });
+  const std::size_t flown = (flights.tests.empty() ? flights.references : flights.tests).size(),
+                    jobs = kJobsOfThread * static_cast<std::size_t>(io::thread_count(threads));
+  const std::size_t at_once = std::max<std::size_t>(1, jobs / std::max<std::size_t>(1, flown)) * kVehicles;
+  for (std::size_t first = 0; first < order.size(); first += at_once) {
+    std::vector<const VehicleHypothesis*> these;
+    for (std::size_t i = first; i < std::min(first + at_once, order.size()); ++i) these.push_back(&vehicles[order[i]]);
+    const std::vector<OfReferences> of_references = compare_references(flights.references, these, threads);
+    std::vector<Residuals> of_tests = compare(flights.tests, these, threads);
+    io::parallel_for(these.size(), threads, [&](std::size_t i) {
+      Residuals all;
+      for (const auto& rows : of_references[i]) all.push_back(*rows);
+      std::ranges::move(of_tests[i], std::back_inserter(all));
+      if (std::ranges::any_of(all, &Rows::empty)) all.clear();
+      use(order[first + i], std::move(all));
+    });
   }
+}
+
+std::vector<Residuals> residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads) {
+  std::vector<Residuals> list(vehicles.size());
+  for_residuals(flights, vehicles, threads, [&](std::size_t i, Residuals residual) { list[i] = std::move(residual); });
   return list;
 }
 

@@ -1,6 +1,8 @@
 // What flights measured less what vehicles predict, row by row: all fits and tests of a diagnosis compare by this.
 #pragma once
 
+#include <functional>
+
 #include "gap/replay/predicted_flight.hpp"
 
 namespace flappy::gap {
@@ -19,6 +21,10 @@ using TestResiduals = std::vector<Rows>;
 /// vehicles of the same variates must have the same parameters.
 /// `threads`: as for io::parallel_for.
 std::vector<Residuals> residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads);
+/// The same, a few blocks of vehicles after another, so that not all residuals are in memory: calls use(vehicle, its
+/// residuals) for each, in any order, and on several threads at once.
+void for_residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads,
+                   const std::function<void(std::size_t, Residuals)>& use);
 /// Drops the reference flights. `residual` must not be empty.
 TestResiduals tests_of(const Flights& flights, Residuals residual);
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "gap/flown_flights.hpp"
+#include "gap/replay/residuals.hpp"
 
 namespace flappy::gap::reset_prediction_test {
 namespace {
@@ -51,6 +52,59 @@ TEST(ResetPrediction, MeanForcesAreThoseOfMotionCapture) {
   };
   EXPECT_NEAR(mean(*wrong, kPathZ) - mean(*flights[0], kPathZ), -kError_m_s2, 0.02 * kError_m_s2);
   EXPECT_NEAR(mean(*wrong, kSpecificForceZ) - mean(*flights[0], kSpecificForceZ), 0, 0.02 * kError_m_s2);
+}
+
+// Vehicles share blocks and logs are kept; still each is compared with the log in which its own errors are undone, and
+// whose grid is its own.
+TEST(ResetPrediction, ComparesEachVehicleWithItsOwnLog) {
+  const Flights flights = flown("hummingbird_nominal", {"flight.duration_s=2.5"});
+  const PredictedFlight& flight = *flights[0];
+  const VehicleHypothesis it{nominal_vehicle(), 0};
+  VehicleHypothesis heavy = it, windy = it, late = it;
+  heavy.vehicle.torso.mass_kg *= 1.1;
+  windy.vehicle.effects["wind"] = {{"x_m_s", 0.3}, {"y_m_s", 0}, {"z_m_s", 0}, {"gust_m_s", 0}, {"gust_time_s", 0.5}};
+  late.lag_s = 4e-4;
+  const EffectValues turned = {{"imu_mounting", {{"x_rad", 0.02}, {"y_rad", 0}, {"z_rad", 0}}}},
+                     turned_more = {{"imu_mounting", {{"x_rad", 0.04}, {"y_rad", 0}, {"z_rad", 0}}}},
+                     moved = {{"imu_place", {{"x_m", 0.01}, {"y_m", 0}, {"z_m", 0}}}},
+                     delayed = {{"mocap_delay", {{"delay_s", 0.004}}}}, slowed = {{"imu_clock", {{"rate", 2e-3}}}};
+  const std::vector<ComparedVehicle> all = {{&it, {}},        {&it, turned}, {&heavy, turned}, {&it, turned_more},
+                                            {&windy, moved},  {&late, {}},   {&it, delayed},   {&it, slowed},
+                                            {&heavy, slowed}, {&it, moved},  {&heavy, {}}};
+  for (int round = 0; round < 2; ++round) {  // the second time, the last logs are known
+    const std::vector<Rows> rows = flight.compare(all);
+    ASSERT_EQ(rows.size(), all.size());
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const auto own = all[i].undone.empty() ? nullptr : flight.corrected(all[i].undone);
+      const PredictedFlight& seen = own ? *own : flight;
+      Rows alone = seen.predict({all[i].vehicle})[0];
+      for (std::size_t k = 0; k < alone.size(); ++k) alone[k] = seen.measured()[k] - alone[k];
+      EXPECT_EQ(rows[i], alone) << i;
+      for (std::size_t k = 0; k < i; ++k) EXPECT_NE(rows[i], rows[k]) << i << " " << k;
+    }
+  }
+}
+
+// References remember residuals; two robots of other parameters, lags or errors of sensors have their own.
+TEST(ResetPrediction, ReferencesRememberEachRobotsResidualsAlone) {
+  const Flights flown_once = flown("hummingbird_nominal", {"flight.duration_s=2.5"});
+  const Flights reference{flown_once.tests, {}}, again{{flown_once[0]->with_log(flown_once[0]->recording()->log)}, {}};
+  VehicleHypothesis it{nominal_vehicle(), 0};
+  it.variates = {0};
+  std::vector<VehicleHypothesis> all(5, it);
+  all[1].vehicle.torso.mass_kg *= 1.1;
+  all[1].variates = {1};
+  all[2].lag_s = 4e-4;
+  all[3].sensors = {{"imu_place", {{"x_m", 0.01}, {"y_m", 0}, {"z_m", 0}}}};
+  all[4].vehicle.effects["wind"] = {
+      {"x_m_s", 0.3}, {"y_m_s", 0}, {"z_m_s", 0}, {"gust_m_s", 0}, {"gust_time_s", 0.5}};  // not in references
+  const std::vector<Residuals> together = residuals(reference, all, 2);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    EXPECT_EQ(residuals(reference, {all[i]}, 1).front(), together[i]) << i;
+    again[0]->forget();
+    EXPECT_EQ(residuals(again, {all[i]}, 1).front(), together[i]) << i;
+    for (std::size_t k = 0; k < i; ++k) EXPECT_EQ(together[i] == together[k], k == 0 && i == 4) << i << " " << k;
+  }
 }
 
 }  // namespace
