@@ -189,7 +189,7 @@ bool find_changes_over_noise(const ScoreCommand& command, Bench& bench) {
       });
   if (!all) return false;
   for (const std::size_t i : asked)
-    if (const Json& change = read_json(file_of(i)).at("change_over_noise"); !change.is_null())
+    if (const Json change = read_json(file_of(i)).at("change_over_noise"); !change.is_null())
       bench.cases[i].change_over_noise = change.get<double>();
   return true;
 }
