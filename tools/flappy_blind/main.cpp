@@ -250,6 +250,7 @@ int main(int argc, char** argv) {
       .range(std::size_t{1}, blind::Family::kFlights)
       .needs(contrast)
       .shows_default();
+  make.option("--effects", made.plan.effects, "of robots that changed, with --contrast: these alone").needs(contrast);
   make.flag("--bench", made.plan.bench, "robots are clamped to a force sensor and filmed, with --contrast")
       .needs(contrast);
   make.option("--vehicle", made.vehicle, "the robot as declared").shows_default();

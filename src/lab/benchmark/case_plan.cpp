@@ -222,6 +222,9 @@ class Planner {
     for (const auto& [id, d] : of_)
       if (!id.starts_with("outside_")) all.push_back(id);
     shuffle(all);
+    for (const std::string& id : options_.effects)
+      if (!std::ranges::count(all, id))
+        throw io::InputError("--effects " + id + ": no effect of the catalogue; accepted: " + io::joined(all));
     if (!options_.effects.empty())
       std::erase_if(all, [&](const std::string& id) { return !std::ranges::count(options_.effects, id); });
     random_.seed(first_seed_);
