@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <set>
 
 #include "io/files.hpp"
@@ -38,18 +39,21 @@ struct Range {
 
 }  // namespace
 
-void check_same_streams(const std::vector<flightlog::FlightLog>& logs, const std::vector<std::string>& folders) {
-  for (std::size_t f = 1; f < logs.size(); ++f) {
-    const auto check = [&](const char* file, bool first, bool here) {
-      if (first != here)
-        throw io::InputError(folders[f] + ": has " + (here ? "" : "no ") + file + ", but " + folders[0] + " has " +
-                             (first ? "it" : "none") + "; accepted: flights with the same streams");
-    };
-    check("power.csv", logs[0].power.has_value(), logs[f].power.has_value());
-    check("wings.csv", logs[0].wings.has_value(), logs[f].wings.has_value());
-    check("forces.csv", logs[0].header.rig.has_value(), logs[f].header.rig.has_value());
-    check("imu.csv", logs[0].header.imu.rate_hz > 0, logs[f].header.imu.rate_hz > 0);
-  }
+void check_same_streams(const std::vector<flightlog::FlightLog>& logs, const std::vector<std::string>& folders,
+                        std::size_t references) {
+  const auto check = [&](const char* file, const std::function<bool(const flightlog::FlightLog&)>& has) {
+    const auto first_test = logs.begin() + static_cast<std::ptrdiff_t>(references);
+    const auto before = std::find_if(logs.begin(), first_test, has), after = std::find_if(first_test, logs.end(), has);
+    const bool shown = before != first_test;
+    if (shown == (after != logs.end())) return;
+    throw io::InputError(folders[static_cast<std::size_t>((shown ? before : after) - logs.begin())] + ": has " + file +
+                         ", but no " + (shown ? "flight" : "reference") +
+                         " has it; accepted: both with the same streams, in some of the flights at least");
+  };
+  check("power.csv", [](const auto& log) { return log.power.has_value(); });
+  check("wings.csv", [](const auto& log) { return log.wings.has_value(); });
+  check("forces.csv", [](const auto& log) { return log.header.rig.has_value(); });
+  check("imu.csv", [](const auto& log) { return log.header.imu.rate_hz > 0; });
 }
 
 std::vector<std::string> contrast_warnings(const std::vector<flightlog::FlightHeader>& headers,

@@ -200,7 +200,7 @@ std::vector<CheckedLogs> read_sets(const DiagnosisRequest& request) {
       if (session != request.sessions.end() && logs.back().header.session.empty())
         logs.back().header.session = session->second;
     }
-  if (!request.settings.reference.empty()) check_same_streams(logs, folders);
+  if (!request.settings.reference.empty()) check_same_streams(logs, folders, request.settings.reference.size());
   const std::vector<flightlog::CheckReport> reports = flightlog::check_flights(logs);
   std::size_t next = 0;
   for (CheckedLogs& set : sets) {

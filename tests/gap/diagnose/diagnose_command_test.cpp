@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "full.hpp"
+#include "gap/answer/contrast_warnings.hpp"
 #include "gap/result/diagnosis_json.hpp"
 #include "io/files.hpp"
 #include "io/progress.hpp"
@@ -113,4 +114,25 @@ TEST(RunDiagnose, RefusesWhatItCannotAnswer) {
 }
 
 }  // namespace
+TEST(SameStreams, AreInSomeFlightsOfBothSets) {
+  const auto log = [](bool wings) {
+    flightlog::FlightLog l;
+    if (wings) l.wings.emplace();
+    return l;
+  };
+  const auto refused = [&](const std::vector<bool>& wings) {
+    std::vector<flightlog::FlightLog> logs;
+    for (const bool w : wings) logs.push_back(log(w));
+    return test::refusal([&] { check_same_streams(logs, {"r1", "r2", "t1", "t2"}, 2); });
+  };
+  EXPECT_EQ(refused({false, false, false, false}), "accepted");
+  EXPECT_EQ(refused({true, false, false, true}), "accepted") << "a camera films some runs";
+  EXPECT_EQ(refused({false, false, false, true}),
+            "t2: has wings.csv, but no reference has it; accepted: both with the same streams, in some of the flights "
+            "at least");
+  EXPECT_EQ(refused({false, true, false, false}),
+            "r2: has wings.csv, but no flight has it; accepted: both with the same streams, in some of the flights at "
+            "least");
+}
+
 }  // namespace flappy::gap::diagnose_command_test
