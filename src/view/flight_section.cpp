@@ -9,6 +9,7 @@
 #include "flightlog/beat_averaged_motion.hpp"
 #include "flightlog/flight_log.hpp"
 #include "flightlog/readings.hpp"
+#include "io/csv.hpp"
 #include "io/installation.hpp"
 #include "sim/replay.hpp"
 #include "view/results.hpp"
@@ -28,7 +29,8 @@ constexpr std::size_t kPointsOnPaper = 1500;
 /// Resolutions of packed columns.
 namespace step {
 constexpr double kTime_s = 1e-6, kPlace_m = 1e-5, kQuaternion = 1e-5, kAngle_rad = 1e-3, kRate_rad_s = 1e-3,
-                 kForce_m_s2 = 1e-2, kVoltage_V = 1e-3, kSplit = 1e-5, kCurrent_A = 1e-4;
+                 kForce_m_s2 = 1e-2, kVoltage_V = 1e-3, kSplit = 1e-5, kCurrent_A = 1e-4, kWing_N = 1e-4,
+                 kWing_W = 1e-3;
 }
 
 struct NamedColumn {
@@ -221,6 +223,20 @@ Json streams_of(const FlightLog& log, const std::optional<flightlog::WingsStream
   return json;
 }
 
+/// What a simulator wrote of the wings beside the log.
+Json loads_of(const fs::path& file, Packing& packing, Json& notes) {
+  const io::CsvTable table = io::read_csv(file);
+  std::vector<NamedColumn> columns = {{"t_s", table.column("t_s"), step::kTime_s}};
+  for (const auto& [name, resolution] : {std::pair("left_lift_N", step::kWing_N),
+                                         {"left_drag_N", step::kWing_N},
+                                         {"right_lift_N", step::kWing_N},
+                                         {"right_drag_N", step::kWing_N},
+                                         {"left_mechanical_power_W", step::kWing_W},
+                                         {"right_mechanical_power_W", step::kWing_W}})
+    columns.push_back({name, table.column(name), resolution});
+  return packed(flightlog::log_file::kWingLoads, columns, packing, notes);
+}
+
 /// A column over the flight time, thinned to about kPointsOnPaper points.
 Series on_paper(const std::string& name, Colour colour, bool dashed, const Column& t, const Column& values,
                 double factor = 1) {
@@ -332,6 +348,8 @@ Section flight_section(std::vector<ShownFlight> flights, const FlightOptions& op
     const flightlog::ImuStream path = winged ? flightlog::ImuStream() : force_of_path(log, vehicle, folder);
     const Json swapped = take_swapped(log, packing, notes);
     Json streams = streams_of(log, derived ? derived_wings(log, vehicle) : log.wings, packing, notes);
+    if (const fs::path file = folder / flightlog::log_file::kWingLoads; fs::exists(file))
+      streams["loads"] = loads_of(file, packing, notes);
     if (!winged) {
       streams["path"] = packed("path",
                                {{"t_s", path.t_s, step::kTime_s},

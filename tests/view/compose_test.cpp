@@ -174,6 +174,27 @@ TEST(FlightSection, HasTheStreamsTheVehicleAndTheGoal) {
   EXPECT_TRUE(f.at("notes").empty());
 }
 
+TEST(FlightSection, HasTheLoadsOfWingsThatASimulatorWrote) {
+  const io::TemporaryFolder folder;
+  flightlog::write_flight_log(folder.path() / "flight", hover());
+  const fs::path file = folder.path() / "flight" / flightlog::log_file::kWingLoads;
+  const auto streams = [&] {
+    Packing packing;
+    return flight_section({folder.path() / "flight"}, {}, packing)
+        .json()
+        .at("blocks")[0]
+        .at("flights")[0]
+        .at("streams");
+  };
+  EXPECT_FALSE(streams().contains("loads"));
+  const std::string names =
+      "t_s,left_lift_N,left_drag_N,right_lift_N,right_drag_N,left_mechanical_power_W,right_mechanical_power_W\n";
+  io::write_atomically(file, names + "0,0.06,0.04,0.06,0.04,0.5,0.5\n0.001,0.05,0.03,0.06,0.04,0.5,0.4\n");
+  EXPECT_EQ(streams().at("loads").at("left_lift_N").at("count"), 2);
+  io::write_atomically(file, "t_s,left_lift_N\n0,1\n1,1\n");
+  EXPECT_NE(refusal([&] { streams(); }).find("left_drag_N"), std::string::npos);
+}
+
 TEST(FlightSection, LeavesOutPosesWhoseMarkersWereTakenForOthers) {
   flightlog::FlightLog log = hover();
   flightlog::MocapStream& m = log.mocap;

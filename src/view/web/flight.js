@@ -138,6 +138,13 @@ export class Flight {
       list.push(panel("battery", "Battery", "V", false, s.power.t_s, [["battery", s.power.battery_V]]));
       list.push(panel("currents", "Currents", "A", false, s.power.t_s, [["left", s.power.left_current_A], ["right", s.power.right_current_A]]));
     }
+    if (s.loads) {
+      const l = s.loads;
+      list.push(panel("lift", "Lift and drag of the wings", "N", true, l.t_s,
+        [["left lift", l.left_lift_N], ["left drag", l.left_drag_N], ["right lift", l.right_lift_N], ["right drag", l.right_drag_N]]));
+      list.push(panel("wing_power", "Mechanical power of the wings", "W", true, l.t_s,
+        [["left", l.left_mechanical_power_W], ["right", l.right_mechanical_power_W]]));
+    }
     list.slice(0, 2).forEach((each) => { each.left_out = this.swapped; });
     return list.filter((each) => each.lines.length > 0);
   }
