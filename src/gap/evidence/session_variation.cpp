@@ -34,9 +34,7 @@ constexpr const char* kSessionParametersHead =
     R"(# Prior standard deviation of the change of a parameter, in standard deviations of its prior (configs/gap/priors.toml), by a part of its name.
 # Weather: density by 1 %. A battery put back: mass by 0.5 %, centre of mass by 0.1 mm. Temperature of the motors: resistance by 2.5 %, torque constant
 # by 0.3 %. Wear and grease: friction and damping by 7 %. A hinge that was touched: rest angle by 0.3 degrees. The IMU and the markers are taken off and
-# put back: mounting by a tenth of its prior. A battery that was charged: share.battery, as a charger holds its full voltage to 0.75 % (Microchip,
-# MCP73831 data sheet); 0.4 % of 18 V is 0.04 of the signal, the sag of some 1.6 V. Clocks drift with temperature. Choice: made before any session was
-# seen, but for the battery.
+# put back: mounting by a tenth of its prior. Clocks drift with temperature. Choice: made before any session was seen.
 )";
 constexpr const char* kSessionBackground =
     R"(# Prior standard deviation of the change of each effect's magnitude from session to session, in coordinates of the effect (1: the prior of the

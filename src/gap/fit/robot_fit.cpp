@@ -35,6 +35,9 @@ constexpr double kWidenings[] = {2, 4, 8, 16, 32, 64};
 /// Factor between law factors that are tried. Choice.
 constexpr double kLawStep = 2;
 
+/// Standard deviation by which the voltage of a battery differs from session to session, as a share of the nominal one.
+/// Source: Microchip, MCP73831 data sheet: a charger holds it to 0.75 % at most; half of that.
+constexpr double kCharged = 0.004;
 constexpr const char* kDiverges =
     "the vehicle: its simulation of these flights diverges; accepted: a vehicle that flies what was flown";
 
@@ -145,6 +148,13 @@ std::vector<Background> RobotFit::session_changes(const SessionVariation& sessio
     const ModelDiscrepancy::Nuisance& n = evidence().discrepancy().nuisances[i];
     if (const double sd = session.parameter_sd(n.id + "." + n.value); sd > 0)
       list.push_back({kSessionParameters, sd * basis.in_tests(sensor_errors_[i])});
+  }
+  for (const auto& flight : fitter_.flights().all()) {
+    if (flight->recording() == nullptr || !flight->recording()->log.header.power) continue;
+    BasisCoefficients level = BasisCoefficients::Zero(kGroups, basis.size());
+    level(kBattery * kCoefficients, 0) = flight->recording()->log.header.power->battery_nominal_V;
+    list.push_back({kSessionParameters, kCharged * basis.in_tests(level)});
+    break;
   }
   for (const MagnitudeColumn& m : magnitudes_) {
     const double sd = session.background_sd(m.effect) / std::sqrt(static_cast<double>(m.near.size()));
