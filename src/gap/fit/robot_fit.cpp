@@ -38,6 +38,9 @@ constexpr double kLawStep = 2;
 /// Standard deviation by which the voltage of a battery differs from session to session, as a share of the nominal one.
 /// Source: Microchip, MCP73831 data sheet: a charger holds it to 0.75 % at most; half of that.
 constexpr double kCharged = 0.004;
+/// Standard deviation by which the zero of a force sensor differs from run to run: its temperature drifts. Source: a step
+/// of an ATI Nano17 (SI-12-0.12), 1/320 N and 1/64 Nmm; the moment with the force's at 1 cm.
+constexpr double kZero_N = 3.1e-3, kZero_Nm = 35e-6;
 constexpr const char* kDiverges =
     "the vehicle: its simulation of these flights diverges; accepted: a vehicle that flies what was flown";
 
@@ -149,12 +152,23 @@ std::vector<Background> RobotFit::session_changes(const SessionVariation& sessio
     if (const double sd = session.parameter_sd(n.id + "." + n.value); sd > 0)
       list.push_back({kSessionParameters, sd * basis.in_tests(sensor_errors_[i])});
   }
-  for (const auto& flight : fitter_.flights().all()) {
+  const FlightList all = fitter_.flights().all();
+  for (const auto& flight : all) {
     if (flight->recording() == nullptr || !flight->recording()->log.header.power) continue;
     BasisCoefficients level = BasisCoefficients::Zero(kGroups, basis.size());
     level(kBattery * kCoefficients, 0) = flight->recording()->log.header.power->battery_nominal_V;
     list.push_back({kSessionParameters, kCharged * basis.in_tests(level)});
     break;
+  }
+  if (std::ranges::all_of(all, [](const auto& f) { return f->recording() != nullptr && f->recording()->clamped(); })) {
+    const Recording& r = *all.front()->recording();
+    for (int i = 0; i < 3; ++i)
+      for (const auto& [channel, zero] : {std::pair(kSpecificForceX + i, kZero_N / r.mass_kg),
+                                          {kAngularAccelerationX + i, kZero_Nm / r.inertia_kg_m2[i]}}) {
+        BasisCoefficients level = BasisCoefficients::Zero(kGroups, basis.size());
+        level(channel * kCoefficients, 0) = zero;
+        list.push_back({kSessionParameters, basis.in_tests(level)});
+      }
   }
   for (const MagnitudeColumn& m : magnitudes_) {
     const double sd = session.background_sd(m.effect) / std::sqrt(static_cast<double>(m.near.size()));
