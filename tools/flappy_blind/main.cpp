@@ -40,7 +40,7 @@ Json fly_family(const RobotOptions& o, const FamilyOptions& f) {
   a.vehicle_file = o.vehicle;
   for (const BlindEffect& e : effects_of(o.effects)) a.effects.emplace_back(e.id, e.magnitude);
   a.hover = f.hover, a.own_parameters = f.own_parameters, a.conventions = f.conventions;
-  a.power = o.power || f.bench, a.wings = o.wings || f.bench, a.bench = f.bench;
+  a.power = o.power || f.bench, a.wings = o.wings, a.bench = f.bench;
   if (a.bench) benchmark::require_bench(family);
   std::optional<Assignment> reference;
   if (!f.reference.empty()) {

@@ -124,16 +124,16 @@ std::size_t CheckReport::count(Verdict verdict) const {
 CheckReport check_flight(const FlightLog& log) {
   const FlightHeader& h = log.header;
   CheckReport report;
-  const auto add = [&](const char* name, const Column& t_s, std::optional<double> declared_hz) {
+  const auto add = [&](const char* name, const Column& t_s, std::optional<double> declared_hz, bool film = false) {
     report.streams.push_back(stream_statistics(name, t_s, declared_hz));
-    check_stream(report.streams.back(), h.flapping_Hz, log.wings && &t_s == &log.wings->t_s, report.findings);
+    check_stream(report.streams.back(), h.flapping_Hz, film, report.findings);
   };
   add("command", log.command.t_s, std::nullopt);
   if (h.rig) add("forces", log.forces->t_s, h.rig->rate_hz);
   else add("mocap", log.mocap.t_s, h.mocap.rate_hz);
   if (h.imu.rate_hz > 0) add("imu", log.imu.t_s, h.imu.rate_hz);
   if (log.power) add("power", log.power->t_s, h.power->rate_hz);
-  if (log.wings) add("wings", log.wings->t_s, h.wings->rate_hz);
+  if (log.wings) add("wings", log.wings->t_s, h.wings->rate_hz, true);
   if (log.attitude) add("attitude", log.attitude->t_s, h.attitude->rate_hz);
   if (h.rig) {
     const ForcesStream& f = *log.forces;

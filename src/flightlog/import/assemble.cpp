@@ -82,8 +82,12 @@ const std::vector<double>& field_of(const Channel& channel, const io::Table& tab
                "columns, or an export with its head");
 }
 
-std::string worlds_of(const Capture& capture) {
-  return capture.program == "Motive" ? "\"y_up\" (the program's default), \"enu\" (z up)" : "\"enu\" (z up), \"y_up\"";
+/// InputError where neither the file nor the mapping says which axis is up.
+void require_world(const Capture& capture, const StreamMapping& s) {
+  if (capture.says_up || s.says_world) return;
+  s.table.fail(
+      "world", "is missing: " + capture.program + "'s files do not say which axis is up",
+      capture.program == "Motive" ? "\"y_up\" (the program's default), \"enu\" (z up)" : "\"enu\" (z up), \"y_up\"");
 }
 
 /// The field of a column that a body of an export has. InputError for a body that is not there, and where the file does
@@ -96,10 +100,9 @@ const std::vector<double>& field_of_body(const Channel& channel, const StreamMap
                  "\"" + s.body + "\" is no rigid body of the recording" +
                      (std::ranges::find(capture->markers, s.body) == capture->markers.end() ? "" : ", but a marker"),
                  listed(capture->bodies) + io::did_you_mean(s.body, capture->bodies));
-  const std::string which = capture->program + "'s files do not say which axis ";
-  if (!capture->says_up && !s.says_world) s.table.fail("world", "is missing: " + which + "is up", worlds_of(*capture));
+  require_world(*capture, s);
   if (!capture->says_up && !s.says_axes)
-    s.table.fail("frame", "is missing: " + which + "of the body is forward",
+    s.table.fail("frame", "is missing: " + capture->program + "'s files do not say which axis of the body is forward",
                  "\"fur\" (x forward, y up), \"luf\" (z forward, y up), \"flu\" (x forward, z up), \"frd\"");
   if (const auto* found = channel.column(field)) return *found;
   if (s.rotation.empty())
@@ -124,13 +127,12 @@ double unit_of_point(const Channel& channel, const StreamMapping& s, const std::
 /// say which axis is up.
 std::vector<double> field_of_marker(const Channel& channel, const StreamMapping& s, const FieldNames& fields) {
   const Capture* capture = channel.capture();
-  if (capture && !capture->says_up && !s.says_world)
-    s.table.fail("world", "is missing: " + capture->program + "'s files do not say which axis is up",
-                 worlds_of(*capture));
+  if (capture) require_world(*capture, s);
   for (const std::string& field : fields)
     if (const auto* found = channel.column(field)) {
       std::vector<double> values = *found;
-      for (double& value : values) value *= unit_of_point(channel, s, field);
+      const double unit = unit_of_point(channel, s, field);
+      for (double& value : values) value *= unit;
       return values;
     }
   const std::string& field = fields.front();
@@ -370,7 +372,7 @@ struct Stream {
   Columns columns;
   std::vector<std::string> notes;                  ///< warnings about markers
   std::vector<const ColumnMapping*> not_measured;  ///< of each row, the first column that it says is not measured
-  std::vector<std::string> faults;                 ///< of wings by points: of each row, why it is unusable, or empty
+  std::vector<std::string> faults;  ///< [row] why the points of the wings are unusable; "": they are usable
   StreamReport report;
 
   void turn() {
@@ -569,8 +571,8 @@ void angles_of_points(Stream& s, const Stream* mocap, double latency_s) {
   s.columns.clear();
   if (!residual.empty()) s.columns["residual_m"] = std::move(residual);
   for (const auto& [left, right] : wings.angles) {
-    s.columns["left_stroke_rad"].push_back(left.stroke_rad),
-        s.columns["left_rotation_rad"].push_back(left.rotation_rad);
+    s.columns["left_stroke_rad"].push_back(left.stroke_rad);
+    s.columns["left_rotation_rad"].push_back(left.rotation_rad);
     s.columns["right_stroke_rad"].push_back(right.stroke_rad);
     s.columns["right_rotation_rad"].push_back(right.rotation_rad);
     s.columns["deviation_rad"].push_back(std::max(std::abs(left.deviation_rad), std::abs(right.deviation_rad)));

@@ -28,7 +28,7 @@ struct StreamReport {
   std::vector<double>
       residual_m;  ///< [sample] rms distance of the markers from their places in the pose, m; without markers empty
   std::vector<double> deviation_rad;  ///< [sample] of wings by points: the larger deviation of the two wings
-  double stroke_noise_rad = 0;        ///< of wings by points: noise of a sample, by the scatter of their length
+  double stroke_noise_rad = 0;        ///< FilmedWings::stroke_noise_rad; 0 without points
 };
 
 struct ClockReport {

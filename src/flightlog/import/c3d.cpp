@@ -317,7 +317,7 @@ class C3dReader {
     const std::set<std::string>* wanted = channels_.wanted(channel_);
     for (std::size_t p = 0; wanted && p < names.size(); ++p)
       for (std::size_t k = 0; k < 3; ++k)
-        if (const std::string field = names[p] + std::array{".x_m", ".y_m", ".z_m"}[k]; wanted->contains(field)) {
+        if (const std::string field = names[p] + kPointAxes[k]; wanted->contains(field)) {
           row.push_back({field, 0});
           copied.push_back(2 + 4 * p + k);
         }

@@ -1,6 +1,7 @@
 // A recording in any format: named channels of rows with named numbers, time of receipt and, if any, stamp.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <limits>
@@ -33,6 +34,9 @@ using Row = std::vector<Item>;
 
 /// Stands for the name of the channel in a recording that has only one.
 inline const std::string kOnlyChannel = "*";
+
+/// A field of a coordinate of a point or marker, m, is the point's name and one of these.
+inline constexpr std::array kPointAxes = {".x_m", ".y_m", ".z_m"};
 
 /// Field of the number of a table's row, from 0: rows that are left out count. Only where it is wanted.
 inline const std::string kFrame = "#frame";

@@ -59,7 +59,7 @@ const std::vector<StreamKeys> kStreams = {
     {"attitude", {"qw", "qx", "qy", "qz"}, {}, {"latency_s", "noise_rad"}, true, true},
     {"policy", {}, {}, {"numbers"}, false, false, false},
 };
-constexpr double kUnitTolerance = 1e-3;  // of the length of a quaternion, as in flight.toml
+constexpr double kUnitTolerance = 1e-3;  // a quaternion may be longer or shorter than 1 by so much, as in flight.toml
 const Names kAngles = {"roll_rad", "pitch_rad", "yaw_rad"};
 const Names kRotations = {"vector", "xyz", "xzy", "yxz", "yzx", "zxy", "zyx"};
 /// In place of the pitch: acceleration in W, without gravity.

@@ -57,7 +57,7 @@
 //   file = "rest.csv"                        # the robot at rest and level
 //   position_m = [0.0, 0.0, 0.03]            # of B's origin in W
 //   yaw_rad = 0.0                            # default
-//   unit_m = 1.0                             # of [mocap], with markers; default: the table's row of units, else 1
+//   unit_m = 1.0                             # unit of markers, m; default: the table's row of units, else 1
 //   rate_hz = 200                            # optional in every stream; measured if missing
 //   latency_s = 0.0                          # time used less measured instant; 0 if the stamp is that instant
 //   position_noise_m = 1e-4
@@ -77,12 +77,12 @@
 //   [wings.points]                           # in place of columns: digitised points (wing_film.hpp), by their names in
 //   left_root = "pt1"                        # the table; also left_tip, left_trailing, right_root, right_tip,
 //                                            # right_trailing
-//   unit_m = 1e-3                            # of [wings], as all that follow: unit of the points; as in [mocap]
+//   unit_m = 1e-3                            # unit of the points, m; default as in [mocap]
 //   length_tolerance = 0.1                   # default; a length that differs by a larger share from its median is wrong
 //   stroke_plane_rad = 0.0                   # default; Phi of model/jointed.hpp
 //   [wings.markers]                          # points of the body, as in [mocap], with tolerance_m and at_rest; or
-//   attitude = [1.0, 0.0, 0.0, 0.0]          # of a clamped robot: turns the axes of the points to B; default; else that
-//   world = "enu"                            # of [mocap], of which the points have this world
+//   attitude = [1.0, 0.0, 0.0, 0.0]          # default; a clamped robot's: turns the axes of the points to B
+//   world = "enu"                            # axes of the points, where [mocap] gives the attitude
 //   [rig]                                    # of a clamped robot, in place of mocap and imu: columns are those of
 //                                            # forces.csv, other keys those of [rig] in flight.toml
 //   [attitude]                               # optional: attitude of a second estimator; world and frame as above
@@ -114,8 +114,6 @@
 
 namespace flappy::flightlog {
 
-/// What the names of a point's columns add to its own, m.
-inline constexpr std::array kPointAxes = {".x_m", ".y_m", ".z_m"};
 /// Keys of [wings.points]: of each wing two points of its axis of rotation, and one behind it.
 inline constexpr std::array kWingPoints = {"left_root",  "left_tip",  "left_trailing",
                                            "right_root", "right_tip", "right_trailing"};
@@ -159,8 +157,8 @@ struct StreamMapping {
   std::vector<std::string> markers;                  ///< whose places give the pose, in place of columns; empty: none
   std::vector<std::vector<double>> marker_places_m;  ///< in B; empty until place_markers() where at_rest gives them
   double tolerance_m = 0.005;                        ///< a marker farther from its place is a wrong one
-  std::optional<double> unit_m;                      ///< of markers and points; none: as the table says, else 1
-  std::vector<std::string> points;                   ///< of the wings, as kWingPoints, in place of columns; empty: none
+  std::optional<double> unit_m;                      ///< unit of markers and points; none: the table's, else 1 m
+  std::vector<std::string> points;  ///< [kWingPoints] names of the wings' points; empty: columns instead
   double stroke_plane_rad = 0, length_tolerance = 0.1;           ///< with points
   Eigen::Quaterniond attitude = Eigen::Quaterniond::Identity();  ///< with points of a clamped robot: to B
   std::optional<AtRest> at_rest;

@@ -171,7 +171,7 @@ bool is_matlab_4(std::string_view bytes) {
   if (bytes.size() < 4 * kWords) return false;
   std::array<std::uint32_t, kWords> words;  // kind, rows, columns, whether complex, letters of the name
   for (std::size_t k = 0; k < kWords; ++k) words[k] = number_at<std::uint32_t>(bytes.data() + 4 * k);
-  if (words[0] >= 5000)  // of a machine with the other byte order
+  if (words[0] >= 5000)  // written with the other byte order
     for (std::uint32_t& word : words) word = __builtin_bswap32(word);
   const std::uint32_t kind = words[0], letters = words[4];
   return kind < 5000 && kind / 100 % 10 == 0 && kind / 10 % 10 <= 5 && kind % 10 <= 2 && words[3] <= 1 && letters > 1 &&

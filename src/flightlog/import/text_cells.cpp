@@ -84,7 +84,7 @@ std::optional<double> zone_s(std::string_view text) {
 
 constexpr std::string_view kOpen = "[({", kClose = "])}";
 
-/// What stands between the brackets of a list; as Python prints an array, also behind its type. Nothing for another text.
+/// The text between the brackets of a list, or of "array([...])" as Python prints it. None: the text is no list.
 std::optional<std::string_view> list_in(std::string_view text) {
   if (text.starts_with("array(") && text.ends_with(')')) {
     const std::size_t open = text.find('['), close = text.rfind(']');

@@ -142,8 +142,7 @@ Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flig
       {Fitted::refit, &inference.refit},
       {Fitted::effect, best != nullptr ? &best->held_out : nullptr}};
   if (!flights.tests.front()->is_averaged())
-    r.ladder = ladder_of(context, inference.nominal, inference.refit, best != nullptr ? &best->held_out : nullptr,
-                         r.hypotheses);
+    r.ladder = ladder_of(context, inference.nominal, inference.refit, fits[2].second, r.hypotheses);
   for (const auto& [fitted, residual] : fits) {
     if (residual == nullptr) continue;
     std::vector<ResidualLocation> locations = locate(context, *residual, fitted);

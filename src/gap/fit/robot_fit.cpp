@@ -152,23 +152,22 @@ std::vector<Background> RobotFit::session_changes(const SessionVariation& sessio
     if (const double sd = session.parameter_sd(n.id + "." + n.value); sd > 0)
       list.push_back({kSessionParameters, sd * basis.in_tests(sensor_errors_[i])});
   }
-  const FlightList all = fitter_.flights().all();
-  for (const auto& flight : all) {
-    if (flight->recording() == nullptr || !flight->recording()->log.header.power) continue;
+  const auto add_level = [&](int channel, double sd) {
     BasisCoefficients level = BasisCoefficients::Zero(kGroups, basis.size());
-    level(kBattery * kCoefficients, 0) = flight->recording()->log.header.power->battery_nominal_V;
-    list.push_back({kSessionParameters, kCharged * basis.in_tests(level)});
-    break;
-  }
+    level(channel * kCoefficients, 0) = sd;
+    list.push_back({kSessionParameters, basis.in_tests(level)});
+  };
+  const FlightList all = fitter_.flights().all();
+  const auto metered = std::ranges::find_if(
+      all, [](const auto& f) { return f->recording() != nullptr && f->recording()->log.header.power.has_value(); });
+  if (metered != all.end())
+    add_level(kBattery, kCharged * (*metered)->recording()->log.header.power->battery_nominal_V);
   if (std::ranges::all_of(all, [](const auto& f) { return f->recording() != nullptr && f->recording()->clamped(); })) {
     const Recording& r = *all.front()->recording();
-    for (int i = 0; i < 3; ++i)
-      for (const auto& [channel, zero] : {std::pair(kSpecificForceX + i, kZero_N / r.mass_kg),
-                                          {kAngularAccelerationX + i, kZero_Nm / r.inertia_kg_m2[i]}}) {
-        BasisCoefficients level = BasisCoefficients::Zero(kGroups, basis.size());
-        level(channel * kCoefficients, 0) = zero;
-        list.push_back({kSessionParameters, basis.in_tests(level)});
-      }
+    for (int i = 0; i < 3; ++i) {
+      add_level(kSpecificForceX + i, kZero_N / r.mass_kg);
+      add_level(kAngularAccelerationX + i, kZero_Nm / r.inertia_kg_m2[i]);
+    }
   }
   for (const MagnitudeColumn& m : magnitudes_) {
     const double sd = session.background_sd(m.effect) / std::sqrt(static_cast<double>(m.near.size()));

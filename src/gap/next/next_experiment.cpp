@@ -134,9 +134,9 @@ std::vector<Course> courses_of(const std::vector<std::vector<double>>& first,
   std::vector<std::pair<double, Course>> list;
   for (std::size_t q = 0; q < std::size(kCourses); ++q) {
     const std::size_t n = std::min(first[q].size(), second[q].size());
+    if (n == 0) continue;
     const Eigen::Map<const VectorXd> a(first[q].data(), static_cast<Index>(n)),
         b(second[q].data(), static_cast<Index>(n));
-    if (n == 0) continue;
     const double own = (a.array() - a.mean()).matrix().norm(), apart = (a - b).norm();
     list.push_back({own > 0 ? apart / own : 0, {kCourses[q], {a.begin(), a.end()}, {b.begin(), b.end()}}});
   }

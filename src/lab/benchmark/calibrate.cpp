@@ -113,14 +113,6 @@ void check_verdict(const fs::path& folder, const Manifest& manifest, const fs::p
                          " was scored with another; accepted: the file that it was scored with");
 }
 
-/// Whether the score leaves a case out, because its effect does not show.
-bool within_noise(const fs::path& folder, std::size_t number) {
-  const fs::path file = true_fits(folder) / (number_text(number) + "_over_noise.json");
-  if (!fs::exists(file)) return false;
-  const Json change = read_json(file).at("change_over_noise");
-  return !change.is_null() && change.get<double>() < kBeyondNoise;
-}
-
 class Calibration {
  public:
   explicit Calibration(const CalibrateCommand& command)
@@ -150,8 +142,8 @@ class Calibration {
           if (h.remainder) a.unexplained.emplace_back();
           own.hypotheses.push_back(std::move(a));
         }
-        if (own.hypotheses.empty()) continue;  // its data were faulty
-        if (within_noise(folder, c.number)) continue;
+        if (own.hypotheses.empty()) continue;                                     // its data were faulty
+        if (is_within_noise(read_change_over_noise(folder, c.number))) continue;  // as the score does
         own.part = parts.try_emplace(manifest.family + " " + own.truth.part, counts.size()).first->second;
         if (own.part == counts.size()) counts.push_back(0);
         counts[own.part] += 1;

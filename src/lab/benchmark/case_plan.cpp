@@ -273,7 +273,7 @@ blind::Assignment assignment_of(const PlannedCase& planned, const std::filesyste
   a.vehicle_file = vehicle;
   for (const blind::BlindEffect& e : planned.effects) a.effects.emplace_back(e.id, e.magnitude);
   a.hover = planned.hover, a.power = planned.power || planned.bench;
-  a.bench = a.wings = planned.bench;
+  a.bench = planned.bench;
   a.own_parameters = planned.own_parameters, a.conventions = planned.conventions;
   a.session = planned.references > 0 ? 1 : 0;
   return a;

@@ -1,6 +1,8 @@
 // How far an effect changes flights beyond the noise of the IMU.
 #pragma once
 
+#include <optional>
+
 #include "lab/blind/family.hpp"
 
 namespace flappy::benchmark {
@@ -17,5 +19,7 @@ std::optional<double> change_over_noise(const blind::Family& family, const blind
 
 /// Below, an effect does not change the flights beyond noise. A choice.
 inline constexpr double kBeyondNoise = 10;
+/// Such a case is left out. None: not known.
+inline bool is_within_noise(std::optional<double> change) { return change && *change < kBeyondNoise; }
 
 }  // namespace flappy::benchmark

@@ -110,6 +110,17 @@ Json open_labels(const std::filesystem::path& folder, const Manifest& manifest) 
   return read_json(sealed);
 }
 
+std::filesystem::path over_noise_file(const std::filesystem::path& folder, std::size_t number) {
+  return true_fits(folder) / (number_text(number) + "_over_noise.json");
+}
+
+std::optional<double> read_change_over_noise(const std::filesystem::path& folder, std::size_t number) {
+  const std::filesystem::path file = over_noise_file(folder, number);
+  if (!std::filesystem::exists(file)) return {};
+  const Json change = read_json(file).at("change_over_noise");
+  return change.is_null() ? std::nullopt : std::optional(change.get<double>());
+}
+
 CaseTruth Label::truth() const {
   CaseTruth t{planned.part, {}, channels, regimes, planned.seed, draw};
   for (const blind::BlindEffect& e : planned.effects) t.effects.push_back(e.id);

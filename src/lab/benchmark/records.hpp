@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,10 @@ std::string sum_line(const std::filesystem::path& folder, std::size_t number);
 void check_predictions(const std::filesystem::path& folder, const Manifest& manifest);
 /// Folder that is made when the labels are opened; from then on, no prediction is accepted.
 std::filesystem::path true_fits(const std::filesystem::path& folder);
+/// How far the effect of a case changes its flights beyond noise (change_over_noise.hpp): the file that keeps it in
+/// true_fits(), and its content. None: it was not asked for, or changes none of these.
+std::filesystem::path over_noise_file(const std::filesystem::path& folder, std::size_t number);
+std::optional<double> read_change_over_noise(const std::filesystem::path& folder, std::size_t number);
 /// The content of sealed/labels.json. InputError if it has changed.
 Json open_labels(const std::filesystem::path& folder, const Manifest& manifest);
 

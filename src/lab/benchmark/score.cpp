@@ -247,7 +247,7 @@ std::optional<std::vector<std::string>> unbeaten_lines(const std::vector<ScoreLi
   return keys;
 }
 
-bool within_noise(const ScoredCase& c) { return c.change_over_noise && *c.change_over_noise < kBeyondNoise; }
+bool within_noise(const ScoredCase& c) { return is_within_noise(c.change_over_noise); }
 
 std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases);
 std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases);

@@ -168,9 +168,7 @@ bool fit_truths(const ScoreCommand& command, Bench& bench) {
 /// How far effects that were not named change the flights beyond noise. False if interrupted.
 bool find_changes_over_noise(const ScoreCommand& command, Bench& bench) {
   std::vector<std::size_t> asked, open;
-  const auto file_of = [&](std::size_t i) {
-    return true_fits(bench.folder) / (number_text(bench.manifest.cases[i].number) + "_over_noise.json");
-  };
+  const auto file_of = [&](std::size_t i) { return over_noise_file(bench.folder, bench.manifest.cases[i].number); };
   for (std::size_t i = 0; i < bench.cases.size(); ++i) {
     if (!needs_change_over_noise(bench.cases[i])) continue;
     asked.push_back(i);
@@ -189,8 +187,7 @@ bool find_changes_over_noise(const ScoreCommand& command, Bench& bench) {
       });
   if (!all) return false;
   for (const std::size_t i : asked)
-    if (const Json change = read_json(file_of(i)).at("change_over_noise"); !change.is_null())
-      bench.cases[i].change_over_noise = change.get<double>();
+    bench.cases[i].change_over_noise = read_change_over_noise(bench.folder, bench.manifest.cases[i].number);
   return true;
 }
 

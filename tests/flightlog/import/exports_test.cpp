@@ -6,10 +6,9 @@
 #include <fstream>
 #include <numbers>
 
-#include "flightlog/import/assemble.hpp"
 #include "flightlog/import/c3ds.hpp"
+#include "flightlog/import/import_files.hpp"
 #include "flightlog/import/mats.hpp"
-#include "flightlog/import/sources.hpp"
 #include "flightlog/import/ulogs.hpp"
 #include "flightlog/rotation.hpp"
 #include "io/temporary_folder.hpp"
@@ -51,13 +50,8 @@ class Recording {
     return files_.back();
   }
   Imported import(const std::string& streams) {
-    warnings.clear();
     std::ofstream(folder_ / "m.toml") << kHead << streams;
-    Mapping mapping = read_mapping(folder_ / "m.toml");
-    place_markers(mapping, warnings);
-    Channels channels(mapping.wanted(), mapping.wanted_times());
-    for (const auto& file : files_) read_source(file, channels, warnings);
-    return assemble(channels, mapping);
+    return import_files(folder_ / "m.toml", files_, warnings);
   }
   /// What is refused, without the folder.
   std::string refusal(const std::string& streams) {

@@ -8,9 +8,8 @@
 #include <numbers>
 #include <random>
 
-#include "flightlog/import/assemble.hpp"
+#include "flightlog/import/import_files.hpp"
 #include "flightlog/import/mapping.hpp"
-#include "flightlog/import/sources.hpp"
 #include "flightlog/rotation.hpp"
 #include "io/temporary_folder.hpp"
 #include "io/text.hpp"
@@ -268,13 +267,8 @@ class Film {
     files_.push_back(folder_ / name);
   }
   Imported import(const std::string& streams) {
-    warnings.clear();
     std::ofstream(folder_ / "m.toml") << kHead << streams;
-    Mapping mapping = read_mapping(folder_ / "m.toml");
-    place_markers(mapping, warnings);
-    Channels channels(mapping.wanted(), mapping.wanted_times());
-    for (const auto& file : files_) read_source(file, channels, warnings);
-    Imported imported = assemble(channels, mapping);
+    Imported imported = import_files(folder_ / "m.toml", files_, warnings);
     warnings.insert(warnings.end(), imported.report.warnings.begin(), imported.report.warnings.end());
     return imported;
   }

@@ -126,19 +126,7 @@ FamilyFlight run_on_bench(const Assignment& a, std::size_t run, double lasts_s) 
     if (tick == -before / 2 || tick == 0) forces.zero();
     const double now = static_cast<double>(tick) * kTick_s;
     const Beat sent = programme.inputs(now);
-    if (tick >= 0) {
-      const std::array<double, 2> logged = waveform(f, sent, now + kBenchRest_s);
-      command.t_s.push_back(now);
-      command.left_voltage_V.push_back(logged[0]);
-      command.right_voltage_V.push_back(logged[1]);
-      command.inputs->amplitude_V.push_back(std::clamp(sent.amplitude_V, 0.0, f.amplitude_limit_V));
-      command.inputs->difference_V.push_back(
-          std::clamp(sent.difference_V, -f.difference_limit_V, f.difference_limit_V));
-      command.inputs->bias_V.push_back(std::clamp(sent.bias_V, -f.bias_limit_V, f.bias_limit_V));
-      command.inputs->split_cycle.push_back(std::clamp(sent.split_cycle, -f.split_cycle_limit, f.split_cycle_limit));
-      const double beats = (now + kBenchRest_s) * f.flapping_Hz;
-      command.phase_rad->push_back(2 * kPi * (beats - std::floor(beats)));
-    }
+    if (tick >= 0) add_command(f, sent, now, kBenchRest_s, command);
     if (a.power) sensors.before_tick(robot, now);
     robot.drive(waveform(f, radio.arrived(sent, now), now + kBenchRest_s));
     for (int step = 1; step <= kStepsPerTick; ++step) {

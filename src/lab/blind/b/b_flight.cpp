@@ -58,22 +58,24 @@ Beat Radio::arrived(const Beat& sent, double now) {
   return last_;
 }
 
+void add_command(const RobotParameters& f, const Beat& sent, double now_s, double before_s,
+                 flightlog::CommandStream& to) {
+  const std::array<double, 2> voltages = waveform(f, sent, now_s + before_s);
+  to.t_s.push_back(std::max(0.0, now_s));
+  to.left_voltage_V.push_back(voltages[0]);
+  to.right_voltage_V.push_back(voltages[1]);
+  to.inputs->amplitude_V.push_back(std::clamp(sent.amplitude_V, 0.0, f.amplitude_limit_V));
+  to.inputs->difference_V.push_back(std::clamp(sent.difference_V, -f.difference_limit_V, f.difference_limit_V));
+  to.inputs->bias_V.push_back(std::clamp(sent.bias_V, -f.bias_limit_V, f.bias_limit_V));
+  to.inputs->split_cycle.push_back(std::clamp(sent.split_cycle, -f.split_cycle_limit, f.split_cycle_limit));
+  const double beats = (now_s + before_s) * f.flapping_Hz;
+  to.phase_rad->push_back(2 * std::numbers::pi * (beats - std::floor(beats)));
+}
+
 std::string Flight::tick(const Beat& sent, bool may_tumble) {
   const double now = time_s();
   const RobotParameters& f = robot_.plant().parameters();
-  const std::array<double, 2> logged = waveform(f, sent, now + trim_s_);
-  if (now >= -1e-9) {
-    flightlog::CommandStream& c = log_.command;
-    c.t_s.push_back(std::max(0.0, now));
-    c.left_voltage_V.push_back(logged[0]);
-    c.right_voltage_V.push_back(logged[1]);
-    c.inputs->amplitude_V.push_back(std::clamp(sent.amplitude_V, 0.0, f.amplitude_limit_V));
-    c.inputs->difference_V.push_back(std::clamp(sent.difference_V, -f.difference_limit_V, f.difference_limit_V));
-    c.inputs->bias_V.push_back(std::clamp(sent.bias_V, -f.bias_limit_V, f.bias_limit_V));
-    c.inputs->split_cycle.push_back(std::clamp(sent.split_cycle, -f.split_cycle_limit, f.split_cycle_limit));
-    const double beats = (now + trim_s_) * f.flapping_Hz;
-    c.phase_rad->push_back(2 * std::numbers::pi * (beats - std::floor(beats)));
-  }
+  if (now >= -1e-9) add_command(f, sent, now, trim_s_, log_.command);
   const std::string how = fly(waveform(f, radio_.arrived(sent, now), now + trim_s_), may_tumble);
   observer_.tick(sensors_, time_s());  // takes the samples, which are then no firmware's
   return how;

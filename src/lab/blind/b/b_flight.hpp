@@ -18,6 +18,10 @@ struct Case {
 };
 Case make_case(const Assignment& a);
 
+/// Adds inputs that are sent at `now_s`, with their voltages and phase, to a log; `before_s` s had passed at its start.
+void add_command(const RobotParameters& f, const Beat& sent, double now_s, double before_s,
+                 flightlog::CommandStream& to);
+
 /// Radio link: returns the sent inputs or, while packets are lost (command dropout), the last that arrived.
 class Radio {
  public:
