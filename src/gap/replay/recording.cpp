@@ -140,10 +140,14 @@ void Recording::lay_grid() {
   }
 }
 
-/// Bounds half-way between the samples of the sensor, so that each sample is in the middle of its interval.
+/// Bounds half-way between samples of the sensor. Each interval has as many samples as kClampedInterval_s holds, and
+/// they are spread evenly in it, so that their mean is that of the interval.
 void Recording::lay_clamped_grid() {
   const flightlog::Column& t_s = log.forces->t_s;
-  const double late_s = log.header.rig->latency_s, usual_s = 1 / log.header.rig->rate_hz;
+  const double late_s = log.header.rig->latency_s, rate_hz = log.header.rig->rate_hz;
+  // a rounding error of the rate does not cost a sample
+  samples_per_interval = std::max<std::size_t>(1, static_cast<std::size_t>(kClampedInterval_s * rate_hz + 0.01));
+  const double usual_s = static_cast<double>(samples_per_interval) / rate_hz;
   const auto bound_s = [&](std::size_t i) { return (t_s[i - 1] + t_s[i]) / 2 - late_s; };
   std::size_t i = 1;
   while (i < t_s.size() && bound_s(i) < begin_s) ++i;
@@ -151,9 +155,9 @@ void Recording::lay_clamped_grid() {
   begin_s = bound_s(i);
   double now_s = begin_s;
   torso.emplace_back();
-  std::vector<std::size_t> samples;  // [interval]
   const std::vector<std::pair<double, double>> undriven = undriven_s();
-  for (; i + 1 < t_s.size() && bound_s(i + 1) <= last_s; ++i) {
+  for (std::size_t first = i; i + 1 < t_s.size() && bound_s(i + 1) <= last_s; ++i) {
+    if (i + 1 - first < samples_per_interval) continue;
     const int n = static_cast<int>(std::lround((bound_s(i + 1) - now_s) / kPredictionStep_s));
     if (n == 0) continue;
     const double from_s = now_s;
@@ -161,27 +165,30 @@ void Recording::lay_clamped_grid() {
     steps.push_back(n);
     end_s.push_back(now_s);
     torso.emplace_back();
-    samples.push_back(i);
+    take_load(first, i + 1);
     const bool driven =
         std::ranges::none_of(undriven, [&](const auto& span) { return span.first < now_s && from_s < span.second; });
-    // a gap of the sensor makes a long interval, whose mean its one sample is not
-    valid.push_back(driven && n * kPredictionStep_s < 1.5 * usual_s + kPredictionStep_s ? 1 : 0);
+    // of an interval with a gap of the sensor, the mean is not that of its samples
+    valid.push_back(driven && n * kPredictionStep_s < usual_s + 0.5 / rate_hz + kPredictionStep_s ? 1 : 0);
+    first = i + 1;
   }
-  take_loads(samples);
 }
 
-/// Forces and moments, in B and about the torso origin. `samples`: [interval] index in forces.csv.
-void Recording::take_loads(const std::vector<std::size_t>& samples) {
+/// Mean force and moment of the samples from `first` on, before `end`; in B and about the torso origin.
+void Recording::take_load(std::size_t first, std::size_t end) {
   const flightlog::ForcesStream& f = *log.forces;
   const flightlog::RigHeader& rig = *log.header.rig;
   const Eigen::Quaterniond to_B(rig.attitude[0], rig.attitude[1], rig.attitude[2], rig.attitude[3]);
-  const Vector3d at(rig.position_m.data());
-  for (const std::size_t i : samples) {
-    const Vector3d force = to_B * Vector3d(f.force_x_N[i], f.force_y_N[i], f.force_z_N[i]);
-    const Vector3d moment = to_B * Vector3d(f.moment_x_Nm[i], f.moment_y_Nm[i], f.moment_z_Nm[i]) + at.cross(force);
-    force_m_s2.push_back(force / mass_kg);
-    turn_rad_s2.push_back(moment.cwiseQuotient(inertia_kg_m2));
+  Vector3d force = Vector3d::Zero(), moment = Vector3d::Zero();
+  for (std::size_t i = first; i < end; ++i) {
+    force += Vector3d(f.force_x_N[i], f.force_y_N[i], f.force_z_N[i]);
+    moment += Vector3d(f.moment_x_Nm[i], f.moment_y_Nm[i], f.moment_z_Nm[i]);
   }
+  const auto samples = static_cast<double>(end - first);
+  force = to_B * (force / samples);
+  moment = to_B * (moment / samples) + Vector3d(rig.position_m.data()).cross(force);
+  force_m_s2.push_back(force / mass_kg);
+  turn_rad_s2.push_back(moment.cwiseQuotient(inertia_kg_m2));
 }
 
 /// Spans without commands. Each lasts until the transient of the unknown voltages has decayed.

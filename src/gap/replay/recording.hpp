@@ -1,6 +1,6 @@
 // A recorded flight of a vehicle with wings and motors, prepared for replay: motor voltages, motion of the torso at the
 // bounds of the IMU's intervals, measured force in each interval. ResetPrediction replays it. In the log of a clamped
-// robot the torso rests at the origin, upright, and the intervals are those of the sensor of its stand.
+// robot the torso rests at the origin, upright, and each interval has one or more samples of the sensor of its stand.
 #pragma once
 
 #include <filesystem>
@@ -22,6 +22,9 @@ inline constexpr double kPredictionStep_s = 2e-4;
 inline constexpr double kHoldStep_s = 1e-4;
 /// Beats until the transient of wings that start at rest has decayed. Choice: after three it is thirty times the noise.
 inline constexpr double kSpinUpBeats = 6;
+/// Longest interval of a clamped robot's grid. Choice: seven of them make a period of the highest harmonic, and a sensor
+/// that is faster is averaged.
+inline constexpr double kClampedInterval_s = 1e-3;
 /// Below this height above its stand, a vehicle may touch the ground, which no hypothesis models. Choice.
 inline constexpr double kMinClearance_m = 0.01;
 
@@ -68,6 +71,8 @@ struct Recording {
   /// [interval] Of a clamped robot: the moment on its stand about the torso origin, in B, over the moments of inertia of
   /// the torso.
   std::vector<Eigen::Vector3d> turn_rad_s2;
+  /// Of a clamped robot; 1 for others, and where the sensor is slower than kClampedInterval_s.
+  std::size_t samples_per_interval = 1;
   std::vector<double> left_V, right_V;  ///< [physics step] commanded voltage times `full`
 
   std::vector<double> beat;  ///< [interval] its middle, in beats since beat 0 began (beat_at)
@@ -94,7 +99,7 @@ struct Recording {
   void prepare(const std::string& place);
   void lay_grid();
   void lay_clamped_grid();
-  void take_loads(const std::vector<std::size_t>& samples);
+  void take_load(std::size_t first, std::size_t end);
   std::vector<std::pair<double, double>> undriven_s() const;
   void read_voltages();
   void find_phase();

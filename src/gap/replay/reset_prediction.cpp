@@ -210,12 +210,13 @@ Rows ResetPrediction::declared_noise(std::uint64_t seed) const {
   std::normal_distribution<double> normal;
   std::vector<double> samples(recording_.intervals() * kSignals, 0);
   double before[3] = {0, 0, 0};
+  const double of_mean = 1 / std::sqrt(static_cast<double>(recording_.samples_per_interval));
   for (std::size_t k = 0; k < recording_.intervals(); ++k) {
     double* s = &samples[k * kSignals];
     for (int i = 0; i < 3; ++i) {
       if (h.rig) {
-        s[kSpecificForceX + i] = h.rig->force_noise_N * normal(random) / recording_.mass_kg;
-        s[kAngularAccelerationX + i] = h.rig->moment_noise_Nm * normal(random) / recording_.inertia_kg_m2[i];
+        s[kSpecificForceX + i] = of_mean * h.rig->force_noise_N * normal(random) / recording_.mass_kg;
+        s[kAngularAccelerationX + i] = of_mean * h.rig->moment_noise_Nm * normal(random) / recording_.inertia_kg_m2[i];
         continue;
       }
       // the simulation was reset to a rate that has the noise of the sample before
