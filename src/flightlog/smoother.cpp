@@ -406,19 +406,22 @@ sim::VoltageScript motor_voltages(const FlightLog& log) {
   return script;
 }
 
-std::array<double, 2> strokes_at(const WingsStream& wings, double rate_hz, double t_s) {
+std::array<double, 4> wing_angles_at(const WingsStream& wings, double rate_hz, double t_s) {
   const Column& t = wings.t_s;
   const std::size_t k = last_not_after(t, t_s);
-  if (k < 1 || k + 2 >= t.size() || t[k + 2] - t[k - 1] > 3.5 / rate_hz) return {std::nan(""), std::nan("")};
-  std::array<double, 2> stroke = {0, 0};
+  if (k < 1 || k + 2 >= t.size() || t[k + 2] - t[k - 1] > 3.5 / rate_hz)
+    return {std::nan(""), std::nan(""), std::nan(""), std::nan("")};
+  std::array<double, 4> angles = {0, 0, 0, 0};
   for (std::size_t i = k - 1; i <= k + 2; ++i) {
     double weight = 1;
     for (std::size_t j = k - 1; j <= k + 2; ++j)
       if (j != i) weight *= (t_s - t[j]) / (t[i] - t[j]);
-    stroke[0] += weight * wings.left_stroke_rad[i];
-    stroke[1] += weight * wings.right_stroke_rad[i];
+    angles[0] += weight * wings.left_stroke_rad[i];
+    angles[1] += weight * wings.right_stroke_rad[i];
+    angles[2] += weight * wings.left_rotation_rad[i];
+    angles[3] += weight * wings.right_rotation_rad[i];
   }
-  return stroke;
+  return angles;
 }
 
 }  // namespace flappy::flightlog

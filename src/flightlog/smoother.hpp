@@ -125,7 +125,8 @@ class Smoother {
 /// The voltages at the motors: the commands, times battery_V (interpolated) / battery_nominal_V with a power.csv.
 sim::VoltageScript motor_voltages(const FlightLog& log);
 
-/// Left and right stroke, rad, at a time, by a cubic through the four samples around it; NaN where these have a gap.
-std::array<double, 2> strokes_at(const WingsStream& wings, double rate_hz, double t_s);
+/// Left and right stroke, then left and right rotation, rad, at a time, by a cubic through the four samples around it;
+/// NaN where these have a gap.
+std::array<double, 4> wing_angles_at(const WingsStream& wings, double rate_hz, double t_s);
 
 }  // namespace flappy::flightlog

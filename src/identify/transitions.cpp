@@ -168,7 +168,7 @@ struct Transitions::Flight {
       x.velocity_m_s[i] = m.velocity_m_s[i];
       x.body_rate_rad_s[i] = m.body_rate_rad_s[i];
     }
-    if (wings) std::ranges::copy(flightlog::strokes_at(*wings, wings_hz, t_s), x.stroke_rad);
+    if (wings) std::copy_n(flightlog::wing_angles_at(*wings, wings_hz, t_s).begin(), 2, x.stroke_rad);
     const Eigen::Quaterniond& q = m.attitude;
     x.attitude[0] = q.w(), x.attitude[1] = q.x(), x.attitude[2] = q.y(), x.attitude[3] = q.z();
     return x;

@@ -22,6 +22,8 @@ const std::map<std::string, std::string> kChannelNames = {{"angular_acceleration
                                                           {"specific_force_z", "vertical specific force"},
                                                           {"stroke_left", "left stroke"},
                                                           {"stroke_right", "right stroke"},
+                                                          {"rotation_left", "left wing's rotation"},
+                                                          {"rotation_right", "right wing's rotation"},
                                                           {"battery", "battery voltage"},
                                                           {"current_left", "left motor's current"},
                                                           {"current_right", "right motor's current"},

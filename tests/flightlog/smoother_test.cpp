@@ -373,7 +373,7 @@ TEST(Smoother, OfSimulatedFlightsHasHonestCovariances) {
   EXPECT_LT(part(0.9), 0.4);
 }
 
-TEST(Strokes, AreCubicBetweenSamples) {
+TEST(WingAngles, AreCubicBetweenSamples) {
   flightlog::WingsStream w;
   const auto cubic = [](double t) { return 1 + t * (2 + t * (-30 + 400 * t)); };
   for (int i = 0; i < 50; ++i) {
@@ -382,12 +382,15 @@ TEST(Strokes, AreCubicBetweenSamples) {
     w.t_s.push_back(t);
     w.left_stroke_rad.push_back(cubic(t));
     w.right_stroke_rad.push_back(-cubic(t));
+    w.left_rotation_rad.push_back(2 * cubic(t));
+    w.right_rotation_rad.push_back(-2 * cubic(t));
   }
   for (const double t : {0.0031, 0.01, 0.0333, 0.0499, 0.093}) {
-    EXPECT_NEAR(strokes_at(w, 500, t)[0], cubic(t), 1e-12) << t;
-    EXPECT_NEAR(strokes_at(w, 500, t)[1], -cubic(t), 1e-12) << t;
+    constexpr double kTimes[] = {1, -1, 2, -2};
+    for (std::size_t i = 0; i < 4; ++i)
+      EXPECT_NEAR(wing_angles_at(w, 500, t)[i], kTimes[i] * cubic(t), 1e-12) << t << " " << i;
   }
-  for (const double t : {-1.0, 0.001, 0.041, 0.097, 1.0}) EXPECT_TRUE(std::isnan(strokes_at(w, 500, t)[0])) << t;
+  for (const double t : {-1.0, 0.001, 0.041, 0.097, 1.0}) EXPECT_TRUE(std::isnan(wing_angles_at(w, 500, t)[3])) << t;
 }
 
 TEST(MotorVoltages, FollowTheBattery) {

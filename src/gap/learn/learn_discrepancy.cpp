@@ -103,9 +103,10 @@ void expect(const Robots& robots, const ModelDiscrepancy& now, ShareMoments& sha
 }
 
 /// First and last of the channels that are shrunk towards their mean.
-constexpr std::array<std::pair<int, int>, 7> kAlike = {{{kAngularAccelerationX, kAngularAccelerationZ},
+constexpr std::array<std::pair<int, int>, 8> kAlike = {{{kAngularAccelerationX, kAngularAccelerationZ},
                                                         {kSpecificForceX, kSpecificForceZ},
                                                         {kStrokeLeft, kStrokeRight},
+                                                        {kRotationLeft, kRotationRight},
                                                         {kBattery, kBattery},
                                                         {kCurrentLeft, kCurrentRight},
                                                         {kPathX, kPathZ},

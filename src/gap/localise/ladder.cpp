@@ -14,6 +14,8 @@ std::size_t rung_of_channel(int channel, bool clamped) {
   switch (channel) {
     case kStrokeLeft:
     case kStrokeRight:
+    case kRotationLeft:
+    case kRotationRight:
     case kBattery:
     case kCurrentLeft:
     case kCurrentRight:

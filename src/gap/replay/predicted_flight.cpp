@@ -11,6 +11,8 @@ const char* channel_name(int channel) {
                                                 "specific_force_z",
                                                 "stroke_left",
                                                 "stroke_right",
+                                                "rotation_left",
+                                                "rotation_right",
                                                 "battery",
                                                 "current_left",
                                                 "current_right",

@@ -27,7 +27,9 @@ enum Channel : int {
   // from here on only for vehicles with wings
   kStrokeLeft,
   kStrokeRight,  ///< stroke angle, rad; only covered where logged
-  kBattery,      ///< battery voltage, V; only covered where logged
+  kRotationLeft,
+  kRotationRight,  ///< rotation of the wing, rad; only covered where logged
+  kBattery,        ///< battery voltage, V; only covered where logged
   kCurrentLeft,
   kCurrentRight,  ///< motor current, A; only covered where logged
   // motion capture against the IMU, without a vehicle (stream_rows.hpp), so every vehicle predicts 0; only the mean

@@ -45,6 +45,8 @@ void reset_block(sim::Block<Flown>& block, const TorsoRows* from, const TorsoRow
       store(transpose_times(halfway, force), kept.rows + kSpecificForce, first);
       x.left.stroke_rad.store(kept.rows[kStroke] + first);
       x.right.stroke_rad.store(kept.rows[kStroke + 1] + first);
+      x.left.rotation_rad.store(kept.rows[kRotation] + first);
+      x.right.rotation_rad.store(kept.rows[kRotation + 1] + first);
       x.body_rate_rad_s = x.body_rate_rad_s + missed;
     } else {
       x.body_rate_rad_s = load(to.body_rate_rad_s, first);
@@ -78,6 +80,8 @@ void clamped_block(sim::Block<Flown>& block, double interval_s, ClampedBlockStat
             rows.rows + kAngularAcceleration, first);
       x.left.stroke_rad.store(rows.rows[kStroke] + first);
       x.right.stroke_rad.store(rows.rows[kStroke + 1] + first);
+      x.left.rotation_rad.store(rows.rows[kRotation] + first);
+      x.right.rotation_rad.store(rows.rows[kRotation + 1] + first);
     }
     store(momentum, kept.momentum_kg_m_s, first);
     store(spin, kept.angular_momentum_kg_m2_s, first);

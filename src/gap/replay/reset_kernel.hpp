@@ -31,7 +31,8 @@ enum ResetRow : int {
   kAngularAcceleration = 0,  ///< mean over the interval, simulated less recorded, rad/s^2, B: 3 rows
   kSpecificForce = 3,        ///< mean at the IMU, m/s^2, in the simulated B half-way through the interval: 3 rows
   kStroke = 6,               ///< stroke angle at the end of the interval, rad: left, right
-  kResetRows = 8
+  kRotation = 8,             ///< rotation of the wing, likewise
+  kResetRows = 10
 };
 
 /// State that a block keeps from one interval to the next, and the rows of the last interval.
@@ -55,7 +56,7 @@ struct ClampedBlockState {
 
 /// Computes the rows of an interval of vehicles that are welded to a stand: the mean force and moment of the wings on
 /// the torso, N and Nm in B about the torso origin, in the places of specific force and angular acceleration, and the
-/// strokes. By momentum: what the air gave to the wings less what they gained. Weights are left out: a sensor is zeroed at
+/// angles of the wings. By momentum: what the air gave to the wings less what they gained. Weights are left out: a sensor is zeroed at
 /// rest, and a wing's weight moves its moment by 1e-5 Nm. `interval_s` 0: the start, without rows.
 using ClampedBlock = void (*)(sim::Block<Flown>& block, double interval_s, ClampedBlockState& kept,
                               ResetBlockState& rows);

@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t kSignals = kBattery, kMetered = sim::kMeterRows;
 static_assert(kPathX == kSignals + kMetered);
 static_assert(kAngularAccelerationX == int{kAngularAcceleration} && kSpecificForceX == int{kSpecificForce} &&
-              kStrokeLeft == int{kStroke} && kSignals == kResetRows);
+              kStrokeLeft == int{kStroke} && kRotationLeft == int{kRotation} && kSignals == kResetRows);
 
 /// Samples of all lanes.
 constexpr std::size_t kSample = kSignals * kVehicles, kMeter = kMetered * kVehicles;
@@ -68,13 +68,17 @@ ResetPrediction::ResetPrediction(Recording recording) : recording_(std::move(rec
   std::vector<double> samples(r.intervals() * kSignals, 0);
   std::vector<char> seen(r.valid);
   has_wings_ = r.log.wings.has_value();
+  // films of strokes alone leave rotations at one value
+  has_rotations_ = has_wings_ && std::ranges::any_of(r.log.wings->left_rotation_rad, [&](double angle) {
+                     return angle != r.log.wings->left_rotation_rad.front();
+                   });
   for (std::size_t k = 0; k < r.intervals(); ++k) {
     double* s = &samples[k * kSignals];
     for (int i = 0; i < 3; ++i) s[kSpecificForceX + i] = r.force_m_s2[k][i];
     for (int i = 0; r.clamped() && i < 3; ++i) s[kAngularAccelerationX + i] = r.turn_rad_s2[k][i];
     if (!has_wings_) continue;
-    const auto strokes = flightlog::strokes_at(*r.log.wings, r.log.header.wings->rate_hz, r.end_s[k]);
-    if (std::isfinite(strokes[0])) s[kStrokeLeft] = strokes[0], s[kStrokeRight] = strokes[1];
+    const auto angles = flightlog::wing_angles_at(*r.log.wings, r.log.header.wings->rate_hz, r.end_s[k]);
+    if (std::isfinite(angles[0])) std::ranges::copy(angles, s + kStrokeLeft);
     else seen[k] = 0;
   }
   if (has_wings_) wings_ = BeatProjection(r.beat, seen, r.beats, first);
@@ -225,7 +229,7 @@ Rows ResetPrediction::declared_noise(std::uint64_t seed) const {
       before[i] = rate;
       s[kSpecificForceX + i] = h.imu.accel_noise_m_s2 * normal(random);
     }
-    for (int i = 0; i < 2; ++i) s[kStrokeLeft + i] = recording_.log.wings ? h.wings->noise_rad * normal(random) : 0;
+    for (int i = 0; i < 4 && recording_.log.wings; ++i) s[kStrokeLeft + i] = h.wings->noise_rad * normal(random);
   }
   Rows rows = rows_of(samples);
   if (recording_.log.power) {
@@ -249,6 +253,7 @@ bool ResetPrediction::covers(std::size_t beat, int channel) const {
   if (channel >= kPathX) return compared_[beat] != 0;
   if (channel >= kBattery) return imu_.covers(beat) && beat < power_.beats() && power_.covers(beat);
   if (channel >= kSpecificForceX && channel <= kSpecificForceZ) return smoothed_[beat] != 0;
+  if (channel >= kRotationLeft && !has_rotations_) return false;
   if (channel >= kStrokeLeft) return has_wings_ && imu_.covers(beat) && wings_.covers(beat);
   return imu_.covers(beat);
 }

@@ -37,8 +37,8 @@ class ResetPrediction final : public PredictedFlight {
   double beats_Hz() const override { return recording_.log.header.flapping_Hz; }
   /// No channel covers a beat of the first kSpinUpBeats, or one in which the IMU's intervals are not valid
   /// (Recording::valid). Besides, path and rotate need motion capture kSpan beats to either side (stream_rows.hpp), the
-  /// specific force the same and two covered beats to either side, strokes need wings.csv, battery and currents
-  /// power.csv.
+  /// specific force the same and two covered beats to either side, angles of the wings need wings.csv, and
+  /// rotations that it has them, battery and currents power.csv.
   bool covers(std::size_t beat, int channel) const override;
   /// Coefficient 0 is the mean of a beat, the others are its harmonics; path and rotate have only the mean. True of
   /// streams that are not logged, too, which covers() leaves out.
@@ -92,7 +92,7 @@ class ResetPrediction final : public PredictedFlight {
   std::vector<char> compared_, smoothed_;  ///< [beat] has path and rotate rows; has mean forces of motion capture
   Eigen::Matrix3Xd path_m_s2_;             ///< [axis][beat] rows of the path channels, W
   std::vector<Eigen::Matrix3d> attitude_;  ///< [beat] B to W
-  bool has_wings_ = false;
+  bool has_wings_ = false, has_rotations_ = false;
   // [power.csv sample on the grid] index, first step not before it, and how many steps later that begins
   std::vector<std::size_t> power_sample_, power_step_;
   std::vector<double> power_late_;

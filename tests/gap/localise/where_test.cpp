@@ -218,7 +218,8 @@ TEST(Ladder, CountsEachRungAgainstItsNoise) {
   EXPECT_EQ(ladder[1].probability, 0.3) << "wing_damage";
   EXPECT_EQ(ladder[2].probability, 0.3) << "gyro_bias";
   // without film and currents
-  for (const int channel : {kStrokeLeft, kStrokeRight, kBattery, kCurrentLeft, kCurrentRight})
+  for (const int channel :
+       {kStrokeLeft, kStrokeRight, kRotationLeft, kRotationRight, kBattery, kCurrentLeft, kCurrentRight})
     for (int c = 0; c < kCoefficients; ++c) f.around.rows[group_of(channel, c)] = 0;
   EXPECT_FALSE(ladder_of(f.around, none, f.residual, nullptr, {})[0].refit);
 }

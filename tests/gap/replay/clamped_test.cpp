@@ -101,6 +101,7 @@ TEST(Clamped, PredictsWhatTheWingsDoToTheStand) {
   EXPECT_LT(left_by(flight, nominal), 0.01);
   EXPECT_FALSE(flight.covers(30, kPathX));
   EXPECT_FALSE(flight.covers(30, kStrokeLeft)) << "not filmed";
+  EXPECT_FALSE(flight.covers(30, kRotationLeft)) << "not filmed";
   EXPECT_TRUE(flight.covers(30, kSpecificForceZ));
 }
 

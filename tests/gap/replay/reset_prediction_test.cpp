@@ -24,9 +24,9 @@ TEST(ResetPrediction, TheVehicleThatFlewLeavesTheNoiseOfTheSensors) {
   // 250 beats: an rms of as many normal numbers varies by 4 %, of neighbours that share samples by 6 %; heavy tails, for
   // now and then a wing's landing comes a little early, add to a few. Mean forces, of which five beats share samples, by 10 %; and
   // to their noise, that of motion capture, comes that of the motion to which the torso is reset.
-  for (const int channel :
-       {kAngularAccelerationX, kAngularAccelerationY, kAngularAccelerationZ, kSpecificForceX, kSpecificForceY,
-        kSpecificForceZ, kStrokeLeft, kStrokeRight, kCurrentLeft, kCurrentRight, kBattery, kPathX, kRotateZ})
+  for (const int channel : {kAngularAccelerationX, kAngularAccelerationY, kAngularAccelerationZ, kSpecificForceX,
+                            kSpecificForceY, kSpecificForceZ, kStrokeLeft, kStrokeRight, kRotationLeft, kRotationRight,
+                            kCurrentLeft, kCurrentRight, kBattery, kPathX, kRotateZ})
     for (int c = 0; c < (channel < kPathX ? 3 : 1); ++c) {
       const int g = channel * kCoefficients + c;
       const double ratio = rms(*flights[0], left, g) / rms(*flights[0], noise, g);
