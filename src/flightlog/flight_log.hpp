@@ -234,6 +234,16 @@ inline const std::vector<std::string> kAll = {kHeader,   kCommand, kMocap,  kImu
                                               kAttitude, kForces,  kPolicy, kTruth, kJoints, kWingLoads};
 }  // namespace log_file
 
+/// Columns of wing_loads.csv: means over the control period before t_s.
+inline const std::vector<std::string> kWingLoadNames = [] {
+  std::vector<std::string> names = {"t_s"};
+  for (const std::string side : {"left_", "right_"})
+    for (const char* what : {"force_x_N", "force_y_N", "force_z_N", "moment_x_Nm", "moment_y_Nm", "moment_z_Nm",
+                             "lift_N", "drag_N", "aerodynamic_power_W", "mechanical_power_W"})
+      names.push_back(side + what);
+  return names;
+}();
+
 /// Columns of truth.csv: pose, motion and wings of the flapper, and the bias of its gyro.
 inline const std::vector<std::string> kMotionNames = {"t_s",
                                                       "x_m",

@@ -147,7 +147,7 @@ FlyResult fly_all(const FlyConfig& config, const FlyOptions& options) {
     if (!options.mcap.empty()) {
       const auto log = flights.recorders().front().log();
       result.mcap = log.has_value();
-      if (log) flightlog::ros::write_flight_mcap(options.mcap, *log);
+      if (log) flightlog::ros::write_flight_mcap(options.mcap, *log, {}, flights.recorders().front().wing_loads());
       else fs::remove(options.mcap);  // the file is that of an earlier flight
     }
     all_scores.insert(all_scores.end(), scores.begin(), scores.end());

@@ -37,16 +37,6 @@ const std::vector<std::string> kJointNames = [] {
   return names;
 }();
 
-/// Columns of the loads of the wings: means over the control period before t_s.
-const std::vector<std::string> kLoadNames = [] {
-  std::vector<std::string> names = {"t_s"};
-  for (const std::string side : {"left_", "right_"})
-    for (const char* what : {"force_x_N", "force_y_N", "force_z_N", "moment_x_Nm", "moment_y_Nm", "moment_z_Nm",
-                             "lift_N", "drag_N", "aerodynamic_power_W", "mechanical_power_W"})
-      names.push_back(side + what);
-  return names;
-}();
-
 void write_columns(const std::filesystem::path& file, const std::vector<std::string>& names,
                    const std::vector<flightlog::Column>& columns) {
   io::CsvWriter csv(file, names);
@@ -202,7 +192,7 @@ struct Recorder<T>::Storage {
     if (vehicle.jointed) joints.resize(kJointNames.size());
     if (h.power) log.power.emplace(), power = TickSampler(h.power->rate_hz);
     if (h.wings) log.wings.emplace(), wings = TickSampler(h.wings->rate_hz);
-    if (config.log.wing_loads) loads.resize(kLoadNames.size());
+    if (config.log.wing_loads) loads.resize(flightlog::kWingLoadNames.size());
     if (h.power || !loads.empty()) {  // a meter needs the rows of effects, even if no effect is in force
       sim::storage_of(f.batch()).keep_effects(0);
       sim::storage_of(f.batch()).put_effect_rows(i, vehicle);
@@ -542,13 +532,19 @@ std::optional<flightlog::FlightLog> Recorder<T>::log() const {
 }
 
 template <class T>
+const std::vector<flightlog::Column>& Recorder<T>::wing_loads() const {
+  return storage_->loads;
+}
+
+template <class T>
 bool Recorder<T>::write(const std::filesystem::path& folder) const {
   const std::optional<flightlog::FlightLog> all = log();
   if (!all) return false;
   write_flight_log(folder, *all);
   flightlog::write_truth(folder, kTruthNames, storage_->truth);
   if (!storage_->joints.empty()) write_columns(folder / flightlog::log_file::kJoints, kJointNames, storage_->joints);
-  if (!storage_->loads.empty()) write_columns(folder / flightlog::log_file::kWingLoads, kLoadNames, storage_->loads);
+  if (!storage_->loads.empty())
+    write_columns(folder / flightlog::log_file::kWingLoads, flightlog::kWingLoadNames, storage_->loads);
   return true;
 }
 
@@ -556,7 +552,8 @@ template <class T>
 double Recorder<T>::bytes_per_s(const FlyConfig& c) {
   const flight::FleetOptions& o = c.fleet;
   const std::size_t inputs = model::mixed_inputs(c.vehicle).size();
-  const std::size_t joints = (c.vehicle.jointed ? kJointNames.size() : 0) + (c.log.wing_loads ? kLoadNames.size() : 0);
+  const std::size_t joints =
+      (c.vehicle.jointed ? kJointNames.size() : 0) + (c.log.wing_loads ? flightlog::kWingLoadNames.size() : 0);
   const double commands = inputs > 0 ? static_cast<double>(1 + inputs) * o.control_hz : 8 / c.vehicle.driver.hold_s;
   const double numbers = commands + 7 * o.sensors.imu.rate_hz + 8 * o.sensors.mocap.rate_hz +
                          static_cast<double>(kTruthNames.size() + 9 + joints) * o.control_hz;

@@ -40,6 +40,8 @@ class Recorder {
   const flightlog::FlightLog& so_far() const;
   /// The log so far; empty until all streams have at least two samples and overlap in time.
   std::optional<flightlog::FlightLog> log() const;
+  /// Columns of wing_loads.csv (flightlog::kWingLoadNames); empty where they are not asked for.
+  const std::vector<flightlog::Column>& wing_loads() const;
   /// Writes log and truth. Returns false, and writes nothing, if log() is empty. Throws io::InputError.
   bool write(const std::filesystem::path& folder) const;
 

@@ -49,13 +49,15 @@ struct Feed {
 
 class FlightFile {
  public:
-  FlightFile(const std::filesystem::path& path, const FlightLog& log, const std::vector<VehicleTopics>& vehicles)
-      : log_(log), file_(path) {
+  FlightFile(const std::filesystem::path& path, const FlightLog& log, const std::vector<VehicleTopics>& vehicles,
+             const std::vector<Column>& wing_loads)
+      : log_(log), wing_loads_(wing_loads), file_(path) {
     feeds_ = {{&log.command.t_s, [this](std::size_t i) { write_command(i); }},
               {&log.mocap.t_s, [this](std::size_t i) { write_mocap(i); }},
               {&log.imu.t_s, [this](std::size_t i) { write_imu(i); }}};
     if (log.power && log.header.power) feeds_.push_back({&log.power->t_s, [this](std::size_t i) { write_power(i); }});
     if (log.wings && log.header.wings) feeds_.push_back({&log.wings->t_s, [this](std::size_t i) { write_wings(i); }});
+    if (!wing_loads.empty()) feeds_.push_back({&wing_loads[0], [this](std::size_t i) { write_loads(i); }});
     for (const VehicleTopics& v : vehicles) {
       Column& imu_s = times_.emplace_back();
       for (const VehicleTopics::Imu& i : v.imu) imu_s.push_back(log.imu.t_s[i.sample]);
@@ -206,7 +208,22 @@ class FlightFile {
     send("/joint_states", type_name::kJointState, s.t_s[i], 0, m);
   }
 
+  void write_loads(std::size_t i) {
+    Members m;
+    std::size_t k = 1;
+    const auto next = [&] { return wing_loads_[k++][i]; };
+    for (const std::string side : {"left", "right"}) {
+      for (const char* vector : {"_force_n", "_moment_nm"})
+        for (const char* axis : {".x", ".y", ".z"}) m[side + vector + axis] = next();
+      for (const char* number : {"_lift_n", "_drag_n", "_aerodynamic_power_w", "_mechanical_power_w"})
+        m[side + number] = next();
+    }
+    put_header(m, to_ns(wing_loads_[0][i]), kTorso);
+    send("/wing_loads", type_name::kWingLoads, wing_loads_[0][i], 0, m);
+  }
+
   const FlightLog& log_;
+  const std::vector<Column>& wing_loads_;
   McapWriter file_;
   std::map<std::string, Topic> topics_;
   std::deque<Column> times_;  ///< of the vehicles' feeds
@@ -216,10 +233,10 @@ class FlightFile {
 }  // namespace
 
 std::uint64_t write_flight_mcap(const std::filesystem::path& path, const FlightLog& log,
-                                const std::vector<VehicleTopics>& vehicles) {
+                                const std::vector<VehicleTopics>& vehicles, const std::vector<Column>& wing_loads) {
   require_flown(log, path.string());
   require_voltages(log, path.string());
-  return FlightFile(path, log, vehicles).write();
+  return FlightFile(path, log, vehicles, wing_loads).write();
 }
 
 }  // namespace flappy::flightlog::ros

@@ -6,6 +6,7 @@
 //   /battery      BatteryState   where power is logged: current is minus that of both motors
 //   /motors       JointState     where power is logged: effort is the current in A of left_motor and right_motor
 //   /joint_states JointState     where wings are logged: left_stroke, left_rotation, right_stroke, right_rotation
+//   /wing_loads   WingLoads      where a simulator gives them: means over the control period that ends at the stamp
 //
 // And for each vehicle that is said to have flown, what it predicts (docs/reference/formats.md):
 //
@@ -41,8 +42,9 @@ struct VehicleTopics {
   std::vector<Beat> beats;
 };
 
-/// Returns the number of messages. InputError where the file cannot be written, or the flight has no voltages.
+/// `wing_loads`: columns of wing_loads.csv (kWingLoadNames), or none. Returns the number of messages. InputError where the file cannot be written, or the flight has no voltages.
 std::uint64_t write_flight_mcap(const std::filesystem::path& path, const FlightLog& log,
-                                const std::vector<VehicleTopics>& vehicles = {});
+                                const std::vector<VehicleTopics>& vehicles = {},
+                                const std::vector<Column>& wing_loads = {});
 
 }  // namespace flappy::flightlog::ros

@@ -49,6 +49,12 @@ constexpr Text kTexts[] = {
     {"flappy_msgs/msg/WingInput",
      "std_msgs/Header header\nuint64 tick\nfloat64 amplitude_v\nfloat64 difference_v\nfloat64 bias_v\n"
      "float64 split_cycle\nfloat64 left_voltage_v\nfloat64 right_voltage_v\nfloat64 phase_rad\n"},
+    {"flappy_msgs/msg/WingLoads",
+     "std_msgs/Header header\ngeometry_msgs/Vector3 left_force_n\ngeometry_msgs/Vector3 left_moment_nm\n"
+     "float64 left_lift_n\nfloat64 left_drag_n\nfloat64 left_aerodynamic_power_w\nfloat64 left_mechanical_power_w\n"
+     "geometry_msgs/Vector3 right_force_n\ngeometry_msgs/Vector3 right_moment_nm\n"
+     "float64 right_lift_n\nfloat64 right_drag_n\nfloat64 right_aerodynamic_power_w\n"
+     "float64 right_mechanical_power_w\n"},
     {"flappy_msgs/msg/Tick",
      "builtin_interfaces/Time stamp\nbuiltin_interfaces/Time until\nuint64 tick\nuint32 imu\nuint32 poses\nuint8 "
      "wish\n"},

@@ -15,9 +15,9 @@ struct Seen {
   Members members;
 };
 
-std::map<std::string, std::vector<Seen>> written(const FlightLog& log) {
+std::map<std::string, std::vector<Seen>> written(const FlightLog& log, const std::vector<Column>& wing_loads = {}) {
   const io::TemporaryFolder folder;
-  write_flight_mcap(folder / "f.mcap", log);
+  write_flight_mcap(folder / "f.mcap", log, {}, wing_loads);
   const auto bag = Bag::open(folder / "f.mcap");
   std::map<std::string, std::vector<Seen>> seen;
   std::int64_t last_ns = 0;
@@ -35,6 +35,26 @@ double number(const Seen& seen, const std::string& path) { return std::get<doubl
 std::int64_t stamp_ns(const Seen& seen, const std::string& header = "header") {
   return 1'000'000'000 * std::get<std::int64_t>(seen.members.at(header + ".stamp.sec")) +
          static_cast<std::int64_t>(std::get<std::uint64_t>(seen.members.at(header + ".stamp.nanosec")));
+}
+
+// Numbers that tell each member: hundredths of the column, and the row.
+TEST(FlightMcap, HasTheLoadsOfTheWings) {
+  std::vector<Column> loads(kWingLoadNames.size());
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t k = 0; k < loads.size(); ++k)
+      loads[k].push_back(k == 0 ? 0.01 * static_cast<double>(i + 1)
+                                : static_cast<double>(i) + 0.01 * static_cast<double>(k));
+  const auto seen = written(test::some_log(), loads);
+  ASSERT_EQ(seen.at("/wing_loads").size(), 3u);
+  const Seen& last = seen.at("/wing_loads")[2];
+  EXPECT_EQ(stamp_ns(last), 30'000'000);
+  EXPECT_EQ(std::get<std::string>(last.members.at("header.frame_id")), "torso");
+  EXPECT_EQ(number(last, "left_force_n.x"), 2.01);
+  EXPECT_EQ(number(last, "left_moment_nm.z"), 2.06);
+  EXPECT_EQ(number(last, "left_lift_n"), 2.07);
+  EXPECT_EQ(number(last, "right_force_n.y"), 2.12);
+  EXPECT_EQ(number(last, "right_drag_n"), 2.18);
+  EXPECT_EQ(number(last, "right_mechanical_power_w"), 2.2);
 }
 
 TEST(FlightMcap, HasATopicForEachStream) {
