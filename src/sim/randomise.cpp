@@ -242,6 +242,21 @@ bool Randomisation::is_uniform(std::size_t draw) const {
   return draws_[draw].law == Law::scale_uniform || draws_[draw].law == Law::replace_uniform;
 }
 
+void Randomisation::narrow(const std::vector<std::string>& parts, double share) {
+  for (std::size_t d = 0; d < draws_.size(); ++d) {
+    const std::string path = name(d);
+    if (std::ranges::none_of(parts, [&](const std::string& part) { return path.find(part) != std::string::npos; }))
+      continue;
+    Draw& draw = draws_[d];
+    if (is_uniform(d)) {
+      const double middle = (draw.a + draw.b) / 2, half = share * (draw.b - draw.a) / 2;
+      draw.a = middle - half, draw.b = middle + half;
+    } else {
+      draw.b *= share;
+    }
+  }
+}
+
 std::string Randomisation::name(std::size_t draw) const {
   model::Vehicle vehicle = nominal_;
   const std::size_t first = posterior_.empty() ? draws_[draw].parameters.front() : posterior_[draw].parameter;

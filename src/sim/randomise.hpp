@@ -40,6 +40,8 @@ class Randomisation {
   /// The vehicle of a key: the same for the same key, whatever else is sampled.
   model::Vehicle sample(RandomKey key) const;
 
+  /// Draws whose first parameter's path contains one of `parts` vary by a share of what they did. Not of a posterior.
+  void narrow(const std::vector<std::string>& parts, double share);
   /// Number of draws; each has one variate, standard normal or uniform in [-1, 1].
   std::size_t draws() const { return draws_.size() + posterior_.size(); }
   std::size_t majors() const { return majors_ + posterior_.size(); }

@@ -95,6 +95,7 @@ void add_choices(Section& section, const Json& choices, double asked) {
   Json rows = Json::array();
   for (std::size_t i = 0; i < choices.size(); ++i) {
     const Json& c = choices[i];
+    const std::string at = "/choices/" + std::to_string(i) + "/";
     std::vector<std::string> gained;
     for (const std::string& e : c.at("gained").get<std::vector<std::string>>()) gained.push_back(spoken(e));
     if (c.at("flies")) {
@@ -103,12 +104,13 @@ void add_choices(Section& section, const Json& choices, double asked) {
       f.categories.push_back(spoken(c.at("name")));
     }
     rows.push_back({spoken(c.at("name")), c.at("what"),
-                    c.at("flies") ? cell(c.at("probability"), "/choices/" + std::to_string(i) + "/probability", 2)
-                                  : Json("cannot be flown"),
+                    c.at("flies") ? cell(c.at("probability"), at + "probability", 2) : Json("cannot be flown"),
+                    cell(c.at("hours"), at + "hours", 1), cell(c.at("gained_per_hour"), at + "gained_per_hour", 3),
                     spoken_list(gained)});
   }
   section.add(f);
-  section.add(table("", {"choice", "what", "mean probability", "names also"}, std::move(rows)));
+  section.add(table("", {"choice", "what", "mean probability", "hours of work", "gained per hour", "names also"},
+                    std::move(rows)));
 }
 
 }  // namespace

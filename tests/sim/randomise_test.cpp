@@ -132,6 +132,18 @@ TEST(Laws, AreCutWhereTheTableSays) {
   EXPECT_LE(moments(x).high, 1.1 * nominal);
 }
 
+TEST(Laws, NarrowByPartsOfNames) {
+  auto r = randomisation(table("\"torso.mass_kg\"", "law = \"scale_normal\"\nsd = 0.1") +
+                         table("\"right.spring.rest_angle_rad\"", "law = \"replace_uniform\"\nlow = -0.1\nhigh = 0.3"));
+  auto both = r;
+  r.narrow({"mass_kg", "com_m"}, 0.1);
+  both.narrow({"rest_angle", "mass"}, 0.1);
+  const double nominal = r.nominal().torso.mass_kg;
+  expect_moments(draw(r, torso_mass), nominal, 0.01 * kCutSd * nominal);
+  expect_moments(draw(r, rest_angle), 0.1, 0.4 / std::sqrt(12));
+  expect_moments(draw(both, rest_angle), 0.1, 0.04 / std::sqrt(12));
+}
+
 // ---- the posterior of a vehicle file
 
 using Rows = std::vector<std::vector<double>>;

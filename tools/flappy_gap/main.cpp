@@ -220,6 +220,7 @@ int main(int argc, char** argv) {
       .shows_default();
   plan.flag("--reference", planned.settings.reference, "with as many reference flights of the same robot");
   takes_constants(plan, planned.settings);
+  plan.option("--work", planned.settings.work, "hours of work of each choice [configs/gap/plan_work.toml]");
   plan.option("--magnitude", planned.magnitudes, "EFFECT=FACTOR on the typical magnitude");
   plan.option("--out", planned.out, "folder for plan.json and matrix.csv");
   plan.option("--threads", planned.settings.threads, "0: one for each processor").range(0, 1024);

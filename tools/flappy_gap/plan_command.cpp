@@ -42,9 +42,13 @@ void print(const Plan& plan) {
     std::printf("cannot be told apart: %s\n", io::joined(g).c_str());
   for (std::size_t i = 0; i < plan.choices.size() && i < kShownChoices; ++i) {
     const PlannedChoice& c = plan.choices[i];
-    std::printf("%s%s: mean probability %.2f%s\n", i == 0 ? "instead: " : "         ", c.what.c_str(), c.probability,
-                c.gained.empty() ? "" : (", names also " + io::joined(c.gained)).c_str());
+    const std::string work = c.hours > 0 ? io::format(" for %.2g h of work", c.hours) : "";
+    std::printf("%s%s: mean probability %.2f%s%s\n", i == 0 ? "instead: " : "         ", c.what.c_str(), c.probability,
+                work.c_str(), c.gained.empty() ? "" : (", names also " + io::joined(c.gained)).c_str());
   }
+  const auto most = std::ranges::max_element(plan.choices, {}, &PlannedChoice::gained_per_hour);
+  if (most != plan.choices.end() && most->gained_per_hour > 0)
+    std::printf("most for an hour of work: %s (%.3f)\n", most->what.c_str(), most->gained_per_hour);
 }
 
 }  // namespace

@@ -29,6 +29,29 @@ constexpr double kNamed = 0.5;
 /// Other numbers of flights that are weighed. Choice.
 constexpr std::size_t kFew = 1, kMany = 6;
 
+/// Hours of work, and what weighing a robot tells: configs/gap/plan_work.toml.
+struct Work {
+  double flight = 0, session = 0, currents = 0, film = 0, clamp = 0, weigh = 0, change = 0;
+  double weighed_share = 1;
+  std::vector<std::string> weighed;  ///< parts of the paths of parameters
+};
+
+Work read_work(const fs::path& path) {
+  const io::Config config = io::Config::load(path);
+  const io::Table root = config.root();
+  root.schema(1);
+  Work w;
+  const io::Table hours = root.table("hours"), weighed = root.table("weighed");
+  const std::pair<const char*, double*> all[] = {
+      {"flight", &w.flight}, {"session", &w.session}, {"currents", &w.currents}, {"film", &w.film},
+      {"clamp", &w.clamp},   {"weigh", &w.weigh},     {"change", &w.change}};
+  for (const auto& [key, value] : all) *value = hours.number(key, io::positive(1e4));
+  w.weighed_share = weighed.number("share", io::positive(1));
+  w.weighed = weighed.strings("parameters");
+  root.finish();
+  return w;
+}
+
 /// The flights of a robot, and the sensors that log them.
 struct Session {
   std::string name, what;
@@ -37,6 +60,8 @@ struct Session {
   bool reference = false, power = false, wings = false;
   const Manoeuvre* further = nullptr;  ///< as many further flights of this, perhaps with an intervention; null: none
   bool films_further = false;          ///< whether only the wings of the further ones are filmed
+  bool weighed = false;                ///< whether the robot was weighed and balanced
+  double hours = 0;                    ///< of work beyond the session that was asked for
 };
 
 class Planner {
@@ -47,6 +72,7 @@ class Planner {
         vehicle_(read_vehicle(settings.vehicle)),
         uncertain_(
             sim::read_randomisation(vehicle_, io::Config::load(file(settings.priors, "gap/priors.toml")).root())),
+        work_(read_work(file(settings.work, "gap/plan_work.toml"))),
         discrepancy_(read_model_discrepancy(file(settings.discrepancy, "gap/model_discrepancy.toml"))) {
     const fs::path folder =
         settings.experiments.empty() ? fs::path(io::config_path("gap/experiments")) : fs::path(settings.experiments);
@@ -114,33 +140,39 @@ class Planner {
 
   std::vector<Session> choices(const Session& asked) const {
     std::vector<Session> all;
-    const auto add = [&](const std::string& name, const std::string& what, const auto& change) {
+    const auto add = [&](const std::string& name, const std::string& what, double hours, const auto& change) {
       all.push_back(asked);
-      all.back().name = name, all.back().what = what;
+      all.back().name = name, all.back().what = what, all.back().hours = hours;
       change(all.back());
     };
     if (asked.manoeuvre == nullptr) return all;
+    const double flown = work_.flight * static_cast<double>(asked.flights), session = work_.session + flown;
     add(asked.reference ? "no_reference" : "reference",
         asked.reference ? "without reference flights" : "as many reference flights of the same robot",
-        [](Session& s) { s.reference = !s.reference; });
-    add("currents", "battery voltage and motor currents logged, too", [](Session& s) { s.power = true; });
-    add("filmed_wings", "the wings' angles filmed, too", [](Session& s) { s.wings = true; });
+        asked.reference ? 0 : session, [](Session& s) { s.reference = !s.reference; });
+    add("currents", "battery voltage and motor currents logged, too", work_.currents,
+        [](Session& s) { s.power = true; });
+    add("filmed_wings", "the wings' angles filmed, too", work_.film, [](Session& s) { s.wings = true; });
+    add("weighed", "the robot weighed and balanced before", work_.weigh, [](Session& s) { s.weighed = true; });
     for (const std::size_t n : {kFew, kMany})
       if (n != asked.flights)
         add(std::to_string(n) + (n == 1 ? "_flight" : "_flights"),
             std::to_string(n) + (n == 1 ? " flight" : " flights") + " in place of " + std::to_string(asked.flights),
-            [n](Session& s) { s.flights = n; });
+            std::max(0.0, work_.flight * static_cast<double>(n) - flown), [n](Session& s) { s.flights = n; });
     for (const Manoeuvre& m : manoeuvres_) {
       if (&m == asked.manoeuvre) continue;
       const std::string further = std::to_string(asked.flights) + " further ";
       if (m.config.log.rig) {
-        add(m.name, further + "runs, clamped to a force sensor", [&m](Session& s) { s.further = &m; });
-        add(m.name + "_filmed", further + "runs, clamped to a force sensor, the wings filmed",
+        const double runs = (asked.reference ? 2 : 1) * (work_.clamp + session);
+        add(m.name, further + "runs, clamped to a force sensor", runs, [&m](Session& s) { s.further = &m; });
+        add(m.name + "_filmed", further + "runs, clamped to a force sensor, the wings filmed", runs + work_.film,
             [&m](Session& s) { s.further = &m, s.films_further = true; });
       } else if (m.config.changes.any())
-        add(m.name, in_words(m.config.changes) + ", before " + further + "flights",
+        add(m.name, in_words(m.config.changes) + ", before " + further + "flights", work_.change + session,
             [&m](Session& s) { s.further = &m; });
-      else add(m.name, "this manoeuvre in place of " + asked.manoeuvre->name, [&m](Session& s) { s.manoeuvre = &m; });
+      else
+        add(m.name, "this manoeuvre in place of " + asked.manoeuvre->name, flown,
+            [&m](Session& s) { s.manoeuvre = &m; });
     }
     return all;
   }
@@ -198,7 +230,9 @@ class Planner {
     if (session.reference)
       discrepancy.session = read_session_variation(file(settings_.sessions, "gap/session_variation.toml"));
     const Question& question = question_of(flights);
-    const RobotFit robot = RobotFit::planned(question, flights, uncertain_, discrepancy, threads_);
+    sim::Randomisation uncertain = uncertain_;
+    if (session.weighed) uncertain.narrow(work_.weighed, work_.weighed_share);
+    const RobotFit robot = RobotFit::planned(question, flights, uncertain, discrepancy, threads_);
     const VerdictRule rule = question.rule(robot, rule_of(session));
     return separation_of(flights, robot, asked_, rule, threads_, sure);
   }
@@ -258,7 +292,7 @@ class Planner {
   }
 
   PlannedChoice weighed(const Session& session, const Plan& plan) const {
-    PlannedChoice c{session.name, session.what, true, 0, {}, {}};
+    PlannedChoice c{session.name, session.what, true, 0, session.hours, 0, {}, {}};
     const std::optional<Separation> s = separation(session, false);
     c.flies = s.has_value();
     if (!s) return c;
@@ -269,6 +303,10 @@ class Planner {
       const auto before = std::ranges::find(plan.effects, s->effects[i], &PlannedEffect::effect);
       if (before == plan.effects.end() || before->probability < kNamed) c.gained.push_back(s->effects[i]);
     }
+    double asked = 0;
+    for (const PlannedEffect& e : plan.effects)
+      asked += e.probability / static_cast<double>(plan.effects.size() + plan.unseen.size());
+    if (c.hours > 0) c.gained_per_hour = (c.probability - asked) / c.hours;
     return c;
   }
 
@@ -282,6 +320,7 @@ class Planner {
   sim::Randomisation uncertain_;
   std::vector<Manoeuvre> manoeuvres_;
   std::map<std::string, double> asked_;  ///< [effect] magnitude over the typical one
+  Work work_;
   ModelDiscrepancy discrepancy_;
 };
 

@@ -23,6 +23,7 @@ struct PlanSettings {
   bool matrix_only = false;  ///< neither other flights nor from which magnitude on an effect is sure
   /// Empty: the files of configs/gap that a diagnosis reads.
   std::string priors, discrepancy, verdict, sessions;
+  std::string work;                          ///< hours of work; empty: configs/gap/plan_work.toml
   std::map<std::string, double> magnitudes;  ///< [effect] the magnitude asked about over the typical one
   int threads = 0;                           ///< 0: one for each processor
 };

@@ -29,6 +29,8 @@ Json to_json(const Plan& plan) {
                        {"what", c.what},
                        {"flies", c.flies},
                        {"probability", c.probability},
+                       {"hours", c.hours},
+                       {"gained_per_hour", c.gained_per_hour},
                        {"named", c.named},
                        {"gained", c.gained}});
   return {{"schema", 1},

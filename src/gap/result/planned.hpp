@@ -31,6 +31,8 @@ struct PlannedChoice {
   /// How probable the diagnosis would find the effect that the robot has: mean over all effects of the catalogue; 0 for
   /// effects that are not seen.
   double probability = 0;
+  double hours = 0;                 ///< of work beyond the plan that was asked for; 0 if it takes less
+  double gained_per_hour = 0;       ///< probability beyond that of the plan that was asked for, over these hours
   std::vector<std::string> named;   ///< effects that the diagnosis would find with a probability of one half or more
   std::vector<std::string> gained;  ///< effects in `named` for which the plan that was asked for is below one half
 };

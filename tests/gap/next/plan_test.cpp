@@ -135,6 +135,13 @@ TEST(Plan, RefusesWhatCannotBeFlown) {
   for (const double times : {0.0, 17.0})
     EXPECT_EQ(with_change([&](PlanSettings& o) { o.magnitudes["wind"] = times; }),
               io::format("--magnitude wind: is %g; accepted: a factor above 0, at most 16.666666666666668", times));
+  const std::string work = testing::TempDir() + "work.toml";
+  std::string hours = io::read_text(FLAPPY_SOURCE_DIR "/configs/gap/plan_work.toml");
+  hours.replace(hours.find("film = 3.0"), 10, "film = -1.0");
+  io::write_atomically(work, hours);
+  const std::string refused = with_change([&](PlanSettings& o) { o.work = work; });
+  EXPECT_TRUE(refused.starts_with(work + ":9:")) << refused;
+  EXPECT_TRUE(refused.find("hours.film") != std::string::npos) << refused;
   EXPECT_TRUE(with_change([](PlanSettings& o) { o.sensors = "nowhere.toml"; }).find("nowhere.toml") !=
               std::string::npos);
 }
