@@ -219,7 +219,7 @@ void one_hash(const Case& c, std::uint64_t golden) {
       for (std::size_t i = 0; i < kSmall; ++i) small = small * 31 + fleet.hash(i, i + 1);
     }
   for (const std::string& set : test::instruction_sets())
-    for (const std::size_t size : test::kBatchSizes) {
+    for (const std::size_t size : test::batch_sizes(set)) {
       std::uint64_t all = 0;
       for (std::size_t first = 0; first < kSmall; first += size) {
         const Fleet<T> fleet = fly<T>(o, c.name, first, size, 2, set);
@@ -296,7 +296,7 @@ std::uint64_t hash_by_voltages(std::size_t size, int threads, const std::string&
 template <class T>
 void one_hash_by_voltages(std::uint64_t golden) {
   for (const std::string& set : test::instruction_sets())
-    for (const std::size_t size : test::kBatchSizes) {
+    for (const std::size_t size : test::batch_sizes(set)) {
       const int threads = size == 1 ? 1 : 3;
       const std::uint64_t hash = hash_by_voltages<T>(size, threads, set);
       EXPECT_EQ(hash, golden) << set << ", batches of " << size << ", " << threads << " threads: 0x" << std::hex

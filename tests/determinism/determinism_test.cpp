@@ -92,7 +92,7 @@ void one_hash(std::uint64_t golden) {
       for (std::size_t i = 0; i < kSmall; ++i) small = small * 31 + batch.hash(i, i + 1);
     }
   for (const std::string& set : test::instruction_sets())
-    for (const std::size_t size : test::kBatchSizes)
+    for (const std::size_t size : test::batch_sizes(set))
       EXPECT_EQ(hash_in_batches_of<T>(size, 2, set), small) << set << ", batches of " << size;
 }
 
@@ -147,15 +147,16 @@ std::uint64_t hash_of_affected(std::size_t size, int threads, const std::string&
 
 template <class T>
 void one_hash_of_affected(std::uint64_t golden) {
-  std::vector<std::size_t> sizes = test::kBatchSizes;
-  sizes.push_back(kAffected);
-  for (const std::string& set : test::instruction_sets())
+  for (const std::string& set : test::instruction_sets()) {
+    std::vector<std::size_t> sizes = test::batch_sizes(set);
+    sizes.push_back(kAffected);
     for (const std::size_t size : sizes) {
       const int threads = size == kAffected ? 3 : size == 1 ? 1 : 2;
       const std::uint64_t hash = hash_of_affected<T>(size, threads, set);
       EXPECT_EQ(hash, golden) << set << ", " << threads << " threads, batches of " << size << ": 0x" << std::hex
                               << hash;
     }
+  }
 }
 
 TEST(Determinism, EffectsInFloat) { one_hash_of_affected<float>(kGoldenEffectsFloat); }
@@ -269,13 +270,14 @@ std::uint64_t hash_of_set(std::size_t size, int threads, const std::string& inst
 
 template <class T>
 void one_hash_of_set(std::uint64_t golden) {
-  std::vector<std::size_t> sizes = test::kBatchSizes;
-  sizes.push_back(kSet);
-  for (const std::string& set : test::instruction_sets())
+  for (const std::string& set : test::instruction_sets()) {
+    std::vector<std::size_t> sizes = test::batch_sizes(set);
+    sizes.push_back(kSet);
     for (const std::size_t size : sizes) {
       const std::uint64_t hash = hash_of_set<T>(size, size == kSet ? 3 : 1, set);
       EXPECT_EQ(hash, golden) << set << ", batches of " << size << ": 0x" << std::hex << hash;
     }
+  }
 }
 
 TEST(Determinism, VoltagesInFloat) { one_hash_of_set<float>(kGoldenVoltagesFloat); }
@@ -337,13 +339,14 @@ std::uint64_t hash_of_touching(std::size_t size, int threads, const std::string&
 
 template <class T>
 void one_hash_of_touching(std::uint64_t golden) {
-  std::vector<std::size_t> sizes = test::kBatchSizes;
-  sizes.push_back(kTouch);
-  for (const std::string& set : test::instruction_sets())
+  for (const std::string& set : test::instruction_sets()) {
+    std::vector<std::size_t> sizes = test::batch_sizes(set);
+    sizes.push_back(kTouch);
     for (const std::size_t size : sizes) {
       const std::uint64_t hash = hash_of_touching<T>(size, size == kTouch ? 3 : 1, set);
       EXPECT_EQ(hash, golden) << set << ", batches of " << size << ": 0x" << std::hex << hash;
     }
+  }
 }
 
 TEST(Determinism, ContactInFloat) { one_hash_of_touching<float>(kGoldenContactFloat); }

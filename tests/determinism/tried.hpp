@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "flappy/batch.hpp"
+#include "full.hpp"
 
 namespace flappy::test {
 
@@ -26,5 +27,12 @@ inline const std::vector<std::size_t> kBatchSizes = {1, 17};
 
 inline std::vector<std::string> instruction_sets() { return sim::instruction_sets(); }
 #endif
+
+/// Batch sizes to try with an instruction set. Batches of one step a whole block for each flapper: without --full, of one set alone.
+inline std::vector<std::size_t> batch_sizes(const std::string& set) {
+  std::vector<std::size_t> sizes = kBatchSizes;
+  if (!full() && set != instruction_sets().back()) std::erase(sizes, 1U);
+  return sizes;
+}
 
 }  // namespace flappy::test

@@ -95,6 +95,7 @@ TEST(ForceFit, IntervalsHoldTheTruthAsOftenAsTheySay) {
 }
 
 TEST(ForceFit, EstimatesTheNoiseWhereNoneIsDeclared) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const model::Vehicle truth = changed(kFour);
   MeasuredMap m = simulate_forces(truth, sixteen(), {}, 5);
   const ForceFit declared = fit_forces(test::nominal(), m, config(kFour), one_start());
@@ -194,6 +195,7 @@ TEST(ForceFit, WhatIsSeenJointlyStaysFitted) {
 
 // Each alone can explain 25 %, both together explain the 36 % that were measured.
 TEST(ForceFit, KeepsTheUnseenWhoseNominalValueDoesNotFit) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   model::Vehicle truth = test::nominal();
   truth.left.motor.torque_constant_Nm_A *= 0.8;
   truth.left.motor.efficiency *= 0.8;
@@ -320,6 +322,7 @@ TEST(ForceFit, RefusesWhatCannotBeFitted) {
 }
 
 TEST(ForceFit, KeepsWhereEachStartEnded) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const std::vector<std::string> two(kFour.begin(), kFour.begin() + 2);
   std::vector<sim::Input> inputs = default_inputs();
   inputs.resize(16);

@@ -10,6 +10,7 @@
 
 #include "dart_peer.hpp"
 #include "flappy/batch.hpp"
+#include "full.hpp"
 #include "io/csv.hpp"
 #include "mujoco_peer.hpp"
 #include "vehicles.hpp"
@@ -114,6 +115,7 @@ TEST(FreeFlight, IsThatOfMujocoWithHardStops) {
 }
 
 TEST(FreeFlight, IsWhereDartTends) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   // The rotor's inertia lags by a step, an error of first order: 0.35 mm at 10 us, half of it at 5 us.
   // Extrapolated, what is left is how far the extrapolation from 20 and 10 us is from that of 10 and 5 us:
   // 0.15 mm.
@@ -189,6 +191,7 @@ TEST(BeatAveragedThrust, IsThatOfMujoco) {
 }
 
 TEST(BeatAveragedThrust, IsWhereDartTends) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   // first order again: 0.07 % at 10 us, from which 20 us is as far as zero
   const auto dart = [](double step_s) {
     return mean_thrust_N(DartPeer(test::nominal(), {.step_s = step_s, .torso_welded = true}), step_s, 10);

@@ -158,6 +158,7 @@ TEST(BeatAveragedContrast, TellsWhenAMotorBreaks) {
 // Flights of one session differ by 4 % of a motor, far more than sessions of other robots do: none is odd, but one that
 // differs by 40 %.
 TEST(BeatAveragedContrast, AFlightIsOddAmongThoseOfItsSet) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   std::vector<Robot> before(6);
   for (std::size_t i = 0; i < before.size(); ++i) before[i].thrust_N[0] *= i % 2 == 0 ? 0.96 : 1.04;
   EXPECT_TRUE(contrast(before, {{}}, "one").odd.empty());
@@ -200,6 +201,7 @@ TEST(BeatAveragedContrast, AWeightAtAMotorIsAChange) {
 
 // A flight that is too short, or whose data have a fault, is left out and named; flights of one session count once.
 TEST(BeatAveragedContrast, LeavesOutDoubtfulFlights) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const flight::Folder folder;
   DiagnosisSettings settings;
   settings.vehicle = test::source_path("configs/vehicles/crazyflie_sd.toml");

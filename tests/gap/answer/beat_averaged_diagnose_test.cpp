@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "full.hpp"
 #include "gap/answer/verdict.hpp"
 #include "gap/diagnose/diagnose.hpp"
 #include "gap/question/validation.hpp"
@@ -201,6 +202,7 @@ TEST(BeatAveragedDiagnosis, ShiftsCopiesInShortFlightsToo) {
 }
 
 TEST(BeatAveragedDiagnosis, SaysTheSameOfForcesThatItsSimulatorPredicted) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const Inference &by_equations = lacking(), d = diagnose_robot(kLacking, {}, by_simulator());
   EXPECT_EQ(d.verdict.kind, by_equations.verdict.kind);
   EXPECT_EQ(d.verdict.effects, by_equations.verdict.effects);

@@ -19,6 +19,7 @@ namespace {
 using Eigen::Index;
 
 TEST(Fit, FindsTheIdentifiedVehicleFromTheNominalOne) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const Flights flights = flown("hummingbird_identified");
   const sim::Randomisation prior = shipped_priors();
   const Hypothesis none(prior, {});

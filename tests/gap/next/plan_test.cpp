@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "full.hpp"
 #include "gap/flown_flights.hpp"
 #include "gap/next/next_experiment.hpp"
 #include "gap/next/separation.hpp"
@@ -59,6 +60,7 @@ class SeparationOfTour : public testing::Test {
 
 // Noise alone lets a gain of N nats vary by sqrt(2 N); the flight of a robot with the effect takes another path.
 TEST_F(SeparationOfTour, ExpectsWhatScreeningFinds) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   const Separation s = of({{"spring_hardening", 1}, {"mocap_delay", 1}});
   for (const std::string effect : {"spring_hardening", "mocap_delay"}) {
     const Flights flown = tour(with(effect, 1));

@@ -120,6 +120,7 @@ TEST(FamilyASessions, LeaveSessionZeroAsItWas) {
 }
 
 TEST(FamilyASessions, FlyOnAnotherDay) {
+  if (!test::full()) GTEST_SKIP() << "takes seconds: with --full";
   Assignment a = assignment();
   a.conventions = a.power = a.wings = true;
   const FamilyFlight before = short_flight(a, 0), after = short_flight(a, 1), again = short_flight(a, 1);
