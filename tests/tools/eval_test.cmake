@@ -39,14 +39,14 @@ file(COPY ${WORK}/task.toml DESTINATION ${WORK}/run/config)
 
 # What this needs: half a second of flight, few flights.
 set(short --set flight.duration_s=0.65 --set task.success.keep.until_s=0.65)
-set(few ${short} --episodes 130)
+set(few ${short} --episodes 70)
 
 # ---- a table, and figures by name
 
 run(${WORK}/run ${few} --json ${WORK}/run.json)
 expect_equal("stderr" "${err}" "")
 expect_equal("exit code" "${code}" 0)
-expect_match("stdout" "${out}" "^130 flights of 0.65 s, task escape, seed 1, test vehicles, float\n +policy +PID alone +ARC alone\n")
+expect_match("stdout" "${out}" "^70 flights of 0.65 s, task escape, seed 1, test vehicles, float\n +policy +PID alone +ARC alone\n")
 foreach(row IN ITEMS "success, %( +[0-9.]+)+\n" "95 % interval, from( +[0-9.]+)+\n" "time to capture, s, median( +[-0-9.]+)+\n"
     "overshoot, mm, median( +[-0-9.]+)+\n" "final position error, mm, median( +[0-9.]+)+\n" "final heading error, deg, median( +[0-9.]+)+\n"
     "energy of the manoeuvre, J, median( +[0-9.]+)+\n" "mean power, W, median( +[0-9.]+)+\n" "failed: never captured( +[0-9]+)+\n"
@@ -55,10 +55,10 @@ foreach(row IN ITEMS "success, %( +[0-9.]+)+\n" "95 % interval, from( +[0-9.]+)+
 endforeach()
 # ---- what it survives
 
-run(${WORK}/run ${short} --episodes 20 --effects --json ${WORK}/effects.json)
+run(${WORK}/run ${short} --episodes 8 --effects --json ${WORK}/effects.json)
 expect_match("stderr, where a slow machine is told how far it is" "${err}" "^(effects flown [0-9]+ %[^\n]*\n)*$")
 expect_equal("exit code" "${code}" 0)
-expect_match("stdout" "${out}" "^20 flights each, task escape, seed 1, test vehicles: success, %, by magnitude of an effect in units of its typical one\n +0.5 +1 +1.5 +2\n  none +[0-9.]+\n")
+expect_match("stdout" "${out}" "^8 flights each, task escape, seed 1, test vehicles: success, %, by magnitude of an effect in units of its typical one\n +0.5 +1 +1.5 +2\n  none +[0-9.]+\n")
 file(READ ${WORK}/effects.json json)
 string(JSON count LENGTH "${json}" effects)
 string(REGEX MATCHALL "\n  [a-z_]+( +([0-9.]+|-))( +([0-9.]+|-))( +([0-9.]+|-))( +([0-9.]+|-))" rows "${out}")
@@ -93,7 +93,7 @@ foreach(cause IN ITEMS not_finite crashed out_of_bounds too_late never_captured 
   string(JSON flights GET "${json}" failures ${cause})
   math(EXPR failed "${failed} + ${flights}")
 endforeach()
-expect_equal("flights that failed" "${failed}" 130)  # it does not even turn
+expect_equal("flights that failed" "${failed}" 70)  # it does not even turn
 
 # ---- the same bytes for any number of threads, and from every form of the policy
 

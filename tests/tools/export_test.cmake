@@ -54,7 +54,7 @@ endforeach()
 
 # it flies every episode as the run does: the same count, the same hash of all motion
 function(flown result)
-  execute_process(COMMAND ${EVAL} ${ARGN} --episodes 60 --no-baselines --json ${WORK}/eval.json OUTPUT_QUIET ERROR_VARIABLE err
+  execute_process(COMMAND ${EVAL} ${ARGN} --episodes 24 --no-baselines --json ${WORK}/eval.json OUTPUT_QUIET ERROR_VARIABLE err
     RESULT_VARIABLE code)
   expect_equal("exit code of flappy-eval: ${err}" "${code}" 0)
   file(READ ${WORK}/eval.json json)

@@ -17,8 +17,8 @@ from pathlib import Path
 
 program, config, work = sys.argv[1], sys.argv[2], Path(sys.argv[3])
 full, launchers = "--full" in sys.argv, [word for word in sys.argv[4:] if word != "--full"]
-updates = 600 if full else 300
-small = [f"learn.updates={updates}", f"evaluate.every={updates // 2}", "evaluate.vehicles=101", "checkpoint.every=150", "collect.vehicles=32",
+updates = 600 if full else 200
+small = [f"learn.updates={updates}", f"evaluate.every={updates // 2}", f"evaluate.vehicles={101 if full else 37}", f"checkpoint.every={150 if full else 100}", "collect.vehicles=32",
          "collect.flappers=200", "learn.replay=20000"]
 lost = 75
 
@@ -104,7 +104,7 @@ for kill in range(10 if full else 1):
     victim, hangs = randomness.randrange(size), kill % 5 == 1
     processes = together(size, fresh(folder))
     deadline = time.monotonic() + 60
-    while not list(folder.glob("checkpoint_*15*")):
+    while not list(folder.glob(f"checkpoint_*{15 if full else 10}*")):
         assert time.monotonic() < deadline and processes[0].poll() is None, folder
         time.sleep(0.02)
     time.sleep(randomness.uniform(0, 0.3))

@@ -7,7 +7,7 @@ set(escape ${SOURCE}/configs/train/escape.toml)
 set(small --set collect.flappers=48 --set collect.vehicles=16 --set networks.critic=[32,32] --set learn.replay=4000
   --set learn.batch=64 --set evaluate.vehicles=32 --set flight.duration_s=0.4 --set task.success.keep.from_s=0.36
   --set task.success.keep.until_s=0.4)
-set(some ${small} --set learn.updates=60000 --set evaluate.every=12000 --set checkpoint.every=600)
+set(some ${small} --set learn.updates=30000 --set evaluate.every=6000 --set checkpoint.every=600)
 
 # ---- a run and what it leaves
 
@@ -15,7 +15,7 @@ run(${escape} ${some} --out ${WORK}/whole --threads 1 --json ${WORK}/whole.json)
 expect_match("stderr, where a slow machine is told how far it is" "${err}" "^(trained [0-9]+ %[^\n]*\n)*$")
 expect_equal("exit code" "${code}" 0)
 expect_match("stdout" "${out}" "^${WORK}/whole: seed 0, 1 threads, [0-9]+ MB of memory, at most [0-9]+ MB on disk\n")
-foreach(row IN ITEMS "trained: seed 0, 60000 updates in [0-9.]+ s .and [0-9.]+ s of evaluation., [0-9.]+ million environment steps\n"
+foreach(row IN ITEMS "trained: seed 0, 30000 updates in [0-9.]+ s .and [0-9.]+ s of evaluation., [0-9.]+ million environment steps\n"
     "best success on validation vehicles: [0-9.]+ %, at update [0-9]+\n" "time to 50, 80, 90, 95 % success:( [-0-9.s]+)+\n"
     "simulation [0-9]+ %, learning [0-9]+ %, the rest [0-9]+ %" "policy ${WORK}/whole/best.json, last checkpoint's payload [0-9a-f]+\n"
     "\nshown by: flappy-report ${WORK}/whole --out report.html\n$")
@@ -29,7 +29,7 @@ expect_keys(${WORK}/whole/run.json commit=STRING processor=STRING instruction_se
 
 file(READ ${WORK}/whole/log.txt text)
 set(time "[-0-9]+T[0-9:.+-]+")
-expect_match("log.txt" "${text}" "^${time} info: flappy-train [0-9.]+, commit [^ ]+: [^\n]+--threads 1[^\n]*\n(${time} info: update [0-9]+: [^\n]+\n)+${time} info: trained, update 60000\n$")
+expect_match("log.txt" "${text}" "^${time} info: flappy-train [0-9.]+, commit [^ ]+: [^\n]+--threads 1[^\n]*\n(${time} info: update [0-9]+: [^\n]+\n)+${time} info: trained, update 30000\n$")
 
 # What a run must leave, to the byte.
 function(digest folder result)
@@ -49,18 +49,18 @@ digest(${WORK}/whole expected)
 file(SHA256 ${WORK}/whole/summary.json before)
 run(--resume ${WORK}/whole --json ${WORK}/finished.json)
 expect_equal("exit code: ${err}" "${code}" 0)
-expect_equal("stdout" "${out}" "${WORK}/whole: is finished: seed 0, 60000 updates; nothing is left to do\nshown by: flappy-report ${WORK}/whole --out report.html\n")
+expect_equal("stdout" "${out}" "${WORK}/whole: is finished: seed 0, 30000 updates; nothing is left to do\nshown by: flappy-report ${WORK}/whole --out report.html\n")
 file(SHA256 ${WORK}/whole/summary.json after)
 expect_equal("summary.json of a finished run" "${after}" "${before}")
 file(SHA256 ${WORK}/finished.json after)
 expect_equal("--json of a finished run" "${after}" "${before}")
 
-# ---- killed ten times at random moments: the same bytes in the end
+# ---- killed six times at random moments: the same bytes in the end
 
-string(RANDOM LENGTH 10 ALPHABET 0123456789 moments)
+string(RANDOM LENGTH 6 ALPHABET 0123456789 moments)
 set(command ${escape} ${some} --out ${WORK}/killed --threads 2)
 set(kills 0)
-foreach(k RANGE 9)
+foreach(k RANGE 5)
   string(SUBSTRING "${moments}" ${k} 1 moment)
   execute_process(COMMAND ${TIMEOUT} -s KILL 0.${moment}7 ${PROGRAM} ${command} OUTPUT_QUIET ERROR_VARIABLE err RESULT_VARIABLE code)
   if(code EQUAL 137 OR code MATCHES "killed")
