@@ -82,6 +82,16 @@ void check_resonance(const FlightLog& log, Findings& findings) {
   }
   const std::string seen =
       format("the sensor resonates at %.4g Hz; harmonics up to %.4g Hz are compared", resonance, band);
+  if (const double rate = log.header.rig->rate_hz; 2 * resonance > rate && resonance > kFree * band) {
+    findings.push_back(
+        {"rig resonance",
+         Verdict::warning,
+         seen + format(", but %.4g samples/s fold what rings above %.4g Hz into these: filter it before it "
+                       "is sampled, or sample faster",
+                       rate, rate / 2),
+         {}});
+    return;
+  }
   if (resonance > kFree * band) findings.push_back({"rig resonance", Verdict::ok, seen, {}});
   else
     findings.push_back({"rig resonance",

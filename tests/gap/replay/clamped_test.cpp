@@ -151,6 +151,9 @@ TEST(Clamped, IsCheckedByItsForces) {
   EXPECT_NE(warns("rig resonance", [](flightlog::FlightLog& l) { l.header.rig->resonance_hz = 120; })
                 .find("it magnifies them"),
             std::string::npos);
+  EXPECT_NE(warns("rig resonance", [](flightlog::FlightLog& l) { l.header.rig->resonance_hz = 690; })
+                .find("1000 samples/s fold what rings above 500 Hz into these"),
+            std::string::npos);
   EXPECT_NE(warns("latencies", [](flightlog::FlightLog& l) { l.header.rig->latency_s = 2; }).find("rig.latency_s = 2"),
             std::string::npos);
   EXPECT_EQ(warns("rig resonance", [](flightlog::FlightLog& l) { l.header.rig->resonance_hz = 400; }), "");
