@@ -25,7 +25,7 @@ Collector::Collector(const TrainConfig& config, io::Ranks* ranks)
     : config_(config),
       ranks_(ranks),
       fly_(of_training(config)),
-      fleet_(config.flappers, fly_.vehicle, fly_.fleet),
+      fleet_(config.flappers, fly_.roomy_vehicle(), fly_.fleet),
       inputs_(fly_.fleet.task.observation().size()),
       outputs_(static_cast<std::size_t>(fly_.fleet.task.actions())),
       kept_(config.return_steps),

@@ -545,8 +545,13 @@ TrainCosts costs_of(const TrainConfig& config) {
                                2 * weights(l.shape.observation + l.shape.action, l.critic_hidden, 1)) *
                               sizeof(float);
   const std::size_t history = inputs * sizeof(float), pending = (config.return_steps + 1) * history;
-  const std::size_t own = config.flappers * (kFlapper + history + pending);
-  const std::size_t others = (1024 + config.vehicles + config.evaluate_vehicles) * (kFlapper + history);
+  std::size_t effects = 0;  // parameters and memory of those that may be drawn
+  if (config.fly.drawn_effects)
+    for (const auto& [effect, weight] : config.fly.drawn_effects->of)
+      effects += (effect->parameters.size() + static_cast<std::size_t>(effect->states)) * sizeof(float);
+  const std::size_t flapper = kFlapper + effects;
+  const std::size_t own = config.flappers * (flapper + history + pending);
+  const std::size_t others = (1024 + config.vehicles + config.evaluate_vehicles) * (flapper + history);
   constexpr std::size_t kParts = 16 + 4 + 4;  // gradients at most; weights, targets, moments; text of the actor
   return {replay + own + others + kParts * numbers + kRest, (config.keep + 1) * (replay + own + 8 * numbers + kRest)};
 }

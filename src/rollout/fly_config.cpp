@@ -140,7 +140,7 @@ class Reader {
   FlyConfig read() {
     root_.schema(1);
     root_.accept({"schema", "precision", "flight", "world", "constant_input", "excitation", "log", "vehicle", "task",
-                  "sensors", "controller", "randomisation", "actor", "dds", "changes"});
+                  "sensors", "controller", "randomisation", "drawn_effects", "actor", "dds", "changes"});
     c_.precision = root_.choice("precision", {"float", "double"});
     read_flight();
     c_.fleet.batch.world = read_world(root_);
@@ -149,6 +149,10 @@ class Reader {
     c_.changes = model::read_changes(root_);
     c_.dds = io::read_dds_config(root_);
     read_files();
+    if (const auto t = root_.optional_table("drawn_effects")) {
+      c_.drawn_effects = read_drawn_effects(*t, c_.vehicle, c_.fleet.batch.world.has_ground());
+      c_.vehicle_sha256.clear();
+    }
     if (root_.has("actor")) c_.actor = fitting_actor(root_, c_.fleet.task);
     root_.finish();
     if (c_.fleet.task.sets_voltages()) refuse_inputs();
@@ -387,9 +391,16 @@ void limit_delays(const flight::FleetOptions& fleet, model::Vehicle& v) {
 
 model::Vehicle FlyConfig::vehicle_of(std::uint32_t flapper, std::uint32_t episode) const {
   model::Vehicle v = randomisation ? randomisation->sample({fleet.seed, flapper, episode}) : vehicle;
-  if (randomisation) limit_delays(fleet, v);
+  if (drawn_effects) drawn_effects->add({fleet.seed, flapper, episode}, v);
+  if (draws_vehicles()) limit_delays(fleet, v);
   for (const auto& [id, values] : added_effects) v.effects[id] = values;
   apply(changes, v);
+  return v;
+}
+
+model::Vehicle FlyConfig::roomy_vehicle() const {
+  model::Vehicle v = vehicle;
+  if (drawn_effects) drawn_effects->make_room(v);
   return v;
 }
 

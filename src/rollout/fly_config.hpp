@@ -11,6 +11,7 @@
 //   [[world.box]]     centre_m, edges_m, rotation_rad = [x, y, z] (a rotation vector, optional)
 //   [[world.cylinder]] from_m, to_m (ends of its axis), radius_m
 //   [constant_input]  and [[excitation]]: excitation.hpp
+//   [drawn_effects]   effects of the catalogue that each vehicle draws: drawn_effects.hpp
 //   [changes]         what was done to the robot on purpose: model/changes.hpp
 //   [log.power]       battery_nominal_V, rate_hz, latency_s, voltage_noise_V, current_noise_A
 //   [log.wings]       rate_hz, noise_rad
@@ -29,6 +30,7 @@
 #include "flightlog/flight_log.hpp"
 #include "io/dds_config.hpp"
 #include "model/changes.hpp"
+#include "rollout/drawn_effects.hpp"
 #include "rollout/watch.hpp"
 #include "sim/randomise.hpp"
 
@@ -48,6 +50,7 @@ struct FlyConfig {
   std::string vehicle_text;    ///< text of that file; with overrides, the resolved text
   model::Vehicle vehicle;
   std::optional<sim::Randomisation> randomisation;
+  std::optional<DrawnEffects> drawn_effects;  ///< added to each vehicle, before added_effects
   /// Effects that are added to every vehicle, randomised or not; same form as model::Vehicle::effects.
   std::map<std::string, std::map<std::string, double>> added_effects;
   model::Changes changes;  ///< made to every vehicle, last
@@ -63,8 +66,13 @@ struct FlyConfig {
   /// Texts by file name, overrides applied, defaults filled in; fly.toml names the others. Without actors and scripts.
   std::map<std::string, std::string> resolved;
 
-  /// The vehicle of a flapper in an episode. With randomisation, every flapper and episode has a vehicle of its own.
+  /// The vehicle of a flapper in an episode. With randomisation or drawn effects, every flapper and episode has a
+  /// vehicle of its own.
   model::Vehicle vehicle_of(std::uint32_t flapper, std::uint32_t episode = 0) const;
+  bool draws_vehicles() const { return randomisation.has_value() || drawn_effects.has_value(); }
+  /// The vehicle with all effects that may be drawn, without their forces: a fleet of it never has to make room for their
+  /// memory, so that checkpoints of it are of one size.
+  model::Vehicle roomy_vehicle() const;
 };
 
 FlyConfig unwatched(FlyConfig config);

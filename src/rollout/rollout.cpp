@@ -40,7 +40,7 @@ void Rollout<T>::start(flight::Fleet<T>& fleet, const FlyConfig& config, std::si
   if (hover != nullptr) return fleet.start(i, episode, *hover);
   const sim::RandomKey key{fleet.options().seed, fleet.options().first_flapper + static_cast<std::uint32_t>(i),
                            episode};
-  if (config.randomisation || config.changes.any() || !config.added_effects.empty())
+  if (config.draws_vehicles() || config.changes.any() || !config.added_effects.empty())
     fleet.set_vehicle(i, config.vehicle_of(key.flapper, episode));
   const flight::Task& task = fleet.options().task;
   fleet.start(i, episode, task.sample_start(key), config.welded ? sim::Start::welded : task.start.kind);

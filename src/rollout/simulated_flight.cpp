@@ -25,6 +25,7 @@ std::vector<SimulatedFlight> simulate(const FlyConfig& given, const model::Vehic
   FlyConfig config = given;
   config.vehicle = vehicle;
   config.randomisation.reset();
+  config.drawn_effects.reset();
   config.fleet.batch.threads = 1;
   Rollout<double> rollout(std::move(config), copies);
   std::vector<SimulatedFlight> flights(copies);

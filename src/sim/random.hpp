@@ -26,6 +26,7 @@ enum class Stream : std::uint32_t {
   snapshot = 13,
   force_sensor = 14,
   design = 15,
+  effects = 16,
 };
 
 struct RandomKey {

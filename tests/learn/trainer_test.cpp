@@ -115,6 +115,21 @@ TEST(Trainer, GoesOnFromAnyStopAsIfNothingHadBeen) {
   EXPECT_TRUE(left_in(stopped) == expected);
 }
 
+/// Flappers meet effects that none of the first episodes had: their memory has to be there from the start.
+TEST(Trainer, GoesOnWithEffectsThatAreDrawn) {
+  const Overrides drawn = {"drawn_effects.none=0.5", "drawn_effects.most=1",    "drawn_effects.magnitude=2",
+                           "collect.flappers=16",    "collect.vehicles=48",     "learn.updates=16",
+                           "evaluate.every=16",      "collect.steps_before=45", "flight.duration_s=2"};
+  for (const std::string name : {"escape", "flapper_dash"}) {
+    const fs::path whole = fresh("drawn_whole_" + name), stopped = fresh("drawn_stopped_" + name);
+    const TrainConfig c = small_training(drawn, name);
+    train_in(whole, c);
+    train_in(stopped, c, [](const TrainProgress& p) { return p.update < 8; });
+    train_in(stopped, c, {}, newest_checkpoint(stopped).path());
+    EXPECT_TRUE(left_in(stopped) == left_in(whole)) << name;
+  }
+}
+
 TEST(Trainer, SumsWhatItsPartsTook) {
   const fs::path folder = fresh("parts");
   const TrainConfig c = small_training();

@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "io/sha256.hpp"
+#include "model/effects/registry.hpp"
 #include "rollout/fly.hpp"
 #include "rollout/fly_fixture.hpp"
 
@@ -71,6 +72,99 @@ TEST(FlyConfig, LimitsDrawnDelays) {
   EXPECT_EQ(least_s, -0.006);
   EXPECT_EQ(most_s, 254 * 5e-5);
   EXPECT_EQ(rollout::fly(c, {.count = 64}).summary.flights, 64u);
+}
+
+TEST(FlyConfig, DrawsEffectsOfTheCatalogue) {
+  const std::vector<std::string> drawn = {"drawn_effects.none=0.3",
+                                          "drawn_effects.most=3",
+                                          "drawn_effects.magnitude=2",
+                                          "drawn_effects.weights.command_delay=20",
+                                          "drawn_effects.weights.com_offset=0",
+                                          "randomisation=../randomisation/published.toml"};
+  const auto with = [&](const std::string& more) {
+    std::vector<std::string> all = drawn;
+    all.push_back(more);
+    return rollout::read_fly_config(kHover, all);
+  };
+  const rollout::FlyConfig c = with("flight.duration_s=0.01"), as_filed = with("drawn_effects.none=1"),
+                           own = with("vehicle.effects.command_delay.delay_s=0.001");
+  EXPECT_EQ(c.vehicle_sha256, "");
+  constexpr std::uint32_t kVehicles = 2000;
+  std::map<std::size_t, double> of_count;
+  std::map<std::string, double> share;
+  double lowest = 0, highest = 0, left = 0, right = 0, longest_s = 0;
+  for (std::uint32_t i = 0; i < kVehicles; ++i) {
+    const model::Vehicle v = c.vehicle_of(i);
+    of_count[v.effects.size()] += 1.0 / kVehicles;
+    EXPECT_EQ(v.torso.mass_kg, as_filed.vehicle_of(i).torso.mass_kg) << "the rest is randomised as without";
+    for (const auto& [id, values] : v.effects) {
+      share[id] += 1.0 / kVehicles;
+      const model::CatalogueEffect& effect = model::effect_within_beat(id);
+      EXPECT_EQ(values.size(), static_cast<std::size_t>(effect.info.magnitudes)) << id;
+      for (const model::EffectParameter& p : effect.parameters)
+        if (values.contains(p.name)) {
+          EXPECT_GE(values.at(p.name), p.low) << id;
+          EXPECT_LE(values.at(p.name), p.high) << id;
+        }
+    }
+    const auto value = [&](const char* id, const char* name) {
+      return v.effects.contains(id) ? v.effects.at(id).at(name) : 0;
+    };
+    lowest = std::min(lowest, value("wind", "x_m_s"));
+    highest = std::max(highest, value("wind", "x_m_s"));
+    left = std::max(left, value("wing_damage", "left_area"));
+    right = std::max(right, value("wing_damage", "right_area"));
+    longest_s = std::max(longest_s, value("command_delay", "delay_s"));
+    if (own.vehicle_of(i).effects.contains("command_delay")) continue;
+    ADD_FAILURE() << "an effect of the file is gone";
+  }
+  EXPECT_NEAR(of_count[0], 0.3, 0.04);
+  for (const std::size_t count : {1U, 2U, 3U}) EXPECT_NEAR(of_count[count], 0.7 / 3, 0.04) << count;
+  EXPECT_FALSE(share.contains("com_offset"));
+  EXPECT_EQ(share.size(), model::effects().size() - 1);
+  EXPECT_GT(share["command_delay"], 0.3);
+  EXPECT_LT(lowest, -0.4) << "of twice 0.3 m/s, both ways";
+  EXPECT_GT(highest, 0.4);
+  EXPECT_GT(left, 0.05) << "of twice 0.05";
+  EXPECT_GT(right, 0.05) << "either wing";
+  EXPECT_GT(longest_s, 0.0175);
+  EXPECT_LE(longest_s, 0.018);
+  for (std::uint32_t i = 0; i < 50; ++i) {
+    EXPECT_EQ(own.vehicle_of(i).effects.at("command_delay").at("delay_s"), 0.001) << "that of the file stays";
+    EXPECT_EQ(c.vehicle_of(i).effects, c.vehicle_of(i).effects);
+  }
+  EXPECT_EQ(as_filed.vehicle_of(3).effects.size(), 0U);
+
+  Folder folder;
+  for (const auto& [file, text] : c.resolved) folder.write(file, text);
+  EXPECT_EQ(rollout::fly(rollout::read_fly_config(folder / "fly.toml"), {.count = 40}).hash,
+            rollout::fly(c, {.count = 40}).hash);
+}
+
+TEST(FlyConfig, RefusesEffectsThatCannotBeDrawn) {
+  const auto refused = [](std::vector<std::string> with) {
+    for (const char* needed : {"none=0", "most=1", "magnitude=2"}) {
+      const std::string key = std::string("drawn_effects.") + needed;
+      const std::string name = key.substr(0, key.find('='));
+      if (std::ranges::none_of(with, [&](const std::string& w) { return w.starts_with(name + "="); }))
+        with.insert(with.begin(), key);
+    }
+    return refusal(with);
+  };
+  EXPECT_EQ(refused({}), "accepted");
+  EXPECT_EQ(refused({"drawn_effects.none=1.5"}),
+            "--set drawn_effects.none=1.5: drawn_effects.none: 1.5 is out of range; accepted: a number from 0 to 1");
+  EXPECT_EQ(refused({"drawn_effects.weights.wing_damge=1"}),
+            "--set drawn_effects.weights.wing_damge=1: drawn_effects.weights.wing_damge: is no effect of this vehicle; "
+            "accepted: those that docs/reference/effects.md lists for it; did you mean \"wing_damage\"?");
+  EXPECT_EQ(refused({"drawn_effects.weights.tether=1", "world.ground_z_m=-1e3"}),
+            "--set drawn_effects.weights.tether=1: drawn_effects.weights.tether: has no ground that it hangs down to; "
+            "accepted: 0, or world.ground_z_m");
+  std::vector<std::string> none;
+  for (const model::CatalogueEffect& e : model::effects())
+    none.push_back(std::string("drawn_effects.weights.") + e.info.id + "=0");
+  EXPECT_NE(refused(none).find("drawn_effects.weights: are all 0; accepted: one above 0"), std::string::npos)
+      << refused(none);
 }
 
 TEST(FlyConfig, DrawsFromThePosteriorOfTheVehicle) {

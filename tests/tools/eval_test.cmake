@@ -73,6 +73,19 @@ foreach(k IN ITEMS 0 8 12)  # of the vehicle, the battery, the gear: each flies 
   endif()
 endforeach()
 
+# Of drawn effects nothing is left then; the worst and the mean are those of the rows.
+run(${WORK}/run ${short} --episodes 20 --effects --magnitudes 2 --set drawn_effects.none=0 --set drawn_effects.most=1 --set drawn_effects.magnitude=2
+  --json ${WORK}/drawn.json)
+expect_equal("exit code" "${code}" 0)
+file(READ ${WORK}/drawn.json drawn)
+string(JSON drawn_hash GET "${drawn}" hash)
+expect_equal("hash without the drawn effects" "${drawn_hash}" "${hash}")
+string(JSON with GET "${json}" effects 3 success 3 hash)
+string(JSON drawn_hash GET "${drawn}" effects 3 success 0 hash)
+expect_equal("hash with an effect at twice its typical magnitude" "${drawn_hash}" "${with}")
+expect_match("stdout" "${out}" "\n  the worst of these effects +[0-9.]+\n  their mean +[0-9.]+\n")
+expect_refused("flappy-eval: --magnitudes requires --effects; see flappy-eval --help" ${WORK}/run --magnitudes 1)
+
 # A file of a run folder flies as its run does: here 0.65 s without being told.
 string(REGEX REPLACE "duration_s = [^\n]*" "duration_s = 0.65" brief "${run_fly}")
 file(WRITE ${WORK}/brief/config/fly.toml "${brief}")
@@ -169,7 +182,7 @@ expect_refused("task \"escape\" would be flown without its excitation, which fla
 expect_refused("flappy-eval: --episodes: Value 0 not in range 1 to 100000; see flappy-eval --help" ${WORK}/best.json --episodes 0)
 expect_refused("flappy-eval: --stream: training not in {test,validation}; see flappy-eval --help" ${WORK}/best.json --stream training)
 expect_refused("flappy-eval: policy is required; see flappy-eval --help")
-expect_refused("flappy-eval: --episode: no such option; accepted: --allow-network, --config, --effects, --episodes, --help, --json, --log-level, --no-baselines, --progress, --seed, --set, --stream, --task, --threads, --vehicle, --version; did you mean \"--episodes\"?; see flappy-eval --help" ${WORK}/best.json --episode=5)
+expect_refused("flappy-eval: --episode: no such option; accepted: --allow-network, --config, --effects, --episodes, --help, --json, --log-level, --magnitudes, --no-baselines, --progress, --seed, --set, --stream, --task, --threads, --vehicle, --version; did you mean \"--episodes\"?; see flappy-eval --help" ${WORK}/best.json --episode=5)
 
 # ---- no output replaces what is read
 

@@ -11,6 +11,7 @@
 #include "io/progress.hpp"
 #include "io/schema.hpp"
 #include "io/sha256.hpp"
+#include "io/text.hpp"
 #include "io/toml_writer.hpp"
 #include "model/effects/registry.hpp"
 #include "rollout/evaluation.hpp"
@@ -40,6 +41,7 @@ struct Request {
   std::uint64_t seed = 1;
   int threads = 0;
   bool no_baselines = false, effects = false;
+  std::vector<double> magnitudes = {0.5, 1, 1.5, 2};  ///< of effects, in units of an effect's typical magnitude
   io::Ranks* ranks = nullptr;
 };
 
@@ -302,9 +304,6 @@ Controller controller_named(const std::string& name, const FlyConfig& config) {
   return flight::read_controller(io::Config::load(io::config_path("controllers/" + name + ".toml")).root());
 }
 
-/// Magnitudes of an effect to evaluate, in units of its typical magnitude.
-constexpr double kMagnitudes[] = {0.5, 1, 1.5, 2};
-
 /// The configuration with one effect of the catalogue at `magnitude` times its typical magnitudes, clamped to what a vehicle file accepts.
 FlyConfig with_effect(FlyConfig config, const model::CatalogueEffect& effect, double magnitude) {
   auto& values = config.added_effects[effect.info.id];
@@ -316,9 +315,27 @@ FlyConfig with_effect(FlyConfig config, const model::CatalogueEffect& effect, do
   return config;
 }
 
-/// Evaluates the success of the policy with each effect, by magnitude.
-void evaluate_effects(const Request& request, const FlyConfig& config, const rollout::Agent& agent,
+/// The lowest and the mean success over all effects that were flown, at one magnitude.
+struct OverEffects {
+  std::optional<double> worst, mean;
+};
+OverEffects over_effects(const Json& effects, std::size_t magnitude) {
+  OverEffects over;
+  double sum = 0, count = 0;
+  for (const Json& effect : effects) {
+    const Json& rate = effect.at("success").at(magnitude).at("rate");
+    if (rate.is_null()) continue;
+    over.worst = std::min(over.worst.value_or(1), rate.get<double>());
+    sum += rate.get<double>(), count += 1;
+  }
+  if (count > 0) over.mean = sum / count;
+  return over;
+}
+
+/// Evaluates the success of the policy with each effect, by magnitude; vehicles draw no other effects.
+void evaluate_effects(const Request& request, FlyConfig config, const rollout::Agent& agent,
                       const io::Program& program) {
+  config.drawn_effects.reset();
   const auto stream = request.stream == "test" ? rollout::kTestFlappers : rollout::kValidationFlappers;
   const rollout::EvaluationOptions options{.count = request.episodes, .first_flapper = stream, .ranks = request.ranks};
   io::ProgressLine progress("effects flown");
@@ -333,15 +350,14 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
     return rollout::summarise(e.flights);
   };
   const std::vector<model::CatalogueEffect>& effects = model::catalogue_of(config.vehicle);
-  const double all = static_cast<double>(effects.size() * std::size(kMagnitudes)) + 1;
+  const double all = static_cast<double>(effects.size() * request.magnitudes.size()) + 1;
   const auto without = fly(config);
   progress.show(++done / all);
   Json list = Json::array();
   std::vector<std::string> rows;
-  const auto percent = [](const std::optional<Summary>& flown) {
-    char text[16];
-    std::snprintf(text, sizeof text, "%8.1f", flown ? 100 * flown->success.value : 0);
-    return flown ? std::string(text) : "       -";
+  const auto percent = [](const Number& share) { return share ? io::format("%8.1f", 100 * *share) : "       -"; };
+  const auto share_of = [](const std::optional<Summary>& flown) {
+    return flown ? Number(flown->success.value) : std::nullopt;
   };
   for (const model::CatalogueEffect& effect : effects) {
     std::string row;
@@ -350,7 +366,7 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
       const model::EffectParameter& p = effect.parameters[static_cast<std::size_t>(i)];
       json["typical"][p.name] = p.typical;
     }
-    for (const double magnitude : kMagnitudes) {
+    for (const double magnitude : request.magnitudes) {
       std::optional<Summary> flown;
       if (effect.info.id == std::string_view("tether") && !config.fleet.batch.world.has_ground())
         json["refused"] = "there is no ground to hang down to; accepted: world.ground_z_m";
@@ -362,7 +378,7 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
           json["refused"] = refused.what();
         }
       progress.show(++done / all);
-      row += percent(flown);
+      row += percent(share_of(flown));
       const auto figure = [&](auto value) { return flown ? Json(value()) : Json(nullptr); };
       json["success"].push_back({{"magnitude", magnitude},
                                  {"rate", figure([&] { return flown->success.value; })},
@@ -382,9 +398,18 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
       over ? "stopped; " : "", request.episodes, config.fleet.task.name.c_str(),
       static_cast<unsigned long long>(request.seed), request.stream.c_str());
   std::printf("  %-28s", "");
-  for (const double magnitude : kMagnitudes) std::printf("%8g", magnitude);
-  std::printf("\n  %-28s%s\n", "none", percent(without).c_str());
+  for (const double magnitude : request.magnitudes) std::printf("%8g", magnitude);
+  std::printf("\n  %-28s%s\n", "none", percent(share_of(without)).c_str());
   for (const std::string& row : rows) std::printf("%s\n", row.c_str());
+  Json worst = Json::array(), mean = Json::array();
+  std::string worst_row, mean_row;
+  for (std::size_t m = 0; m < request.magnitudes.size(); ++m) {
+    const OverEffects over_all = over_effects(list, m);
+    worst.push_back(or_null(over_all.worst)), mean.push_back(or_null(over_all.mean));
+    worst_row += percent(over_all.worst), mean_row += percent(over_all.mean);
+  }
+  std::printf("  %-28s%s\n  %-28s%s\n", "the worst of these effects", worst_row.c_str(), "their mean",
+              mean_row.c_str());
   program.write_shown_json({{"policy", request.policy},
                             {"task", config.fleet.task.name},
                             {"seed", request.seed},
@@ -394,6 +419,8 @@ void evaluate_effects(const Request& request, const FlyConfig& config, const rol
                             {"success_rate", without ? Json(without->success.value) : Json(nullptr)},
                             {"hash", without ? Json(io::hexadecimal(without->hash)) : Json(nullptr)},
                             {"effects", list},
+                            {"worst", worst},
+                            {"mean", mean},
                             {"commit", io::commit()}});
 }
 
@@ -463,7 +490,12 @@ int main(int argc, char** argv) {
   app.option("--threads", r.threads, "0: one for each processor").range(0, 1024).shows_default();
   app.flag("--no-baselines", r.no_baselines, "without PID and ARC");
   program.takes_ranks();
-  app.flag("--effects", r.effects,
-           "instead: success with each effect of the catalogue, at 0.5 to 2 times its typical magnitude");
+  const io::Option effects =
+      app.flag("--effects", r.effects,
+               "instead: success with each effect of the catalogue, at 0.5 to 2 times its typical magnitude");
+  app.option("--magnitudes", r.magnitudes, "of those, in units of the typical ones: 1,1.5")
+      .range(0.0, 10.0)
+      .separated_by(',')
+      .needs(effects);
   return program.run(argc, argv, [&] { eval::evaluate(r, program); });
 }
