@@ -544,8 +544,8 @@ class DiagnosisSection {
                        : "Fly harder manoeuvres, and diagnose old and new flights together.");
     } else if (corrected) {
       section_.say(
-          "No rival is left to be told apart: train or fly on with vehicle_corrected.toml, as with flappy-train CONFIG "
-          "--set vehicle=DIR/vehicle_corrected.toml.");
+          "No rival is left to be told apart: train on with flappy-train --adapt DIR --init RUN, or fly on with "
+          "vehicle_corrected.toml.");
     } else {
       section_.say("Nothing is left to be told apart: fly harder manoeuvres to look further.");
     }

@@ -8,12 +8,14 @@
 #include <optional>
 #include <utility>
 
+#include "io/config.hpp"
 #include "io/log.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
 #include "io/read_files.hpp"
 #include "io/schema.hpp"
 #include "io/sha256.hpp"
+#include "io/toml_writer.hpp"
 #include "learn/checkpoint.hpp"
 #include "learn/learning_curve.hpp"
 #include "learn/trainer.hpp"
@@ -83,6 +85,32 @@ fs::path config_of(const fs::path& run) {
   if (!fs::is_regular_file(config))
     throw io::InputError(run.string() + ": is no run folder; accepted: a folder that flappy-train left");
   return config;
+}
+
+/// A vehicle's name without what a correction appends.
+std::string uncorrected(std::string name) {
+  const std::string appended = "_corrected";
+  while (name.ends_with(appended)) name.resize(name.size() - appended.size());
+  return name;
+}
+
+/// The vehicle that a diagnosis corrected, as an override for training on from `run`. Throws io::InputError unless the
+/// diagnosis was of the run's vehicle.
+std::string adapted_vehicle(const fs::path& diagnosis, const fs::path& run) {
+  const std::string accepted = "; accepted: the folder of a finished flappy-gap diagnose --out";
+  if (!fs::is_regular_file(diagnosis / "diagnosis.json"))
+    throw io::InputError(diagnosis.string() + ": has no diagnosis.json" + accepted);
+  const fs::path vehicle = diagnosis / "vehicle_corrected.toml";
+  if (!fs::is_regular_file(vehicle))
+    throw io::InputError(diagnosis.string() +
+                         ": has no vehicle_corrected.toml: its data are faulty, or it was stopped" + accepted);
+  const auto name = [](const fs::path& file) { return uncorrected(io::Config::load(file).root().string("name")); };
+  const std::string of = name(vehicle), flown = name(run / "config" / "vehicle.toml");
+  if (of != flown)
+    throw io::InputError(diagnosis.string() + ": is a diagnosis of vehicle " + io::toml_string(of) + ", but " +
+                         run.string() + " flies " + io::toml_string(flown) +
+                         "; accepted: a diagnosis of that vehicle, or --set vehicle in place of --adapt");
+  return "vehicle=" + io::toml_string(fs::absolute(vehicle).string());
 }
 
 server::TrainingSample sample_of(const fs::path& run, const TrainProgress& p) {
@@ -171,7 +199,7 @@ int main(int argc, char** argv) {
   io::Program program("flappy-train", "Trains a policy; leaves a run folder.",
                       {"instruction set " + sim::best_instruction_set()});
   const io::Command& app = program.app();
-  std::string config_name, out, resume, from, init, seeds;
+  std::string config_name, out, resume, from, init, adapt, seeds;
   std::vector<std::string> overrides;
   int threads = 0;
   app.option("config", config_name, "what to train: configs/train/*.toml");
@@ -181,7 +209,12 @@ int main(int argc, char** argv) {
       app.option("--resume", resume, "run folder to go on with, from its newest checkpoint").excludes(placed);
   app.option("--seeds", seeds, "several runs: 0-4; writes their learning curve").excludes(resumed);
   app.option("--from", from, "another checkpoint of that folder").needs(resumed);
-  app.option("--init", init, "what to start with: a run folder (its best actor and its critics), or an actor alone")
+  const io::Option initial =
+      app.option("--init", init, "what to start with: a run folder (its best actor and its critics), or an actor alone")
+          .excludes(resumed);
+  app.option("--adapt", adapt,
+             "folder of a diagnosis: trains the run of --init on, with its configuration and the corrected vehicle")
+      .needs(initial)
       .excludes(resumed);
   const io::Option of_threads = app.option("--threads", threads, "0: all").range(0, 1024);
   app.option("--set", overrides, "override a key: learn.updates=1000, task.reward.goal=1")
@@ -189,8 +222,22 @@ int main(int argc, char** argv) {
       .excludes(resumed);
   program.takes_ranks();
   return program.run(argc, argv, [&] {
+    if (!adapt.empty()) {  // a short name for what the three options CONFIG, --set vehicle and --init do
+      if (!config_name.empty())
+        throw io::InputError(config_name + ": --adapt trains on with the configuration of the run " + init +
+                             "; accepted: no other one");
+      for (const std::string& text : overrides)
+        if (text.starts_with("vehicle=") || text.starts_with("vehicle ="))
+          throw io::InputError("--set " + text + ": --adapt sets the vehicle; accepted: other keys");
+      config_name = train::config_of(init).string();
+      overrides.insert(overrides.begin(), train::adapted_vehicle(adapt, init));
+      if (out.empty())
+        out = (fs::path("runs") / (fs::absolute(init).lexically_normal().filename().string() + "_adapted")).string();
+    }
     if (config_name.empty() == resume.empty())
-      throw io::InputError("flappy-train: what to train is not clear; accepted: a configuration, or --resume RUN");
+      throw io::InputError(
+          "flappy-train: what to train is not clear; accepted: a configuration, --resume RUN, or --adapt DIAGNOSIS "
+          "--init RUN");
     io::stop_on_interrupt();
     learn::TrainOptions options;
     options.commit = io::commit();

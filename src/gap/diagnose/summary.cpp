@@ -45,14 +45,14 @@ std::string proposal_line(const NextExperiment& n) {
 
 std::string next_line(const Diagnosis& r, const std::string& out) {
   const Verdict& c = r.verdict;
-  const std::string vehicle =
-      (out.empty() ? "DIR" : std::filesystem::absolute(out).lexically_normal().string()) + "/vehicle_corrected.toml";
+  const std::string folder = out.empty() ? "DIR" : std::filesystem::absolute(out).lexically_normal().string();
   switch (c.kind) {
     case VerdictKind::parameters:
       if (!r.reference.empty()) return "next: nothing to correct; more reference sessions show smaller changes";
       [[fallthrough]];
     case VerdictKind::effect:
-      return "next: train or fly on what was found, as with flappy-train CONFIG --set vehicle=" + vehicle;
+      return "next: train on what was found, with flappy-train --adapt " + folder + " --init RUN; or fly on with " +
+             folder + "/vehicle_corrected.toml";
     case VerdictKind::group:
       return "next: fly so that these differ, and diagnose old and new flights together";
     case VerdictKind::none:
