@@ -168,13 +168,24 @@ FLAPPY_INLINE MocapSample<L<T>> see(const FlightSpace<T>& s, const FlightPlan<T>
   return sample;
 }
 
-/// For lanes with mocap_delay: replaces the pose of a correction by one of the true motion at sample time less delay.
+/// Whether poses of any lane are later than by the latency.
+template <class T>
+FLAPPY_INLINE bool shows_the_past(const FlightSpace<T>& s, const FlightPlan<T>& plan) {
+  return (s.effects.set & kBit<MocapDelay>) != 0 || plan.mocap.jitter_s > 0;
+}
+
+/// For lanes with mocap_delay or jitter: replaces the pose of a correction by one of the true motion at sample time less both.
 /// It runs when the pose arrives, because a negative delay needs motion after the sample time.
 template <class T>
 FLAPPY_INLINE void delay(const FlightSpace<T>& s, const FlightPlan<T>& plan, const Correction& correction, int first) {
   T* rows = s.queue + static_cast<std::ptrdiff_t>(correction.slot) * kMocapRows * kLanes<T>;
   const auto pose = load_rows<MocapSample<L<T>>>(slot(s.queue, correction.slot, kMocapRows), first);
-  const L<T> late = effect_parameter<MocapDelay>(s.effects, 0, first);
+  L<T> late = effect_parameter<MocapDelay>(s.effects, 0, first);
+  if (plan.mocap.jitter_s > 0)
+    late += jitter_of(plan.mocap,
+                      sim::uniforms<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::mocap),
+                                          3 * correction.index + 2, s.flight.flapper + first, s.flight.flight + first)
+                          .u[1]);
   const L<T> age = L<T>(L<T>(correction.age_s) + late) / L<T>(plan.task.tick_s);
   const auto truth = load_rows<Truth<L<T>>>(s.flight.truth, first);
   const auto past = past_truth<T>(s.effects, s.flight.tick + first, truth, age, plan.task.tick_s, first);
@@ -242,7 +253,7 @@ FLAPPY_INLINE void estimate(const FlightSpace<T>& s, const FlightPlan<T>& plan, 
       move(estimator.horizon, *a);
       spread(estimator.covariance, plan.estimator, L<T>(a->share * a->duration_s));
     }
-    if (s.effects.set & kBit<MocapDelay>) delay(s, plan, pose, first);
+    if (shows_the_past(s, plan)) delay(s, plan, pose, first);
     correct(estimator, plan.estimator, load_rows<MocapSample<L<T>>>(slot(s.queue, pose.slot, kMocapRows), first));
   }
   if (plan.correction_count > 0) estimator.now = estimator.horizon;
@@ -330,9 +341,10 @@ class Stopwatch {
 template <class T>
 void fly_block(const FlightSpace<T>& s, const FlightPlan<T>& plan) {
   Stopwatch watch(plan.cycles);
-  if (s.effects.set & kBit<MocapDelay>)
+  if (shows_the_past(s, plan))
     for_lanes<T>([&](int first) {
-      keep_past(s.effects, s.flight.tick + first, load_rows<Truth<L<T>>>(s.flight.truth, first), first);
+      keep_past(s.effects, s.flight.tick + first, load_rows<Truth<L<T>>>(s.flight.truth, first),
+                plan.mocap.jitter_s > 0, first);
     });
   for_lanes<T>([&](int first) { steer(s, plan, first); });
   watch.lap(kSteer);

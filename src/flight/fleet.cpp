@@ -440,7 +440,9 @@ auto Fleet<T>::mocap_samples(std::size_t i) const -> std::vector<MocapRecord> {
                     x.valid > 0});
   };
   const auto delays = std::uint64_t{1} << model::effect_index(model::MocapDelay::kInfo.id);
-  if (i >= size() || !(sim::storage_of(storage_->batch).effects_of_lane(i) & delays)) {
+  const bool late = s.options.sensors.mocap.jitter_s > 0 ||
+                    (i < size() && sim::storage_of(storage_->batch).effects_of_lane(i) & delays);
+  if (i >= size() || !late) {
     s.template for_samples<MocapSample>(i, s.mocap_tap, s.mocap_tap_size, &Slice::mocap, add);
   } else if (!s.mocap_tap.empty()) {
     const T* queue = &s.queue[i / kLanes<T> * s.queue_size];

@@ -154,8 +154,8 @@ class Fleet {
   /// Adds the processor cycles of each Stage (flight_block.hpp) to cycles[Stage] from now on; for fleets on one thread.
   void count_cycles(std::uint64_t* cycles);
 
-  /// Samples of the last control period; empty without record(true) before it. With mocap_delay, the poses that arrived
-  /// in it, because a negative delay is known only then.
+  /// Samples of the last control period; empty without record(true) before it. With mocap_delay or jitter, the poses that
+  /// arrived in it, because a negative delay is known only then.
   struct ImuRecord {
     double arrival_s, gyro_rad_s[3], accel_m_s2[3];
   };

@@ -61,6 +61,8 @@ struct Fleet<T>::Storage {
     queue_size = static_cast<std::size_t>(schedule.queue_slots()) * kMocapRows * kLanes<T>;
     ring.assign(n * ring_size, T(0));
     check_delay(vehicle);
+    if (o.sensors.mocap.jitter_s > 0)
+      sim::storage_of(batch).keep_effects(std::uint64_t{1} << model::effect_index(model::MocapDelay::kInfo.id));
     queue.assign(n * queue_size, T(0));
     for (const Segment<double>& s : o.task.path) {
       Segment<T> to{s.start_tick, {}};
@@ -97,16 +99,21 @@ struct Fleet<T>::Storage {
 
   /// Throws std::invalid_argument if mocap_delay would make a pose precede its motion or outlast the motion memory.
   void check_delay(const model::Vehicle& v) const {
+    const double period_s = period_steps * options.batch.step_s, jitter_s = options.sensors.mocap.longest_jitter_s();
+    const double remembered_s = (model::MocapDelay::kSlots - 1) * period_s;
+    if (jitter_s > 0 && schedule.longest_wait_s() + jitter_s > remembered_s)
+      throw std::invalid_argument("mocap.jitter_s: poses up to " + std::to_string(jitter_s) + " s late are more than " +
+                                  std::to_string(model::MocapDelay::kSlots) +
+                                  " control periods remember; accepted: less, a lower mocap.latency_s or control rate");
     const auto own = v.effects.find(model::MocapDelay::kInfo.id);
     if (own == v.effects.end()) return;
     const auto index = static_cast<std::size_t>(model::effect_index(model::MocapDelay::kInfo.id));
     const double delay_s = model::effects()[index].values(own->second)[0], latency_s = options.sensors.mocap.latency_s;
-    const double period_s = period_steps * options.batch.step_s;
     if (delay_s < -latency_s)
       throw std::invalid_argument("effects.mocap_delay.delay_s: " + std::to_string(delay_s) +
                                   " is before the pose was; accepted: down to -mocap.latency_s, " +
                                   std::to_string(-latency_s));
-    if (schedule.longest_wait_s() + delay_s > (model::MocapDelay::kSlots - 1) * period_s)
+    if (schedule.longest_wait_s() + jitter_s + delay_s > remembered_s)
       throw std::invalid_argument("effects.mocap_delay.delay_s: " + std::to_string(delay_s) + " is more than " +
                                   std::to_string(model::MocapDelay::kSlots) +
                                   " control periods remember; accepted: less, a lower mocap.latency_s or control rate");

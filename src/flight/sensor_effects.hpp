@@ -151,12 +151,14 @@ FLAPPY_INLINE void disturb(const sim::BlockEffects<T>& effects, const Quaternion
   }
 }
 
-/// Stores the true motion at the start of a control period, for past_truth(). `tick`: periods since each lane's start.
+/// Stores the true motion at the start of a control period, for past_truth(). `tick`: periods since each lane's start;
+/// `all`: of all lanes, else of those with a mocap_delay.
 template <class T, class L>
 FLAPPY_INLINE void keep_past(const sim::BlockEffects<T>& effects, const std::uint32_t* tick, const Truth<L>& truth,
-                             int first) {
+                             bool all, int first) {
   static_assert(kRows<Truth> == MocapDelay::kRows);
-  const auto on = !(effect_parameter<MocapDelay>(effects, 0, first) == L(0));
+  const L late = effect_parameter<MocapDelay>(effects, 0, first);
+  const auto on = all ? late == late : !(late == L(0));
   const auto past = memory_of<MocapDelay>(effects, first, on);
   const L* rows = reinterpret_cast<const L*>(&truth);
   for (int i = 0; i < sim::kWidth<T>; ++i)

@@ -3,7 +3,9 @@
 //   gyro   rotation between the two attitudes / interval + constant bias + noise
 //   accel  specific force R^T (dv/dt + g z) at the position of the IMU, R half-way between the two attitudes, + noise
 // An IMU at rest reads +g upward. Motion capture: pose of the torso origin, with white noise, late, lost in bursts
-// (Gilbert 1960: a loss begins with one probability and ends with another).
+// (Gilbert 1960: a loss begins with one probability and ends with another). Lateness may vary from sample to sample,
+// uniformly or exponentially beyond the latency (as action delays in Andrychowicz et al., Int. J. Robotics Research
+// 2020); nobody is told, so a pose that is taken for one of t - latency is older.
 #pragma once
 
 #include "model/vehicle_dynamics.hpp"
@@ -19,10 +21,15 @@ struct ImuConstants {
   T gravity_m_s2;
 };
 
+/// Where an exponential jitter is cut, in units of its mean, so that the motion before is kept for a time that is known.
+/// Choice: cuts one sample in 3,000.
+inline constexpr double kJitterCut = 8;
+
 template <class T>
 struct MocapConstants {
   T position_noise_m, attitude_noise_rad;
   T loss_begins, loss_ends;  // probabilities at each sample
+  T jitter_s, exponential;   // how late samples are beyond the latency: MocapSensor; 0 or 1
 };
 
 inline namespace FLAPPY_ISA {
@@ -113,6 +120,13 @@ struct MocapSample {
 template <class T>
 FLAPPY_INLINE T next_seen(const MocapConstants<Element<T>>& k, const T& seen, const T& chance) {
   return where(seen > T(0), where(chance < T(k.loss_begins), T(0), T(1)), where(chance < T(k.loss_ends), T(1), T(0)));
+}
+
+/// How late a sample is beyond the latency; `chance`: uniform in (0, 1).
+template <class T>
+FLAPPY_INLINE T jitter_of(const MocapConstants<Element<T>>& k, const T& chance) {
+  if (!(k.exponential > 0)) return T(k.jitter_s) * chance;
+  return T(k.jitter_s) * min(T(T(0) - log(chance)), T(kJitterCut));
 }
 
 template <class T>

@@ -40,6 +40,9 @@ Sensors read_sensors(const io::Table& table) {
       table.number("mocap.attitude_noise_rad", io::positive(0.05));  // drawn as a small rotation
   s.mocap.loss_probability = table.number_or("mocap.loss_probability", 0, {0, 0.5});
   s.mocap.loss_length = table.number_or("mocap.loss_length", 1, {1, 1e6});
+  s.mocap.jitter_s = table.number_or("mocap.jitter_s", 0, io::non_negative(0.1));
+  s.mocap.jitter_exponential =
+      table.choice_or("mocap.jitter_law", "uniform", {"uniform", "exponential"}) == "exponential";
   s.estimator.angle_drift_rad_sqrt_s = table.number("estimator.angle_drift_rad_sqrt_s", kNoise);
   s.estimator.velocity_drift_m_s_sqrt_s = table.number("estimator.velocity_drift_m_s_sqrt_s", kNoise);
   s.estimator.gyro_bias_drift_rad_s_sqrt_s = table.number("estimator.gyro_bias_drift_rad_s_sqrt_s", kNoise);

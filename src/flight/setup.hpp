@@ -22,6 +22,10 @@ struct MocapSensor {
   double position_noise_m = 0, attitude_noise_rad = 0;  ///< standard deviation, each axis
   double loss_probability = 0;                          ///< probability that a sample begins a burst of losses
   double loss_length = 1;                               ///< mean number of samples in a burst
+  double jitter_s = 0;              ///< most by which a sample is later than latency_s; its mean if exponential
+  bool jitter_exponential = false;  ///< law of that lateness: exponential, else uniform from 0
+
+  double longest_jitter_s() const { return jitter_exponential ? kJitterCut * jitter_s : jitter_s; }
 };
 
 /// Noise that the estimator assumes in addition to what the sensors declare.

@@ -302,6 +302,21 @@ class Reader {
         root_.fail("flight.step_s",
                    "is longer than the " + io::shortest_digits(1 / rate) + " s between samples of a sensor",
                    "a shorter step, or a slower sensor");
+    const flight::MocapSensor& mocap = o.sensors.mocap;
+    const int period_steps = static_cast<int>(std::lround(1 / (o.control_hz * step)));
+    const double room_s = (model::MocapDelay::kSlots - 1) * period_steps * step -
+                          flight::Schedule(o.sensors, step, period_steps).longest_wait_s();
+    if (mocap.jitter_s > 0 && mocap.longest_jitter_s() > room_s)
+      for_file("sensors", [&] {
+        files_.at("sensors").root().fail(
+            "mocap.jitter_s",
+            "lets poses be " + io::format("%.4g", mocap.longest_jitter_s()) +
+                " s late, and the motion is remembered for " + std::to_string(model::MocapDelay::kSlots) +
+                " control periods",
+            mocap.jitter_exponential ? "at most " + io::format("%.3g", std::max(0.0, room_s / flight::kJitterCut))
+                                     : "at most " + io::format("%.3g", std::max(0.0, room_s)));
+        return 0;
+      });
     if (const auto fault = model::contact_fault(c_.vehicle, step))
       for_file("vehicle", [&] {
         files_.at("vehicle").root().fail(fault->path, fault->what, fault->accepted);
@@ -383,7 +398,8 @@ void limit_delays(const flight::FleetOptions& fleet, model::Vehicle& v) {
   const int period_steps = static_cast<int>(std::lround(1 / (fleet.control_hz * step_s)));
   const double remembered_s = (model::MocapDelay::kSlots - 1) * period_steps * step_s,
                wait_s = flight::Schedule(fleet.sensors, step_s, period_steps).longest_wait_s();
-  limit(model::MocapDelay::kInfo.id, -fleet.sensors.mocap.latency_s, remembered_s - wait_s);
+  limit(model::MocapDelay::kInfo.id, -fleet.sensors.mocap.latency_s,
+        remembered_s - wait_s - fleet.sensors.mocap.longest_jitter_s());
   if (!v.beat_averaged) limit(model::CommandDelay::kInfo.id, 0, kKeptSteps * step_s);
 }
 

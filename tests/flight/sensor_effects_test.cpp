@@ -185,6 +185,67 @@ TEST(SensorEffects, ShowPosesOfTheTimeBefore) {
   EXPECT_LT(late.mocap.z_m[1], -1e-6);
 }
 
+/// How late each pose of a flight is beyond its latency, s; a free fall along x tells.
+std::vector<double> lateness(const std::vector<std::string>& sensors, double delay_s = 0) {
+  std::vector<std::string> overrides = kQuiet;
+  overrides.push_back("sensors.mocap.rate_hz=1000");
+  overrides.insert(overrides.end(), sensors.begin(), sensors.end());
+  const gap::EffectValues late = {{"mocap_delay", {{"delay_s", delay_s}}}};
+  std::vector<std::string> every_step = kQuiet;
+  every_step.push_back("sensors.mocap.rate_hz=4000");
+  const FlightLog fine = open_loop({}, every_step),
+                  seen = open_loop(delay_s != 0 ? late : gap::EffectValues{}, overrides);
+  const double latency_s = seen.header.mocap.latency_s;
+  std::vector<double> list;
+  for (std::size_t i = 0; i < seen.mocap.t_s.size(); ++i) {
+    if (seen.mocap.t_s[i] - latency_s < 0.3) continue;  // it falls fast enough by then
+    std::size_t k = 0;
+    while (k < fine.mocap.z_m.size() && fine.mocap.z_m[k] > seen.mocap.z_m[i]) ++k;
+    if (k == 0 || k == fine.mocap.z_m.size()) continue;
+    const double above = fine.mocap.z_m[k - 1] - seen.mocap.z_m[i], step = fine.mocap.z_m[k - 1] - fine.mocap.z_m[k];
+    const double of_s = fine.mocap.t_s[k - 1] + above / step * sim::kDefaultStep_s;
+    list.push_back(seen.mocap.t_s[i] - of_s);
+  }
+  return list;
+}
+
+TEST(SensorEffects, VaryFromPoseToPose) {
+  const auto mean = [](const std::vector<double>& list) {
+    double sum = 0;
+    for (const double x : list) sum += x;
+    return sum / static_cast<double>(list.size());
+  };
+  for (const double delay_s : {0.0, 0.004}) {
+    const auto uniform = lateness({"sensors.mocap.jitter_s=0.008"}, delay_s),
+               exponential =
+                   lateness({"sensors.mocap.jitter_s=0.004", "sensors.mocap.jitter_law=exponential"}, delay_s);
+    ASSERT_GT(uniform.size(), 100U);
+    EXPECT_NEAR(mean(uniform), delay_s + 0.004, 8e-4);
+    EXPECT_NEAR(mean(exponential), delay_s + 0.004, 1.2e-3);
+    EXPECT_GT(std::ranges::min(uniform), delay_s - 2e-4);
+    EXPECT_LT(std::ranges::max(uniform), delay_s + 0.0082);
+    EXPECT_GT(std::ranges::max(uniform) - std::ranges::min(uniform), 0.006);
+    EXPECT_GT(std::ranges::max(exponential), delay_s + 0.01);
+    EXPECT_GT(std::ranges::min(exponential), delay_s - 2e-4);
+  }
+  for (const double x : lateness({})) EXPECT_NEAR(x, 0, 1e-4);
+}
+
+TEST(SensorEffects, VaryAlikeOnEveryInstructionSet) {
+  const auto hash = [](const std::string& set, double jitter_s) {
+    rollout::FlyConfig c = rollout::read_fly_config(kHover, {"sensors.mocap.jitter_law=exponential"});
+    c.fleet.sensors.mocap.jitter_s = jitter_s;
+    c.fleet.batch.instruction_set = set;
+    Fleet<float> fleet(20, c.vehicle, c.fleet);
+    for (std::size_t i = 0; i < 20; ++i) fleet.start(i, 0, {.position_m = {0, 0, 0.4}}, sim::Start::flying);
+    for (int period = 0; period < 100; ++period) fleet.step();
+    return fleet.hash();
+  };
+  const std::vector<std::string> sets = sim::instruction_sets();
+  for (const std::string& set : sets) EXPECT_EQ(hash(set, 0.003), hash(sets[0], 0.003)) << set;
+  EXPECT_NE(hash("", 0.003), hash("", 0));
+}
+
 TEST(SensorEffects, RefuseADelayThatCannotBe) {
   rollout::FlyConfig c = rollout::read_fly_config(kHover);
   const auto refusal = [&](double delay_s) -> std::string {

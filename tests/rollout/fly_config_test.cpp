@@ -249,6 +249,17 @@ TEST(FlyConfig, RefusesInOneLine) {
   EXPECT_EQ(message([&] { rollout::read_fly_config(pid); }).find(": flight"), std::string::npos);
 }
 
+TEST(FlyConfig, RefusesJitterThatCannotBeRemembered) {
+  EXPECT_EQ(refusal({"sensors.mocap.jitter_s=0.02"}), "accepted");
+  EXPECT_EQ(refusal({"sensors.mocap.jitter_law=normal"}),
+            "--set sensors.mocap.jitter_law=normal: mocap.jitter_law: \"normal\" is not known; accepted: \"uniform\", "
+            "\"exponential\"");
+  EXPECT_EQ(
+      refusal({"sensors.mocap.jitter_s=0.02", "sensors.mocap.jitter_law=exponential"}),
+      "--set sensors.mocap.jitter_s=0.02: mocap.jitter_s: lets poses be 0.16 s late, and the motion is remembered for "
+      "64 control periods; accepted: at most 0.0118");
+}
+
 TEST(FlyConfig, ReadsShapesAndLetsVehiclesWithPointsTouch) {
   const auto read = [](const std::vector<std::string>& o) {
     return rollout::read_fly_config(source_path("configs/fly/landing.toml"), o);
