@@ -4,7 +4,7 @@
 //   accel  specific force R^T (dv/dt + g z) at the position of the IMU, R half-way between the two attitudes, + noise
 // An IMU at rest reads +g upward. Motion capture: pose of the torso origin, with white noise, late, lost in bursts
 // (Gilbert 1960: a loss begins with one probability and ends with another). Lateness may vary from sample to sample,
-// uniformly or exponentially beyond the latency (as action delays in Andrychowicz et al., Int. J. Robotics Research
+// uniformly or exponentially beyond the latency (as time steps in Andrychowicz et al., Int. J. Robotics Research
 // 2020); nobody is told, so a pose that is taken for one of t - latency is older.
 #pragma once
 
