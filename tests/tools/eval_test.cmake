@@ -74,7 +74,7 @@ foreach(k IN ITEMS 0 8 12)  # of the vehicle, the battery, the gear: each flies 
 endforeach()
 
 # Of drawn effects nothing is left then; the worst and the mean are those of the rows.
-run(${WORK}/run ${short} --episodes 20 --effects --magnitudes 2 --set drawn_effects.none=0 --set drawn_effects.most=1 --set drawn_effects.magnitude=2
+run(${WORK}/run ${short} --episodes 8 --effects --magnitudes 2 --set drawn_effects.none=0 --set drawn_effects.most=1 --set drawn_effects.magnitude=2
   --json ${WORK}/drawn.json)
 expect_equal("exit code" "${code}" 0)
 file(READ ${WORK}/drawn.json drawn)
