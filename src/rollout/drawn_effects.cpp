@@ -21,7 +21,7 @@ std::size_t chosen(double uniform, std::size_t count) {
   return std::min(count - 1, static_cast<std::size_t>(uniform * static_cast<double>(count)));
 }
 
-/// The same by weight.
+/// Index of the effect that a uniform number chooses, the more probable the larger its weight.
 std::size_t chosen(double uniform, const std::vector<DrawnEffects::Weighted>& of) {
   double all = 0;
   for (const DrawnEffects::Weighted& w : of) all += w.weight;

@@ -167,8 +167,7 @@ Evaluation Evaluator::fly(const Agent& agent, Detail detail, const std::function
 }
 
 FlyConfig nominal(FlyConfig config) {
-  config.randomisation.reset();
-  config.drawn_effects.reset();
+  config.draw_no_vehicles();
   flight::StartRange& start = config.fleet.task.start;
   for (auto* list : {&start.position_m, &start.rotation_rad, &start.velocity_m_s, &start.body_rate_rad_s})
     for (flight::Spread& s : *list) s.half = 0;

@@ -60,7 +60,8 @@ class Evaluator {
   Hovers<double> double_hovers_;
 };
 
-/// The configuration without randomisation and drawn effects: the nominal vehicle, from the middle of the task's start range.
+/// The configuration without randomisation and drawn effects: the nominal vehicle, from the middle of the task's start
+/// range.
 FlyConfig nominal(FlyConfig config);
 
 }  // namespace flappy::rollout

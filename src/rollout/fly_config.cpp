@@ -132,6 +132,14 @@ std::shared_ptr<const policy::Actor> fitting_actor(const io::Table& root, const 
   return actor;
 }
 
+/// By how much a pose may be later than by its latency: the motion before is remembered for so long.
+double longest_lateness_s(const flight::FleetOptions& fleet) {
+  const double step_s = fleet.batch.step_s;
+  const int period_steps = static_cast<int>(std::lround(1 / (fleet.control_hz * step_s)));
+  return (model::MocapDelay::kSlots - 1) * period_steps * step_s -
+         flight::Schedule(fleet.sensors, step_s, period_steps).longest_wait_s();
+}
+
 class Reader {
  public:
   Reader(const std::filesystem::path& path, const Overrides& overrides)
@@ -303,9 +311,7 @@ class Reader {
                    "is longer than the " + io::shortest_digits(1 / rate) + " s between samples of a sensor",
                    "a shorter step, or a slower sensor");
     const flight::MocapSensor& mocap = o.sensors.mocap;
-    const int period_steps = static_cast<int>(std::lround(1 / (o.control_hz * step)));
-    const double room_s = (model::MocapDelay::kSlots - 1) * period_steps * step -
-                          flight::Schedule(o.sensors, step, period_steps).longest_wait_s();
+    const double room_s = longest_lateness_s(o);
     if (mocap.jitter_s > 0 && mocap.longest_jitter_s() > room_s)
       for_file("sensors", [&] {
         files_.at("sensors").root().fail(
@@ -394,13 +400,9 @@ void limit_delays(const flight::FleetOptions& fleet, model::Vehicle& v) {
     double& delay_s = found->second[model::effects()[e].parameters[0].name];
     delay_s = std::max(low, std::min(delay_s, high));
   };
-  const double step_s = fleet.batch.step_s;
-  const int period_steps = static_cast<int>(std::lround(1 / (fleet.control_hz * step_s)));
-  const double remembered_s = (model::MocapDelay::kSlots - 1) * period_steps * step_s,
-               wait_s = flight::Schedule(fleet.sensors, step_s, period_steps).longest_wait_s();
   limit(model::MocapDelay::kInfo.id, -fleet.sensors.mocap.latency_s,
-        remembered_s - wait_s - fleet.sensors.mocap.longest_jitter_s());
-  if (!v.beat_averaged) limit(model::CommandDelay::kInfo.id, 0, kKeptSteps * step_s);
+        longest_lateness_s(fleet) - fleet.sensors.mocap.longest_jitter_s());
+  if (!v.beat_averaged) limit(model::CommandDelay::kInfo.id, 0, kKeptSteps * fleet.batch.step_s);
 }
 
 }  // namespace
@@ -412,6 +414,11 @@ model::Vehicle FlyConfig::vehicle_of(std::uint32_t flapper, std::uint32_t episod
   for (const auto& [id, values] : added_effects) v.effects[id] = values;
   apply(changes, v);
   return v;
+}
+
+void FlyConfig::draw_no_vehicles() {
+  randomisation.reset();
+  drawn_effects.reset();
 }
 
 model::Vehicle FlyConfig::roomy_vehicle() const {

@@ -70,6 +70,8 @@ struct FlyConfig {
   /// vehicle of its own.
   model::Vehicle vehicle_of(std::uint32_t flapper, std::uint32_t episode = 0) const;
   bool draws_vehicles() const { return randomisation.has_value() || drawn_effects.has_value(); }
+  /// From now on every flapper has the nominal vehicle, besides added_effects and changes.
+  void draw_no_vehicles();
   /// The vehicle with all effects that may be drawn, without their forces: a fleet of it never has to make room for their
   /// memory, so that checkpoints of it are of one size.
   model::Vehicle roomy_vehicle() const;

@@ -24,8 +24,7 @@ std::vector<SimulatedFlight> simulate(const FlyConfig& given, const model::Vehic
                                       double from_s) {
   FlyConfig config = given;
   config.vehicle = vehicle;
-  config.randomisation.reset();
-  config.drawn_effects.reset();
+  config.draw_no_vehicles();
   config.fleet.batch.threads = 1;
   Rollout<double> rollout(std::move(config), copies);
   std::vector<SimulatedFlight> flights(copies);

@@ -41,7 +41,7 @@ struct Request {
   std::uint64_t seed = 1;
   int threads = 0;
   bool no_baselines = false, effects = false;
-  std::vector<double> magnitudes = {0.5, 1, 1.5, 2};  ///< of effects, in units of an effect's typical magnitude
+  std::vector<double> magnitudes = {0.5, 1, 1.5, 2};  ///< that --effects flies, in units of an effect's typical one
   io::Ranks* ranks = nullptr;
 };
 

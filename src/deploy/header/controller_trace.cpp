@@ -20,8 +20,7 @@ std::int32_t whole_us(double s) { return static_cast<std::int32_t>(std::lround(s
 
 /// The configuration for the trace: nominal vehicle, no excitation, hand-back by the estimate, as on board.
 rollout::FlyConfig on_board(rollout::FlyConfig config) {
-  config.randomisation.reset();
-  config.drawn_effects.reset();
+  config.draw_no_vehicles();
   config.excitation = {};
   config.fleet.task.constants.hand_back.on_estimate = 1;
   double& latency_s = config.fleet.sensors.imu.latency_s;

@@ -82,23 +82,20 @@ void check_resonance(const FlightLog& log, Findings& findings) {
   }
   const std::string seen =
       format("the sensor resonates at %.4g Hz; harmonics up to %.4g Hz are compared", resonance, band);
-  if (const double rate = log.header.rig->rate_hz; 2 * resonance > rate && resonance > kFree * band) {
-    findings.push_back(
-        {"rig resonance",
-         Verdict::warning,
-         seen + format(", but %.4g samples/s fold what rings above %.4g Hz into these: filter it before it "
-                       "is sampled, or sample faster",
-                       rate, rate / 2),
-         {}});
-    return;
-  }
-  if (resonance > kFree * band) findings.push_back({"rig resonance", Verdict::ok, seen, {}});
-  else
-    findings.push_back({"rig resonance",
-                        Verdict::warning,
-                        seen + format(", at least %.4g Hz expected: it magnifies them", kFree * band),
-                        {},
-                        resonance > band ? LogPlace{} : LogPlace{kForces}});
+  const double rate = log.header.rig->rate_hz;
+  const bool magnifies = resonance <= kFree * band, folds = 2 * resonance > rate;
+  std::string what = seen;
+  if (magnifies) what += format(", at least %.4g Hz expected: it magnifies them", kFree * band);
+  else if (folds)
+    what += format(
+        ", but %.4g samples/s fold what rings above %.4g Hz into these: filter it before it is sampled, or "
+        "sample faster",
+        rate, rate / 2);
+  findings.push_back({"rig resonance",
+                      magnifies || folds ? Verdict::warning : Verdict::ok,
+                      what,
+                      {},
+                      resonance > band ? LogPlace{} : LogPlace{kForces}});
 }
 
 /// Amplitude of the force along z at a frequency.

@@ -42,7 +42,8 @@ struct VehicleTopics {
   std::vector<Beat> beats;
 };
 
-/// `wing_loads`: columns of wing_loads.csv (kWingLoadNames), or none. Returns the number of messages. InputError where the file cannot be written, or the flight has no voltages.
+/// `wing_loads`: columns of wing_loads.csv (kWingLoadNames), or none. Returns the number of messages. InputError where
+/// the file cannot be written, or the flight has no voltages.
 std::uint64_t write_flight_mcap(const std::filesystem::path& path, const FlightLog& log,
                                 const std::vector<VehicleTopics>& vehicles = {},
                                 const std::vector<Column>& wing_loads = {});

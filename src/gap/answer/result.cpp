@@ -137,12 +137,11 @@ Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flig
   });
 
   const ScoredHypothesis* best = best_fitted(inference);
+  const TestResiduals* with_effect = best != nullptr ? &best->held_out : nullptr;
   const std::pair<Fitted, const TestResiduals*> fits[] = {
-      {Fitted::nominal, &inference.nominal},
-      {Fitted::refit, &inference.refit},
-      {Fitted::effect, best != nullptr ? &best->held_out : nullptr}};
+      {Fitted::nominal, &inference.nominal}, {Fitted::refit, &inference.refit}, {Fitted::effect, with_effect}};
   if (!flights.tests.front()->is_averaged())
-    r.ladder = ladder_of(context, inference.nominal, inference.refit, fits[2].second, r.hypotheses);
+    r.ladder = ladder_of(context, inference.nominal, inference.refit, with_effect, r.hypotheses);
   for (const auto& [fitted, residual] : fits) {
     if (residual == nullptr) continue;
     std::vector<ResidualLocation> locations = locate(context, *residual, fitted);

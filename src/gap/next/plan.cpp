@@ -61,7 +61,7 @@ struct Session {
   const Manoeuvre* further = nullptr;  ///< as many further flights of this, perhaps with an intervention; null: none
   bool films_further = false;          ///< whether only the wings of the further ones are filmed
   bool weighed = false;                ///< whether the robot was weighed and balanced
-  double hours = 0;                    ///< of work beyond the session that was asked for
+  double hours = 0;                    ///< hours of work that it takes beyond the session that was asked for
 };
 
 class Planner {
@@ -291,6 +291,13 @@ class Planner {
     return groups;
   }
 
+  /// Of the plan that was asked for, as PlannedChoice::probability.
+  static double mean_probability(const Plan& plan) {
+    double sum = 0;
+    for (const PlannedEffect& e : plan.effects) sum += e.probability;
+    return sum / static_cast<double>(plan.effects.size() + plan.unseen.size());
+  }
+
   PlannedChoice weighed(const Session& session, const Plan& plan) const {
     PlannedChoice c{session.name, session.what, true, 0, session.hours, 0, {}, {}};
     const std::optional<Separation> s = separation(session, false);
@@ -303,10 +310,7 @@ class Planner {
       const auto before = std::ranges::find(plan.effects, s->effects[i], &PlannedEffect::effect);
       if (before == plan.effects.end() || before->probability < kNamed) c.gained.push_back(s->effects[i]);
     }
-    double asked = 0;
-    for (const PlannedEffect& e : plan.effects)
-      asked += e.probability / static_cast<double>(plan.effects.size() + plan.unseen.size());
-    if (c.hours > 0) c.gained_per_hour = (c.probability - asked) / c.hours;
+    if (c.hours > 0) c.gained_per_hour = (c.probability - mean_probability(plan)) / c.hours;
     return c;
   }
 

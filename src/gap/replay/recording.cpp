@@ -168,7 +168,7 @@ void Recording::lay_clamped_grid() {
     take_load(first, i + 1);
     const bool driven =
         std::ranges::none_of(undriven, [&](const auto& span) { return span.first < now_s && from_s < span.second; });
-    // of an interval with a gap of the sensor, the mean is not that of its samples
+    // where the sensor has a gap, the mean of the samples is not the mean over the interval
     valid.push_back(driven && n * kPredictionStep_s < usual_s + 0.5 / rate_hz + kPredictionStep_s ? 1 : 0);
     first = i + 1;
   }

@@ -71,7 +71,7 @@ struct Recording {
   /// [interval] Of a clamped robot: the moment on its stand about the torso origin, in B, over the moments of inertia of
   /// the torso.
   std::vector<Eigen::Vector3d> turn_rad_s2;
-  /// Of a clamped robot; 1 for others, and where the sensor is slower than kClampedInterval_s.
+  /// Number of samples of the force sensor in an interval; 1 if these are kClampedInterval_s apart or more, and in flight.
   std::size_t samples_per_interval = 1;
   std::vector<double> left_V, right_V;  ///< [physics step] commanded voltage times `full`
 

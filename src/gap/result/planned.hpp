@@ -27,11 +27,11 @@ struct PlannedEffect {
 /// intervention. All else is as in the plan that was asked for.
 struct PlannedChoice {
   std::string name, what;  ///< identifier; in words
-  bool flies = true;       ///< whether the vehicle can fly it; if not, all else is empty
+  bool flies = true;       ///< whether the vehicle can fly it; if not, all else but the hours is empty
   /// How probable the diagnosis would find the effect that the robot has: mean over all effects of the catalogue; 0 for
   /// effects that are not seen.
   double probability = 0;
-  double hours = 0;                 ///< of work beyond the plan that was asked for; 0 if it takes less
+  double hours = 0;                 ///< hours of work that it takes beyond the plan that was asked for, or 0
   double gained_per_hour = 0;       ///< probability beyond that of the plan that was asked for, over these hours
   std::vector<std::string> named;   ///< effects that the diagnosis would find with a probability of one half or more
   std::vector<std::string> gained;  ///< effects in `named` for which the plan that was asked for is below one half

@@ -16,7 +16,8 @@ namespace flappy::gap {
 namespace {
 
 constexpr double kTons = 1e5, kDuration_s = 1.5;
-constexpr int kStepsPerSample = 5;  // of a slow sensor
+/// Steps of the simulation from one sample of the force sensor to the next: at 1 kHz, one sample fills an interval.
+constexpr int kStepsPerSample = 5;
 
 model::Vehicle vehicle() { return model::read_vehicle(FLAPPY_SOURCE_DIR "/configs/vehicles/hummingbird_nominal.toml"); }
 
@@ -72,7 +73,7 @@ flightlog::FlightLog clamped_log(const model::Vehicle& nominal, int steps_per_sa
   return log;
 }
 
-/// What a vehicle's prediction leaves of the forces and moments, as a share of them; the worst channel.
+/// Rms of measured less predicted over rms of measured, of the force or moment for which this is largest.
 double left_by(const ResetPrediction& flight, const model::Vehicle& vehicle) {
   const VehicleHypothesis robot{vehicle, 0};
   const Rows predicted = flight.predict({&robot})[0];
