@@ -105,7 +105,7 @@ void add_choices(Section& section, const Json& choices, double asked) {
     }
     rows.push_back({spoken(c.at("name")), c.at("what"),
                     c.at("flies") ? cell(c.at("probability"), at + "probability", 2) : Json("cannot be flown"),
-                    cell(c.at("hours"), at + "hours", 1), cell(c.at("gained_per_hour"), at + "gained_per_hour", 3),
+                    cell(c.at("hours"), at + "hours", 2), cell(c.at("gained_per_hour"), at + "gained_per_hour", 3),
                     spoken_list(gained)});
   }
   section.add(f);
