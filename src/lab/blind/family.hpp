@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -21,6 +23,10 @@ struct FamilyEffect {
   /// mocap, current), and quantities with which it grows ("always", height, ceiling, wall, place, amplitude, difference,
   /// bias, split_cycle, velocity, rate, acceleration, time, temperature, charge, stroke, heading).
   std::vector<std::string> channels, regimes;
+  std::string law = {};     ///< its equation in words; empty: not written down yet
+  std::string source = {};  ///< the literature that it follows; "choice": none
+  /// Constants of the law at magnitude 1 that carry its strength and scales: positive, SI units.
+  std::vector<double> numbers = {};
 };
 
 /// A flight that a diagnosis proposes, on the clock of its log.
@@ -39,6 +45,8 @@ struct Assignment {
   /// Session of flights. In session 0 the robot is as drawn. A later one has programmes and noise of its own, and what
   /// changes harmlessly from day to day has changed: weather, a warm winding, a battery put back, ...
   std::size_t session = 0;
+  /// The session whose programmes are flown, as all noise stays that of `session`; none: `session`.
+  std::optional<std::size_t> programme_of = {};
   bool hover = false;                 ///< hover only; else rich flights, which vary place, speed and inputs
   bool calm = false;                  ///< flight 0 hovers, flights 1 and 2 follow slow paths; replaces rich flights
   bool own_parameters = false;        ///< draws each parameter of each body independently; else the file's values
@@ -131,6 +139,12 @@ class Family {
   virtual FamilyFlight fly_on_board(const Assignment& a, std::size_t number, const std::array<double, 4>& start,
                                     double lasts_s, OnBoard& firmware) const = 0;
   virtual FamilyEscape escape(const Assignment& a, std::size_t number, const EscapeAssignment& rules) const = 0;
+  /// The law of an effect by itself, as the flights apply it: magnitude 1, the nominal vehicle. Arguments and outcomes:
+  /// lab/benchmark/laws.hpp. Empty: the effect is geometry, or none has been written down.
+  virtual std::vector<double> law(const std::string& effect, std::span<const double> at) const {
+    (void)effect, (void)at;
+    return {};
+  }
 };
 
 }  // namespace flappy::blind
