@@ -11,6 +11,7 @@
 #include "lab/benchmark/detectability.hpp"
 #include "lab/benchmark/families.hpp"
 #include "lab/benchmark/foresee_bench.hpp"
+#include "lab/benchmark/laws.hpp"
 #include "lab/benchmark/make.hpp"
 #include "lab/benchmark/score_bench.hpp"
 #include "lab/blind/a/family_a.hpp"
@@ -148,6 +149,33 @@ Json fly_case(const RobotOptions& o, Programme programme) {
   return {{"seed", o.seed}, {"draw", sampled.draw}, {"crashes", crashes}, {"flights", list}};
 }
 
+/// Prints the nearest pair of laws of each effect, and all that is refused.
+Json check_laws(const std::vector<std::string>& names, const std::filesystem::path& page) {
+  std::vector<const Family*> families;
+  for (const std::string& name : names) families.push_back(&benchmark::family_named(name));
+  if (!page.empty()) io::write_atomically(page, benchmark::laws_page(families));
+  Json all = Json::array();
+  std::size_t refused = 0;
+  std::printf("%-30s %-9s %-9s %8s\n", "effect", "of", "and", "distance");
+  for (const benchmark::LawPair& p : benchmark::compare_laws(families)) {
+    Json pair = {{"effect", p.effect}, {"first", p.first}, {"second", p.second}, {"refused", p.refused()}};
+    pair["distance"] = p.distance ? Json(*p.distance) : Json();
+    pair["equal_number"] = p.equal_number ? Json(*p.equal_number) : Json();
+    pair["missing"] = p.missing;
+    all.push_back(std::move(pair));
+    if (p.distance)
+      std::printf("%-30s %-9s %-9s %8.3f", p.effect.c_str(), p.first.c_str(), p.second.c_str(), *p.distance);
+    else std::printf("%-30s %-9s %-9s %8s", p.effect.c_str(), p.first.c_str(), p.second.c_str(), "-");
+    if (!p.missing.empty()) std::printf("  no %s", p.missing.c_str());
+    if (p.equal_number) std::printf("  both have %s", io::shortest_digits(*p.equal_number).c_str());
+    std::printf("%s\n", p.refused() ? "  refused" : "");
+    refused += p.refused();
+  }
+  std::printf("%zu pairs, %zu refused: nearer than %g, an equal number, or nothing written down\n", all.size(), refused,
+              benchmark::kMinDistance);
+  return {{"refused", refused}, {"pairs", all}};
+}
+
 void add_question_options(io::Command& c, benchmark::BenchQuestions& q) {
   c.option("folders", q.folders, "of flappy-blind make").required();
   c.option("--vehicle", q.vehicle, "the robot as declared, where it is elsewhere now");
@@ -220,6 +248,11 @@ int main(int argc, char** argv) {
       .shows_default();
   escape.option("--count", escapes.count, "escapes, each from another start").range(1, 10000).shows_default();
   escape.option("--out", escapes.robot.out, "folder for the logs: escape_1, escape_2, ...");
+  io::Command laws = program.app().command("laws", "compares laws of effects: those of families, and the catalogue's");
+  std::vector<std::string> compared = {"a", "b", "c"};
+  std::filesystem::path laws_file;
+  laws.option("--family", compared, "these families").one_of({"a", "b", "c"}).shows_default();
+  laws.option("--page", laws_file, "file for a table of laws and sources");
   io::Command detectability = program.app().command("detectability", "finds how large effects have to be to be found");
   benchmark::DetectabilityCommand command;
   detectability.option("--family", command.family, "a, b or c").required();
@@ -306,6 +339,7 @@ int main(int argc, char** argv) {
       const nlohmann::ordered_json found = blind::run_loop(looped);
       if (!found.is_null()) program.write_json(found);
     } else if (calibrate.given()) program.write_json(benchmark::calibrate(calibrated));
+    else if (laws.given()) program.write_json(blind::check_laws(compared, laws_file));
     else if (list.given()) {
       nlohmann::ordered_json all = nlohmann::ordered_json::object();  // effect: its typical magnitude in words, or null
       if (of.family.empty())
