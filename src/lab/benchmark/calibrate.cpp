@@ -11,7 +11,6 @@
 #include "io/program.hpp"
 #include "io/sha256.hpp"
 #include "io/text.hpp"
-#include "lab/benchmark/change_over_noise.hpp"
 #include "lab/benchmark/records.hpp"
 
 namespace flappy::benchmark {
@@ -142,8 +141,8 @@ class Calibration {
           if (h.remainder) a.unexplained.emplace_back();
           own.hypotheses.push_back(std::move(a));
         }
-        if (own.hypotheses.empty()) continue;                                     // its data were faulty
-        if (is_within_noise(read_change_over_noise(folder, c.number))) continue;  // as the score does
+        if (own.hypotheses.empty()) continue;  // its data were faulty
+        if (!own.truth.counts()) continue;     // as the score does
         own.part = parts.try_emplace(manifest.family + " " + own.truth.part, counts.size()).first->second;
         if (own.part == counts.size()) counts.push_back(0);
         counts[own.part] += 1;

@@ -1,6 +1,7 @@
 #include "lab/benchmark/case_plan.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 
 #include "io/config.hpp"
@@ -21,6 +22,9 @@ constexpr std::size_t kSingles = 60, kHarmless = 30, kStrange = 15, kPairs = 20;
 constexpr double kLargest = 4;
 /// For effects outside the catalogue that the table does not list.
 constexpr double kOutsideMagnitude = 2;
+/// Robots differ in how much they have of a cause: magnitudes of contrasts are this many times what its source
+/// measured, uniform in the logarithm.
+constexpr double kMinTypical = 0.7, kMaxTypical = 2;
 
 using Ids = std::vector<std::string>;
 
@@ -164,6 +168,12 @@ class Planner {
     c.effects = {{first, magnitude(first)}, {second, magnitude(second)}};
   }
 
+  /// Typical magnitude of one robot.
+  static double typical(std::uint64_t seed) {
+    const double share = static_cast<double>(std::mt19937_64(seed)()) / static_cast<double>(std::mt19937_64::max());
+    return kMinTypical * std::pow(kMaxTypical / kMinTypical, share);
+  }
+
   std::size_t below(std::size_t n) { return static_cast<std::size_t>(random_() % n); }
 
   template <class List>
@@ -184,16 +194,16 @@ class Planner {
         c.bench = options_.bench;
       });
     };
-    const auto single = [&](std::size_t k, PlannedCase& c) { c.effects = {{all[k % all.size()], 1}}; };
+    const auto single = [&](std::size_t k, PlannedCase& c) { c.effects = {{all[k % all.size()], typical(c.seed)}}; };
     part("changed", rounds(all, kSingles), single);
     part("changed_short_reference", rounds(all, kSingles), [&](std::size_t k, PlannedCase& c) {
-      single(k, c);
       c.seed = seed_of("changed", k);
+      single(k, c);
       c.references = 1;
     });
     part("changed_short_test", rounds(all, kSingles), [&](std::size_t k, PlannedCase& c) {
-      single(k, c);
       c.seed = seed_of("changed", k);
+      single(k, c);
       c.flights = 1;
     });
     part("unchanged", kHarmless, [](std::size_t, PlannedCase&) {});
@@ -210,8 +220,9 @@ class Planner {
       c.effects = {{outside_[k % outside_.size()], kOutsideMagnitude}};
     });
     part("changed_pairs", kPairs, [&](std::size_t, PlannedCase& c) {
+      std::uint64_t draw = c.seed;
       pair(
-          all, [](const std::string&) { return 1.0; }, c);
+          all, [&](const std::string&) { return typical(draw++); }, c);
     });
     number();
     return std::move(cases_);

@@ -55,8 +55,9 @@ struct PlanOptions {
   std::vector<std::string> effects;  ///< robots of contrasts have these effects alone; empty: all
   std::size_t at_most = 0;           ///< most cases of each part; 0: all
   std::size_t flights = blind::Family::kFlights;  ///< most flights of a session of a contrast
-  std::size_t reference_sessions = 1;             ///< of the references of a contrast; other numbers have other seeds
-  bool bench = false;                             ///< robots of contrasts are clamped in place of flying
+  /// Of the references of a contrast; other numbers have other seeds.
+  std::size_t reference_sessions = blind::Family::kFlights;
+  bool bench = false;  ///< robots of contrasts are clamped in place of flying
 };
 
 /// Seeds of family b begin at 20,000,000 (development) and 29,000,000 (reported); a and c: 10,000,000 and 30,000,000

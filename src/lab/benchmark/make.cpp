@@ -82,7 +82,7 @@ class Maker {
       io::write_atomically(now.vehicle_file,
                            model::vehicle_text(sampled_.sample({now.seed, 0, 0, sim::Stream::vehicle})));
     };
-    Label label{p, 0, {}, {}};
+    Label label{p, 0, {}, {}, {}};
     for (const blind::FamilyEffect& e : family_.effects())
       if (std::ranges::count(p.effects, e.id, &blind::BlindEffect::id) > 0) {
         label.channels.insert(label.channels.end(), e.channels.begin(), e.channels.end());
@@ -106,6 +106,9 @@ class Maker {
         flightlog::write_flight_log(case_folder(p) / (kFlightFolder + std::to_string(k + 1)), log);
       }
       label.draw = flown.draw;
+      std::vector<flightlog::FlightLog> logs;
+      for (std::size_t k = 0; k < p.flights; ++k) logs.push_back(std::move(flown.flights[k].log));
+      if (!p.effects.empty()) label.over_sessions = change_over_sessions(family_, flown.assignment, logs);
       json = to_json(label);
     } catch (const blind::NeverFlies&) {
       json = to_json(label);

@@ -110,20 +110,10 @@ Json open_labels(const std::filesystem::path& folder, const Manifest& manifest) 
   return read_json(sealed);
 }
 
-std::filesystem::path over_noise_file(const std::filesystem::path& folder, std::size_t number) {
-  return true_fits(folder) / (number_text(number) + "_over_noise.json");
-}
-
-std::optional<double> read_change_over_noise(const std::filesystem::path& folder, std::size_t number) {
-  const std::filesystem::path file = over_noise_file(folder, number);
-  if (!std::filesystem::exists(file)) return {};
-  const Json change = read_json(file).at("change_over_noise");
-  return change.is_null() ? std::nullopt : std::optional(change.get<double>());
-}
-
 CaseTruth Label::truth() const {
-  CaseTruth t{planned.part, {}, channels, regimes, planned.seed, draw};
+  CaseTruth t{planned.part, {}, channels, regimes, planned.seed, draw, {}};
   for (const blind::BlindEffect& e : planned.effects) t.effects.push_back(e.id);
+  for (const OverSessions& o : over_sessions) t.over_sessions.push_back(o.ratio);
   return t;
 }
 
@@ -159,6 +149,9 @@ Json to_json(const Label& label) {
   json["draw"] = label.draw;
   json["channels"] = label.channels;
   json["regimes"] = label.regimes;
+  json["over_sessions"] = Json::array();
+  for (const OverSessions& o : label.over_sessions)
+    json["over_sessions"].push_back({{"channel", o.channel}, {"ratio", o.ratio}});
   return json;
 }
 
@@ -183,6 +176,8 @@ Label label_from(const Json& json) {
   l.draw = json.at("draw");
   l.channels = json.at("channels").get<Names>();
   l.regimes = json.at("regimes").get<Names>();
+  for (const Json& o : json.value("over_sessions", Json::array()))
+    l.over_sessions.push_back({o.at("channel"), o.at("ratio")});
   return l;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "lab/benchmark/case_plan.hpp"
+#include "lab/benchmark/change_over_sessions.hpp"
 #include "lab/benchmark/score.hpp"
 
 namespace flappy::benchmark {
@@ -49,10 +50,6 @@ std::string sum_line(const std::filesystem::path& folder, std::size_t number);
 void check_predictions(const std::filesystem::path& folder, const Manifest& manifest);
 /// Folder that is made when the labels are opened; from then on, no prediction is accepted.
 std::filesystem::path true_fits(const std::filesystem::path& folder);
-/// How far the effect of a case changes its flights beyond noise (change_over_noise.hpp): the file that keeps it in
-/// true_fits(), and its content. None: it was not asked for, or changes none of these.
-std::filesystem::path over_noise_file(const std::filesystem::path& folder, std::size_t number);
-std::optional<double> read_change_over_noise(const std::filesystem::path& folder, std::size_t number);
 /// The content of sealed/labels.json. InputError if it has changed.
 Json open_labels(const std::filesystem::path& folder, const Manifest& manifest);
 
@@ -60,6 +57,7 @@ struct Label {
   PlannedCase planned;
   std::uint64_t draw = 0;                      ///< number of the first draw of its seed that did not crash
   std::vector<std::string> channels, regimes;  ///< where its effects act (blind::FamilyEffect)
+  std::vector<OverSessions> over_sessions;     ///< of each effect; empty: not computed
   CaseTruth truth() const;
   blind::Assignment robot(const std::filesystem::path& vehicle) const;
 };

@@ -8,7 +8,7 @@
 
 #include "io/statistics.hpp"
 #include "io/text.hpp"
-#include "lab/benchmark/change_over_noise.hpp"
+#include "lab/benchmark/change_over_sessions.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::benchmark {
@@ -247,10 +247,10 @@ std::optional<std::vector<std::string>> unbeaten_lines(const std::vector<ScoreLi
   return keys;
 }
 
-bool within_noise(const ScoredCase& c) { return is_within_noise(c.change_over_noise); }
-
 std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases);
 std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases);
+void add_hidden_lines(const std::string& key, const std::string& part, const std::vector<ScoredCase>& counting,
+                      const std::vector<ScoredCase>& hidden, std::vector<ScoreLine>& lines);
 
 }  // namespace
 
@@ -284,7 +284,13 @@ Answer answer_of(const Prediction& p) {
 
 bool abstains(const Answer& a) { return a.kind == "group" || a.probability < 0.5; }
 
+bool CaseTruth::counts() const {
+  return std::ranges::all_of(over_sessions, [](double ratio) { return ratio >= kCounts; });
+}
+
 bool right(const CaseTruth& t, const Answer& p) {
+  // what sessions hide may be called unchanged
+  if (!t.counts() && (p.kind == "none" || p.kind == "parameters")) return true;
   if (t.part.starts_with("unchanged")) return p.kind == "none" || p.kind == "parameters";
   if (t.part == "changed_withheld" || t.part == "changed_outside") return p.kind == "unknown" || p.kind == "remainder";
   if (t.part == "none" || t.part == "conventions") return p.kind == "none" || p.kind == "parameters";
@@ -321,23 +327,26 @@ std::optional<double> closure(const ScoredCase& c) {
 }
 
 bool needs_true_fit(const ScoredCase& c) {
-  if ((c.truth.part != "singles" && c.truth.part != "changed") || within_noise(c)) return false;
+  if ((c.truth.part != "singles" && c.truth.part != "changed") || !c.truth.counts()) return false;
   const gap::RankedHypothesis* truth = fitted(c.prediction, c.truth.effects);
   return c.prediction.kind != "data" && (truth == nullptr || !truth->loss);
 }
 
-bool needs_change_over_noise(const ScoredCase& c) {
-  return c.truth.part.starts_with("changed") && c.truth.effects.size() == 1 && c.truth.part != "changed_withheld" &&
-         c.truth.part != "changed_outside" && !right(c.truth, c.prediction);
-}
-
 Scores score(const std::vector<ScoredCase>& cases) {
-  std::vector<ScoredCase> absolute, contrasts;
-  for (const ScoredCase& c : cases)
-    if (!within_noise(c)) (std::ranges::count(kContrastParts, c.truth.part) > 0 ? contrasts : absolute).push_back(c);
+  std::array<std::vector<ScoredCase>, 2> counting, hidden;  // absolute, contrasts
+  for (const ScoredCase& c : cases) {
+    const bool contrast = std::ranges::count(kContrastParts, c.truth.part) > 0;
+    (c.truth.counts() ? counting : hidden)[contrast].push_back(c);
+  }
   Scores s;
-  if (!absolute.empty()) s.lines = absolute_lines(absolute);
-  if (!contrasts.empty()) std::ranges::move(contrast_lines(contrasts), std::back_inserter(s.lines));
+  if (!counting[0].empty() || !hidden[0].empty()) {
+    s.lines = absolute_lines(counting[0]);
+    add_hidden_lines("", "singles", counting[0], hidden[0], s.lines);
+  }
+  if (!counting[1].empty() || !hidden[1].empty()) {
+    std::ranges::move(contrast_lines(counting[1]), std::back_inserter(s.lines));
+    add_hidden_lines("contrast", "changed", counting[1], hidden[1], s.lines);
+  }
   s.unbeaten = unbeaten_lines(s.lines);
   return s;
 }
@@ -482,6 +491,41 @@ std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases) {
   l.push_back(std::move(pairs));
   add_foresight("contrast_plan", "contrast, plan", changed, l);
   return l;
+}
+
+/// What the other rows leave out, so that no choice of what counts hides a case. `part`: whose cases are added up.
+void add_hidden_lines(const std::string& key, const std::string& part, const std::vector<ScoredCase>& counting,
+                      const std::vector<ScoredCase>& hidden, std::vector<ScoreLine>& lines) {
+  const std::string begin = key.empty() ? "" : key + "_", says = key.empty() ? "" : key + ", ";
+  Cases every = of_parts(counting, {part});
+  std::ranges::move(of_parts(hidden, {part}), std::back_inserter(every));
+  lines.push_back({begin + "all_top1",
+                   says + "right first, also of effects that sessions hide",
+                   "",
+                   "",
+                   share(every, named_alone),
+                   {},
+                   {},
+                   of_baseline(every, baseline_first)});
+  Cases own;
+  for (const ScoredCase& c : hidden) own.push_back(&c);
+  lines.push_back({begin + "hidden_right",
+                   says + "effects that sessions hide: unchanged, or right",
+                   "",
+                   "",
+                   share(own, [](const ScoredCase& c) { return right(c.truth, c.prediction); }),
+                   {},
+                   {},
+                   {}});
+  lines.push_back(
+      {begin + "hidden_wrong",
+       says + "effects that sessions hide: a wrong name",
+       "",
+       "",
+       share(own, [](const ScoredCase& c) { return names_effects(c.prediction) && !right(c.truth, c.prediction); }),
+       {},
+       {},
+       {}});
 }
 
 }  // namespace

@@ -16,6 +16,9 @@ struct CaseTruth {
   std::vector<std::string> effects;            ///< effects of the robot
   std::vector<std::string> channels, regimes;  ///< where the effects act (blind::FamilyEffect)
   std::uint64_t seed = 0, draw = 0;            ///< identify the robot
+  std::vector<double> over_sessions;           ///< of each effect (change_over_sessions.hpp); empty: not known
+  /// Whether each of its effects changes the flights by more than sessions and noise do; also where it is not known.
+  bool counts() const;
 };
 /// Parts of a benchmark, by their robots. Those with effects have independent parameters and, but for redeclared,
 /// inexact declarations.
@@ -81,9 +84,6 @@ struct ScoredCase {
   std::optional<Answer> true_fit;
   /// Answer for the flights and the flight that `prediction` proposed.
   std::optional<Answer> after_next;
-  /// Change of the test flights by the effect, over what noise alone would give a matched filter
-  /// (change_over_noise.hpp). None: not asked for.
-  std::optional<double> change_over_noise;
   std::optional<Foresight> foreseen;  ///< none: not planned, several effects, or one that changes no row
 };
 
@@ -111,8 +111,6 @@ std::optional<double> closure(const ScoredCase& c);
 
 /// Whether the closure of a case is scored but its true effect was not fitted, so that true_fit is needed.
 bool needs_true_fit(const ScoredCase& c);
-/// Whether change_over_noise is needed: one effect of the catalogue changed between the sessions, and was not named.
-bool needs_change_over_noise(const ScoredCase& c);
 
 /// Evidence of a diagnosis for the true effect over its best rival, nats: of hypotheses with it, alone or with others,
 /// over those without. None unless the robot has one effect and the diagnosis weighed it.

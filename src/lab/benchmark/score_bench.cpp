@@ -10,7 +10,7 @@
 #include "io/files.hpp"
 #include "io/program.hpp"
 #include "io/sha256.hpp"
-#include "lab/benchmark/change_over_noise.hpp"
+#include "io/text.hpp"
 #include "lab/benchmark/families.hpp"
 #include "lab/benchmark/foresee_bench.hpp"
 #include "lab/benchmark/proposal.hpp"
@@ -165,32 +165,6 @@ bool fit_truths(const ScoreCommand& command, Bench& bench) {
   return true;
 }
 
-/// How far effects that were not named change the flights beyond noise. False if interrupted.
-bool find_changes_over_noise(const ScoreCommand& command, Bench& bench) {
-  std::vector<std::size_t> asked, open;
-  const auto file_of = [&](std::size_t i) { return over_noise_file(bench.folder, bench.manifest.cases[i].number); };
-  for (std::size_t i = 0; i < bench.cases.size(); ++i) {
-    if (!needs_change_over_noise(bench.cases[i])) continue;
-    asked.push_back(i);
-    if (!fs::exists(file_of(i))) open.push_back(i);
-  }
-  const bool all =
-      work_through("comparing with noise", open.size(), command.threads, command.ranks, [&](std::size_t k) {
-        const Label& label = bench.labels.at(bench.manifest.cases[open[k]].number);
-        blind::Assignment robot = label.robot(bench.predictions.vehicle());
-        robot.effects.clear();
-        const blind::BlindEffect& e = label.planned.effects.front();
-        const std::optional<double> change =
-            change_over_noise(family_named(bench.manifest.family), robot, label.planned.flights, e.id, e.magnitude);
-        io::write_atomically(file_of(open[k]),
-                             Json{{"change_over_noise", change ? Json(*change) : Json()}}.dump() + "\n");
-      });
-  if (!all) return false;
-  for (const std::size_t i : asked)
-    bench.cases[i].change_over_noise = read_change_over_noise(bench.folder, bench.manifest.cases[i].number);
-  return true;
-}
-
 /// Flies the proposals of part "hover", and with --proposals those of undecided singles. The family makes an
 /// intervention's changes to its robot. Old and new flights are diagnosed together. False if interrupted.
 bool fly_proposals(const ScoreCommand& command, Bench& bench) {
@@ -293,13 +267,15 @@ std::string case_lines(const Bench& bench) {
     const Label& label = bench.labels.at(bench.manifest.cases[i].number);
     const std::size_t number = label.planned.number;
     const Json prediction = bench.predictions.read(number);
-    std::string magnitudes;
+    std::string magnitudes, over_sessions;
     for (const blind::BlindEffect& e : label.planned.effects)
       magnitudes += (magnitudes.empty() ? "" : "+") + io::shortest_digits(e.magnitude);
+    for (const OverSessions& o : label.over_sessions)
+      over_sessions += (over_sessions.empty() ? "" : "+") + io::format("%.3g", o.ratio);
     const bool alone = c.truth.part == "singles" || c.truth.part == "changed";
     const std::optional<double> closed = alone ? closure(c) : std::nullopt;
     text += std::to_string(number) + "," + c.truth.part + "," + io::joined(c.truth.effects, "+") + "," + magnitudes +
-            "," + p.kind + "," + io::joined(p.effects, "+") + "," + figure(p.probability) + "," +
+            "," + over_sessions + "," + p.kind + "," + io::joined(p.effects, "+") + "," + figure(p.probability) + "," +
             (right(c.truth, p) ? "1" : "0") + "," + (closed ? figure(closed) : "") + "," +
             io::shortest_digits(prediction.at("seconds").get<double>()) + "," + (p.where ? p.where->channel : "") +
             "," + (p.where ? p.where->regime : "") + "," + std::to_string(c.truth.seed) + "," +
@@ -324,7 +300,7 @@ Json score_bench(const ScoreCommand& command) {
     }
   for (const auto& b : benches) {
     b->open();
-    if (!fit_truths(command, *b) || !find_changes_over_noise(command, *b) || !fly_proposals(command, *b)) {
+    if (!fit_truths(command, *b) || !fly_proposals(command, *b)) {
       std::printf("stopped; predictions are sealed: the same command goes on\n");
       return nullptr;
     }
@@ -335,7 +311,8 @@ Json score_bench(const ScoreCommand& command) {
   std::set<std::string> sets, commits, undetectable;
   std::size_t never = 0, drawn_again = 0;
   std::string lines =
-      "case,part,effects,magnitudes,verdict,named,probability,right,closure,seconds,channel,regime,seed,draw,"
+      "case,part,effects,magnitudes,over_sessions,verdict,named,probability,right,closure,seconds,channel,regime,seed,"
+      "draw,"
       "family,set,commit\n";
   std::set<std::string> families;
   for (const auto& b : benches) families.insert(b->manifest.family);

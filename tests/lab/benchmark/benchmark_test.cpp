@@ -316,8 +316,12 @@ TEST_F(Benchmark, PlansContrasts) {
   std::map<std::string, std::size_t> count;
   std::map<std::string, std::set<std::string>> effects;
   std::map<std::uint64_t, std::set<std::string>> by_seed;
-  for (const PlannedCase& c : plan_cases(family, of, options)) {
+  std::set<double> magnitudes;
+  std::vector<PlannedCase> cases = plan_cases(family, of, options);
+  std::ranges::stable_sort(cases, {}, [](const PlannedCase& c) { return c.part != "changed"; });
+  for (const PlannedCase& c : cases) {
     ++count[c.part];
+    EXPECT_EQ(c.reference_sessions, c.references) << "each reference is of its own session";
     EXPECT_TRUE(c.own_parameters && c.conventions);
     EXPECT_EQ(c.references, c.part == "changed_short_reference" ? 1U : 3U) << c.part;
     EXPECT_EQ(c.flights, c.part == "changed_short_test" ? 1U : 3U) << c.part;
@@ -325,7 +329,10 @@ TEST_F(Benchmark, PlansContrasts) {
     EXPECT_EQ(c.withheld.empty(), c.part != "changed_withheld");
     EXPECT_EQ(c.effects.empty(), c.part.starts_with("unchanged"));
     for (const blind::BlindEffect& e : c.effects) {
-      EXPECT_EQ(e.magnitude, c.part == "changed_outside" ? 2 : 1);
+      if (c.part == "changed_outside") EXPECT_EQ(e.magnitude, 2);
+      else EXPECT_TRUE(e.magnitude >= 0.7 && e.magnitude <= 2) << e.magnitude;
+      magnitudes.insert(e.magnitude);
+      if (c.part.starts_with("changed_short")) EXPECT_TRUE(by_seed[c.seed].contains(e.id)) << "a robot of part changed";
       effects[c.part].insert(e.id);
       by_seed[c.seed].insert(e.id);
     }
@@ -340,6 +347,9 @@ TEST_F(Benchmark, PlansContrasts) {
       {"changed_calm", 30}, {"unchanged_calm", 30},          {"changed_withheld", 30},   {"changed_outside", 18},
       {"changed_pairs", 20}};
   EXPECT_EQ(count, expected);
+  EXPECT_GT(magnitudes.size(), 100U) << "each robot has its own";
+  EXPECT_LT(*magnitudes.begin(), 0.75);
+  EXPECT_GT(*magnitudes.rbegin(), 1.9);
   EXPECT_EQ(effects["changed"].size(), 30U) << "every effect, even an undetectable one";
   for (const auto& [seed, ids] : by_seed)
     if (ids.size() > 1) EXPECT_EQ(ids.size(), 2U) << "of a pair, not of another robot: " << seed;

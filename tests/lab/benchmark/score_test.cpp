@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "lab/benchmark/change_over_noise.hpp"
+#include "lab/benchmark/change_over_sessions.hpp"
 
 namespace flappy::benchmark {
 namespace {
@@ -253,7 +253,8 @@ TEST(Score, OfAContrast) {
                                    judged("changed_withheld", {"wind"}, "effect", {"tether"}, 0.9),
                                    judged("changed_outside", {"outside_slosh"}, "unknown", {}, 0.9),
                                    judged("changed_pairs", {"wind", "com_offset"}, "effect", {"wind"}, 0.9)};
-  cases[2].change_over_noise = kBeyondNoise - 1;  // left out
+  cases[1].truth.over_sessions = {kCounts + 1};
+  cases[2].truth.over_sessions = {kCounts - 1};  // sessions hide it: unchanged is right
   const std::vector<ScoreLine> lines = score(cases).lines;
   const auto of = [&](const char* key) { return *line_of(lines, key).score.value; };
   EXPECT_DOUBLE_EQ(of("contrast_top1"), 1.0 / 2);
@@ -263,9 +264,13 @@ TEST(Score, OfAContrast) {
   EXPECT_DOUBLE_EQ(of("contrast_pairs_f1"), 2.0 / 3);
   EXPECT_FALSE(line_of(lines, "contrast_calm_top1").score.value);
   EXPECT_THROW(line_of(lines, "top1_mocap_imu"), std::out_of_range) << "no case is of that benchmark";
-  EXPECT_FALSE(needs_change_over_noise(cases[0])) << "it was named";
-  EXPECT_TRUE(needs_change_over_noise(cases[1]));
-  EXPECT_FALSE(needs_change_over_noise(cases[6])) << "another name is expected";
+  EXPECT_DOUBLE_EQ(of("contrast_all_top1"), 1.0 / 3);
+  EXPECT_DOUBLE_EQ(of("contrast_hidden_right"), 1);
+  EXPECT_DOUBLE_EQ(of("contrast_hidden_wrong"), 0);
+  cases[2].prediction.kind = "effect", cases[2].prediction.effects = {"wind"};
+  EXPECT_DOUBLE_EQ(main_score(cases, "contrast_hidden_wrong").value.value(), 1);
+  cases[2].prediction.effects = {"com_offset"};  // hidden, and found all the same
+  EXPECT_DOUBLE_EQ(main_score(cases, "contrast_hidden_right").value.value(), 1);
 }
 
 TEST(Score, ARemainderBesideTheTruthIsRight) {

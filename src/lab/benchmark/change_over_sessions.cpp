@@ -1,0 +1,284 @@
+#include "lab/benchmark/change_over_sessions.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+
+namespace flappy::benchmark {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using flightlog::Column;
+using flightlog::FlightLog;
+
+constexpr double kBeats = 5;             // of a window: long enough for the slowest motion capture
+constexpr std::size_t kFewest = 12;      // samples in a window
+constexpr std::size_t kFirstOther = 11;  // first number of the other sessions: none that a case flies
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+/// Windows of a log.
+struct Windows {
+  double width_s, beat_s;
+  std::size_t count;
+
+  explicit Windows(const FlightLog& log)
+      : width_s(kBeats / log.header.flapping_Hz),
+        beat_s(1 / log.header.flapping_Hz),
+        count(static_cast<std::size_t>(log.command.t_s.back() / width_s)) {}
+  double begin(std::size_t w) const { return static_cast<double>(w) * width_s; }
+};
+
+/// Samples from `from` on that lie in [begin, end).
+std::pair<std::size_t, std::size_t> samples(const Column& t_s, double begin, double end) {
+  const auto first = std::ranges::lower_bound(t_s, begin), last = std::ranges::lower_bound(t_s, end);
+  return {static_cast<std::size_t>(first - t_s.begin()), static_cast<std::size_t>(last - t_s.begin())};
+}
+
+/// Mean and, with `harmonics`, two harmonics of a column, by least squares in each window.
+void add_column(std::vector<WindowedChannel>& all, const Windows& windows, const std::string& name, const Column& t_s,
+                double late_s, const Column& x, bool harmonics) {
+  const double turn = 2 * std::numbers::pi / windows.beat_s;
+  const Eigen::Index width = harmonics ? 5 : 1;
+  std::vector<WindowedChannel> own = {{name + " mean", {}}};
+  if (harmonics) own.push_back({name + " harmonic 1", {}}), own.push_back({name + " harmonic 2", {}});
+  for (std::size_t w = 0; w < windows.count; ++w) {
+    const auto [from, to] = samples(t_s, windows.begin(w) + late_s, windows.begin(w + 1) + late_s);
+    Eigen::VectorXd fit = Eigen::VectorXd::Constant(width, kNone);
+    if (to - from >= kFewest) {
+      Eigen::MatrixXd waves(static_cast<Eigen::Index>(to - from), width);
+      Eigen::VectorXd values(waves.rows());
+      for (std::size_t i = from; i < to; ++i) {
+        const double a = turn * (t_s[i] - late_s - windows.begin(w));
+        const auto row = static_cast<Eigen::Index>(i - from);
+        waves(row, 0) = 1;
+        if (harmonics) waves.row(row).tail(4) << std::cos(a), std::sin(a), std::cos(2 * a), std::sin(2 * a);
+        values[row] = x[i];
+      }
+      fit = waves.colPivHouseholderQr().solve(values);
+    }
+    own[0].values.push_back(fit[0]);
+    for (std::size_t h = 1; h < own.size(); ++h)
+      for (const Eigen::Index k : {2 * h - 1, 2 * h}) own[h].values.push_back(fit[k]);
+  }
+  std::ranges::move(own, std::back_inserter(all));
+}
+
+/// Attitude at a time, between samples by slerp; held before the first and after the last.
+Quaterniond attitude_at(const flightlog::MocapStream& m, double t_s) {
+  const auto at = [&](std::size_t i) { return Quaterniond(m.qw[i], m.qx[i], m.qy[i], m.qz[i]); };
+  const auto next = static_cast<std::size_t>(std::ranges::lower_bound(m.t_s, t_s) - m.t_s.begin());
+  if (next == 0) return at(0);
+  if (next == m.t_s.size()) return at(next - 1);
+  const double share = (t_s - m.t_s[next - 1]) / (m.t_s[next] - m.t_s[next - 1]);
+  return at(next - 1).slerp(share, at(next));
+}
+
+Vector3d rotation_vector(const Quaterniond& q) {
+  const Eigen::AngleAxisd a(q);
+  return a.angle() * a.axis();
+}
+
+/// Quadratic B-spline of support 3: the second difference of means over windows is the acceleration seen through it.
+double spline(double x) {
+  x = std::abs(x);
+  return x < 0.5 ? 0.75 - x * x : x < 1.5 ? 0.5 * (1.5 - x) * (1.5 - x) : 0;
+}
+
+/// Motion capture: place and attitude in each window; by how much the turn from window to window is not the gyro's, and by how much the
+/// second difference of places is not what the accelerometer gives.
+void add_motion(std::vector<WindowedChannel>& all, const Windows& windows, const FlightLog& log) {
+  const flightlog::MocapStream& m = log.mocap;
+  const flightlog::ImuStream& imu = log.imu;
+  const double late_s = log.header.mocap.latency_s, imu_late_s = log.header.imu.latency_s;
+  std::vector<std::optional<Vector3d>> places(windows.count);
+  std::vector<std::optional<Quaterniond>> attitudes(windows.count);
+  for (std::size_t w = 0; w < windows.count; ++w) {
+    const auto [from, to] = samples(m.t_s, windows.begin(w) + late_s, windows.begin(w + 1) + late_s);
+    if (to - from < kFewest) continue;
+    const std::size_t middle = (from + to) / 2;
+    const Quaterniond centre(m.qw[middle], m.qx[middle], m.qy[middle], m.qz[middle]);
+    // means at the middle of the window, which is not quite that of its samples: a straight line by least squares
+    Eigen::MatrixX2d line(static_cast<Eigen::Index>(to - from), 2);
+    Eigen::Matrix<double, Eigen::Dynamic, 6> seen(line.rows(), 6);
+    for (std::size_t i = from; i < to; ++i) {
+      const auto row = static_cast<Eigen::Index>(i - from);
+      line.row(row) << 1, m.t_s[i] - late_s - windows.begin(w) - windows.width_s / 2;
+      seen.row(row) << m.x_m[i], m.y_m[i], m.z_m[i],
+          rotation_vector(centre.conjugate() * Quaterniond(m.qw[i], m.qx[i], m.qy[i], m.qz[i])).transpose();
+    }
+    const Eigen::Matrix<double, 1, 6> mean = line.colPivHouseholderQr().solve(seen).row(0);
+    const Vector3d turn = mean.tail(3);
+    places[w] = mean.head(3);
+    attitudes[w] = centre * (turn.norm() > 0 ? Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized()))
+                                             : Quaterniond::Identity());
+  }
+  // true times of the IMU's samples, their turn and their acceleration in W
+  Eigen::Matrix3Xd acceleration(3, static_cast<Eigen::Index>(imu.t_s.size()));
+  for (std::size_t i = 0; i < imu.t_s.size(); ++i)
+    acceleration.col(static_cast<Eigen::Index>(i)) =
+        attitude_at(m, imu.t_s[i] - imu_late_s + late_s) *
+            Vector3d(imu.accel_x_m_s2[i], imu.accel_y_m_s2[i], imu.accel_z_m_s2[i]) -
+        Vector3d(0, 0, log.header.gravity_m_s2);
+  std::vector<WindowedChannel> own;
+  for (const char* what : {"place", "attitude", "turn less the gyro's", "acceleration less the accelerometer's"})
+    for (const char* axis : {" x", " y", " z"}) own.push_back({std::string(what) + axis, {}});
+  const auto put = [&](std::size_t first, const std::optional<Vector3d>& x) {
+    for (std::size_t k = 0; k < 3; ++k) own[first + k].values.push_back(x ? (*x)[static_cast<Eigen::Index>(k)] : kNone);
+  };
+  for (std::size_t w = 0; w < windows.count; ++w) {
+    put(0, places[w]);
+    put(3, attitudes[w] ? std::optional(rotation_vector(*attitudes[w])) : std::nullopt);
+    std::optional<Vector3d> turn, second;
+    const double middle_s = windows.begin(w) + windows.width_s / 2;
+    if (w + 1 < windows.count && attitudes[w] && attitudes[w + 1]) {
+      const auto [from, to] = samples(imu.t_s, middle_s + imu_late_s, middle_s + windows.width_s + imu_late_s);
+      Quaterniond turned = Quaterniond::Identity();
+      for (std::size_t i = from; i < to; ++i) {
+        const Vector3d angle = windows.width_s / static_cast<double>(to - from) *
+                               Vector3d(imu.gyro_x_rad_s[i], imu.gyro_y_rad_s[i], imu.gyro_z_rad_s[i]);
+        if (angle.norm() > 0) turned = turned * Quaterniond(Eigen::AngleAxisd(angle.norm(), angle.normalized()));
+      }
+      if (to > from) turn = rotation_vector(turned.conjugate() * (attitudes[w]->conjugate() * *attitudes[w + 1]));
+    }
+    put(6, turn);
+    if (w > 0 && w + 1 < windows.count && places[w - 1] && places[w] && places[w + 1]) {
+      const auto [from, to] = samples(imu.t_s, middle_s - 1.5 * windows.width_s + imu_late_s,
+                                      middle_s + 1.5 * windows.width_s + imu_late_s);
+      Vector3d sum = Vector3d::Zero();
+      double weight = 0;
+      for (std::size_t i = from; i < to; ++i) {
+        const double k = spline((imu.t_s[i] - imu_late_s - middle_s) / windows.width_s);
+        sum += k * acceleration.col(static_cast<Eigen::Index>(i)), weight += k;
+      }
+      if (weight > 0)
+        second =
+            (*places[w - 1] - 2 * *places[w] + *places[w + 1]) / (windows.width_s * windows.width_s) - sum / weight;
+    }
+    put(9, second);
+  }
+  std::ranges::move(own, std::back_inserter(all));
+}
+
+}  // namespace
+
+std::vector<WindowedChannel> windowed_channels(const FlightLog& log) {
+  std::vector<WindowedChannel> all;
+  const Windows windows(log);
+  const auto add = [&](const char* name, const Column& t_s, double late_s, const Column& x, bool harmonics = true) {
+    add_column(all, windows, name, t_s, late_s, x, harmonics);
+  };
+  if (const auto& u = log.command.inputs) {
+    add("amplitude", log.command.t_s, 0, u->amplitude_V, false);
+    add("difference", log.command.t_s, 0, u->difference_V, false);
+    add("bias", log.command.t_s, 0, u->bias_V, false);
+    add("split_cycle", log.command.t_s, 0, u->split_cycle, false);
+  }
+  if (!log.imu.t_s.empty()) {
+    const double late_s = log.header.imu.latency_s;
+    add("gyro_x", log.imu.t_s, late_s, log.imu.gyro_x_rad_s);
+    add("gyro_y", log.imu.t_s, late_s, log.imu.gyro_y_rad_s);
+    add("gyro_z", log.imu.t_s, late_s, log.imu.gyro_z_rad_s);
+    add("accel_x", log.imu.t_s, late_s, log.imu.accel_x_m_s2);
+    add("accel_y", log.imu.t_s, late_s, log.imu.accel_y_m_s2);
+    add("accel_z", log.imu.t_s, late_s, log.imu.accel_z_m_s2);
+  }
+  if (log.power && log.header.power) {
+    const double late_s = log.header.power->latency_s;
+    add("battery", log.power->t_s, late_s, log.power->battery_V);
+    if (!log.power->left_current_A.empty()) {
+      add("left_current", log.power->t_s, late_s, log.power->left_current_A);
+      add("right_current", log.power->t_s, late_s, log.power->right_current_A);
+    }
+  }
+  if (log.wings) {
+    add("left_stroke", log.wings->t_s, 0, log.wings->left_stroke_rad);
+    add("left_rotation", log.wings->t_s, 0, log.wings->left_rotation_rad);
+    add("right_stroke", log.wings->t_s, 0, log.wings->right_stroke_rad);
+    add("right_rotation", log.wings->t_s, 0, log.wings->right_rotation_rad);
+  }
+  if (log.forces && log.header.rig) {
+    const double late_s = log.header.rig->latency_s;
+    add("force_x_N", log.forces->t_s, late_s, log.forces->force_x_N);
+    add("force_y_N", log.forces->t_s, late_s, log.forces->force_y_N);
+    add("force_z_N", log.forces->t_s, late_s, log.forces->force_z_N);
+    add("moment_x_Nm", log.forces->t_s, late_s, log.forces->moment_x_Nm);
+    add("moment_y_Nm", log.forces->t_s, late_s, log.forces->moment_y_Nm);
+    add("moment_z_Nm", log.forces->t_s, late_s, log.forces->moment_z_Nm);
+  }
+  if (!log.mocap.t_s.empty() && !log.imu.t_s.empty()) add_motion(all, windows, log);
+  return all;
+}
+
+OverSessions over_sessions(const std::vector<std::pair<FlightLog, FlightLog>>& change,
+                           const std::vector<std::vector<FlightLog>>& sessions) {
+  struct Channel {
+    std::string name;
+    double square = 0;             // |e|^2
+    std::vector<double> products;  // <e, d_s>
+  };
+  std::vector<Channel> channels;
+  for (std::size_t flight = 0; flight < change.size(); ++flight) {
+    const auto with = windowed_channels(change[flight].first), without = windowed_channels(change[flight].second);
+    std::vector<std::vector<WindowedChannel>> others;
+    for (const std::vector<FlightLog>& s : sessions) others.push_back(windowed_channels(s[flight]));
+    for (std::size_t c = 0; c < without.size(); ++c) {
+      if (flight == 0) channels.push_back({without[c].name, 0, std::vector<double>(sessions.size())});
+      for (std::size_t i = 0; i < std::min(with[c].values.size(), without[c].values.size()); ++i) {
+        const double before = without[c].values[i], e = with[c].values[i] - before;
+        const auto known = [&](const auto& of) { return i < of[c].values.size() && std::isfinite(of[c].values[i]); };
+        if (!std::isfinite(e) || !std::ranges::all_of(others, known)) continue;
+        channels[c].square += e * e;
+        for (std::size_t s = 0; s < others.size(); ++s)
+          channels[c].products[s] += e * (others[s][c].values[i] - before);
+      }
+    }
+  }
+  OverSessions most;
+  for (const Channel& c : channels) {
+    double sum = 0;
+    for (const double p : c.products) sum += p * p;
+    if (!(c.square > 0) || !(sum > 0)) continue;
+    const double sd = std::sqrt(sum / c.square / (2 * static_cast<double>(sessions.size())));
+    if (const double ratio = std::sqrt(c.square) / sd; ratio > most.ratio) most = {c.name, ratio};
+  }
+  return most;
+}
+
+std::vector<OverSessions> change_over_sessions(const blind::Family& family, const blind::Assignment& robot,
+                                               const std::vector<FlightLog>& flown) {
+  blind::Assignment other = robot;
+  other.effects.clear();
+  other.programme_of = robot.programme_of.value_or(robot.session);
+  const auto fly = [&](const blind::Assignment& a) {
+    std::vector<FlightLog> logs;
+    for (std::size_t k = 0; k < flown.size(); ++k) {
+      blind::FamilyFlight f = family.fly(a, k);
+      if (f.crashed) return std::vector<FlightLog>{};
+      logs.push_back(std::move(f.log));
+    }
+    return logs;
+  };
+  std::vector<std::vector<FlightLog>> sessions;
+  // a session in which the robot crashes is replaced by the next; a robot that crashes in most of them has fewer
+  for (std::size_t s = 0; sessions.size() < kOtherSessions && s < 2 * kOtherSessions; ++s) {
+    other.session = kFirstOther + s;
+    if (std::vector<FlightLog> logs = fly(other); !logs.empty()) sessions.push_back(std::move(logs));
+  }
+  std::vector<OverSessions> all;
+  for (const auto& [id, magnitude] : robot.effects) {
+    blind::Assignment without = robot;
+    std::erase_if(without.effects, [&](const auto& e) { return e.first == id; });
+    std::vector<std::pair<FlightLog, FlightLog>> change;
+    const std::vector<FlightLog> before = fly(without);
+    for (std::size_t k = 0; k < before.size(); ++k) change.emplace_back(flown[k], before[k]);
+    // a robot that flies with its effect alone has changed as much as a robot can
+    all.push_back(before.empty() ? OverSessions{"crash", 1e9} : over_sessions(change, sessions));
+  }
+  return all;
+}
+
+}  // namespace flappy::benchmark
