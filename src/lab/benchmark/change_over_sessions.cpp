@@ -249,7 +249,8 @@ OverSessions over_sessions(const std::vector<std::pair<FlightLog, FlightLog>>& c
 }
 
 std::vector<OverSessions> change_over_sessions(const blind::Family& family, const blind::Assignment& robot,
-                                               const std::vector<FlightLog>& flown) {
+                                               const std::vector<FlightLog>& flown, std::size_t other_sessions) {
+  if (other_sessions == 0) return {};
   blind::Assignment other = robot;
   other.effects.clear();
   other.programme_of = robot.programme_of.value_or(robot.session);
@@ -264,7 +265,7 @@ std::vector<OverSessions> change_over_sessions(const blind::Family& family, cons
   };
   std::vector<std::vector<FlightLog>> sessions;
   // a session in which the robot crashes is replaced by the next; a robot that crashes in most of them has fewer
-  for (std::size_t s = 0; sessions.size() < kOtherSessions && s < 2 * kOtherSessions; ++s) {
+  for (std::size_t s = 0; sessions.size() < other_sessions && s < 2 * other_sessions; ++s) {
     other.session = kFirstOther + s;
     if (std::vector<FlightLog> logs = fly(other); !logs.empty()) sessions.push_back(std::move(logs));
   }

@@ -35,13 +35,14 @@ struct OverSessions {
 OverSessions over_sessions(const std::vector<std::pair<flightlog::FlightLog, flightlog::FlightLog>>& change,
                            const std::vector<std::vector<flightlog::FlightLog>>& sessions);
 
-/// Of each effect of `robot`, which has `flown` these flights: flies what else is needed.
-std::vector<OverSessions> change_over_sessions(const blind::Family& family, const blind::Assignment& robot,
-                                               const std::vector<flightlog::FlightLog>& flown);
-
 /// From here on an effect counts. Fixed before any robot was judged by it.
 inline constexpr double kCounts = 3;
 /// Other sessions that a robot flies for it.
 inline constexpr std::size_t kOtherSessions = 6;
+
+/// Of each effect of `robot`, which has `flown` these flights: flies what else is needed. None without other sessions.
+std::vector<OverSessions> change_over_sessions(const blind::Family& family, const blind::Assignment& robot,
+                                               const std::vector<flightlog::FlightLog>& flown,
+                                               std::size_t other_sessions = kOtherSessions);
 
 }  // namespace flappy::benchmark

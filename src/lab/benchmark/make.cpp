@@ -108,7 +108,8 @@ class Maker {
       label.draw = flown.draw;
       std::vector<flightlog::FlightLog> logs;
       for (std::size_t k = 0; k < p.flights; ++k) logs.push_back(std::move(flown.flights[k].log));
-      if (!p.effects.empty()) label.over_sessions = change_over_sessions(family_, flown.assignment, logs);
+      if (!p.effects.empty())
+        label.over_sessions = change_over_sessions(family_, flown.assignment, logs, command_.other_sessions);
       json = to_json(label);
     } catch (const blind::NeverFlies&) {
       json = to_json(label);

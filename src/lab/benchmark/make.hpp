@@ -6,6 +6,7 @@
 #include "io/installation.hpp"
 #include "io/ranks.hpp"
 #include "lab/benchmark/case_plan.hpp"
+#include "lab/benchmark/change_over_sessions.hpp"
 #include "lab/benchmark/families.hpp"
 
 namespace flappy::benchmark {
@@ -16,7 +17,8 @@ struct MakeCommand {
                              randomise = io::config_path("randomisation/published.toml"),
                              detectable;  ///< `detectable`: table of detectable magnitudes; empty: that of the family
   PlanOptions plan;
-  int threads = 0;  ///< 0: one for each processor
+  std::size_t other_sessions = kOtherSessions;  ///< that tell which effects count; 0: this is not computed
+  int threads = 0;                              ///< 0: one for each processor
   io::Ranks* ranks = nullptr;
 };
 

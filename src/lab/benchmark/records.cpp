@@ -182,12 +182,10 @@ Label label_from(const Json& json) {
 }
 
 Json to_json(const Prediction& p) {
-  const Json best_rmse =
-      p.best_rmse ? Json{{"named", p.best_rmse->named}, {"ranking", p.best_rmse->ranking}} : Json(nullptr);
-  return {{"diagnosis", to_json(p.diagnosis)},
-          {"best_rmse", best_rmse},
-          {"corrected", p.corrected},
-          {"crashed", p.crashed}};
+  Json rivals = Json::object();
+  for (const auto& [name, r] : p.rivals)
+    rivals[name] = {{"named", r.named}, {"ranking", r.ranking}, {"strength", r.strength}};
+  return {{"diagnosis", to_json(p.diagnosis)}, {"rivals", rivals}, {"corrected", p.corrected}, {"crashed", p.crashed}};
 }
 
 Prediction read_prediction(const std::filesystem::path& file) {
@@ -195,8 +193,8 @@ Prediction read_prediction(const std::filesystem::path& file) {
   try {
     Prediction p;
     p.diagnosis = gap::diagnosis_from(json.at("diagnosis"), file);
-    if (const Json& b = json.at("best_rmse"); !b.is_null())
-      p.best_rmse = Baseline{b.at("named").get<Names>(), b.at("ranking").get<Names>()};
+    for (const auto& [name, r] : json.at("rivals").items())
+      p.rivals[name] = {r.at("named").get<Names>(), r.at("ranking").get<Names>(), r.at("strength")};
     p.corrected = json.at("corrected");
     p.crashed = json.at("crashed");
     return p;

@@ -1,7 +1,9 @@
 #include "lab/benchmark/score.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <set>
 #include <tuple>
@@ -112,35 +114,50 @@ ScoreValue share(const Cases& cases, const Is& is) {
                     cases.size());
 }
 
-/// Share of the baseline, over the cases that it has an answer for.
-template <class Is>
-std::optional<ScoreValue> of_baseline(const Cases& cases, const Is& is) {
-  Cases had = cases;
-  std::erase_if(had, [&](const ScoredCase* c) { return !c->prediction.best_rmse; });
-  if (had.empty()) return std::nullopt;
-  return share(had, [&](const ScoredCase& c) { return is(c.truth, *c.prediction.best_rmse); });
+/// A rival's name and score.
+using NamedScore = std::optional<std::pair<std::string, ScoreValue>>;
+
+/// The best of the rivals that have an answer for each of the cases.
+template <class Score>
+NamedScore best_of_rivals(const Cases& cases, const Score& score) {
+  NamedScore best;
+  if (cases.empty()) return best;
+  for (const auto& [name, rival] : cases.front()->prediction.rivals) {
+    const auto answers = [&](const ScoredCase* c) { return c->prediction.rivals.contains(name); };
+    if (!std::ranges::all_of(cases, answers)) continue;
+    const ScoreValue value = score([&](const ScoredCase& c) -> const Rival& { return c.prediction.rivals.at(name); });
+    if (value.value && (!best || *value.value > *best->second.value)) best = {name, value};
+  }
+  return best;
 }
 
-bool baseline_first(const CaseTruth& t, const Baseline& b) {
+template <class Is>
+NamedScore of_rivals(const Cases& cases, const Is& is) {
+  return best_of_rivals(
+      cases, [&](const auto& of) { return share(cases, [&](const ScoredCase& c) { return is(c.truth, of(c)); }); });
+}
+
+bool rival_first(const CaseTruth& t, const Rival& b) {
   return !b.named.empty() && b.ranking.front() == t.effects.front();
 }
 
-bool baseline_group(const CaseTruth& t, const Baseline& b) {
+bool rival_group(const CaseTruth& t, const Rival& b) {
   return !b.named.empty() && group_of(b.ranking.front()) == group_of(t.effects.front());
 }
 
-bool baseline_among_three(const CaseTruth& t, const Baseline& b) {
+bool rival_among_three(const CaseTruth& t, const Rival& b) {
   const auto end = b.ranking.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(3, b.ranking.size()));
-  return std::find(b.ranking.begin(), end, t.effects.front()) != end;
+  return !b.named.empty() && std::find(b.ranking.begin(), end, t.effects.front()) != end;
 }
 
 enum class Bar { at_least, at_most };
 
 /// A row of the table.
 ScoreLine line(std::string key, std::string what, Bar bar, double must, double aim, ScoreValue score,
-               std::optional<ScoreValue> best_rmse = {}) {
+               NamedScore rival = {}) {
   const auto text = [&](double b) { return io::format(bar == Bar::at_least ? "%.2f" : "at most %.2f", b); };
-  ScoreLine l{std::move(key), std::move(what), text(must), text(aim), score, {}, {}, best_rmse};
+  ScoreLine l{std::move(key), std::move(what), text(must), text(aim), score, {}, {}, {}, {}};
+  if (rival) l.rival_name = rival->first, l.rival = rival->second;
   if (score.value) {
     const auto meets = [&](double b) { return bar == Bar::at_most ? *score.value <= b : *score.value >= b; };
     l.meets_must = meets(must);
@@ -168,7 +185,7 @@ ScoreLine closure_line(const Cases& cases) {
 }
 
 ScoreLine first_line(const char* key, const char* what, double must, double aim, const Cases& cases) {
-  return line(key, what, Bar::at_least, must, aim, share(cases, named_alone), of_baseline(cases, baseline_first));
+  return line(key, what, Bar::at_least, must, aim, share(cases, named_alone), of_rivals(cases, rival_first));
 }
 
 /// With the case of `singles` of the same robot, if the same draw flew.
@@ -220,31 +237,44 @@ bool next_brings_truth(const ScoredCase& c) {
 
 ScoreLine pairs_line(const Cases& cases, double must = 0.75) {
   std::vector<std::pair<Names, Names>> own;
-  std::vector<std::pair<Names, Names>> others;
-  for (const ScoredCase* c : cases) {
-    own.emplace_back(at_work(c->prediction), c->truth.effects);
-    if (const std::optional<Baseline>& b = c->prediction.best_rmse) others.emplace_back(b->named, c->truth.effects);
-  }
+  for (const ScoredCase* c : cases) own.emplace_back(at_work(c->prediction), c->truth.effects);
   return line("pairs_f1", "pairs: F1 of names", Bar::at_least, must, 0.92, f1_score(own),
-              others.empty() ? std::nullopt : std::optional(f1_score(others)));
+              best_of_rivals(cases, [&](const auto& of) {
+                std::vector<std::pair<Names, Names>> others;
+                for (const ScoredCase* c : cases) others.emplace_back(of(*c).named, c->truth.effects);
+                return f1_score(others);
+              }));
 }
 
-/// Standard error of the difference of two scores as if independent; they share cases, so it is rather too large.
-double standard_error(const ScoreValue& a, const ScoreValue& b) {
-  return std::hypot(a.high - a.low, b.high - b.low) / (2 * io::kNormal975);
-}
+bool is_harmless(const CaseTruth& t) { return t.effects.empty(); }
 
-std::optional<std::vector<std::string>> unbeaten_lines(const std::vector<ScoreLine>& lines) {
-  std::optional<bool> alarms;  // whether there are too many false alarms; none: not known
-  std::vector<std::string> keys;
-  for (const ScoreLine& l : lines) {
-    const std::optional<ScoreValue>& b = l.best_rmse;
-    if (!b || !b->value || !l.score.value) continue;
-    if (l.key.starts_with("false_alarm")) alarms = alarms.value_or(false) || *b->value > kFalseAlarms;
-    else if (!(*l.score.value - *b->value > standard_error(l.score, *b))) keys.push_back(l.key);
+/// What rivals say counts from a strength on with which they raise no more alarms at harmless robots than the diagnosis does. Without
+/// harmless robots they say nothing.
+void silence_rivals(std::vector<ScoredCase>& cases) {
+  std::set<std::string> names;
+  std::size_t allowed = 0;
+  for (const ScoredCase& c : cases) {
+    for (const auto& [name, rival] : c.prediction.rivals) names.insert(name);
+    allowed += is_harmless(c.truth) && false_alarm(c);
   }
-  if (!alarms || *alarms) return std::nullopt;
-  return keys;
+  for (const std::string& name : names) {
+    std::vector<double> alarms;
+    bool any = false;
+    for (const ScoredCase& c : cases) {
+      const auto rival = c.prediction.rivals.find(name);
+      if (!is_harmless(c.truth) || rival == c.prediction.rivals.end()) continue;
+      any = true;
+      if (!rival->second.named.empty()) alarms.push_back(rival->second.strength);
+    }
+    std::ranges::sort(alarms, std::greater{});
+    const double above = alarms.size() > allowed ? alarms[allowed] : 0;
+    for (ScoredCase& c : cases) {
+      const auto rival = c.prediction.rivals.find(name);
+      if (rival == c.prediction.rivals.end()) continue;
+      if (!any) c.prediction.rivals.erase(rival);
+      else if (!(rival->second.strength > above)) rival->second.named.clear();
+    }
+  }
 }
 
 std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases);
@@ -265,7 +295,7 @@ Answer answer_of(const Prediction& p) {
   if (d.refit_loss) a.floor = d.noise_floor;
   if (!d.unexplained.empty()) a.where = Where{d.unexplained.front().channel, d.unexplained.front().regime};
   if (d.next) a.manoeuvre = d.next->manoeuvre;
-  a.best_rmse = p.best_rmse;
+  a.rivals = p.rivals;
   for (const gap::Suspect& s : d.suspects) a.suspects.push_back(s.effect);
   for (const gap::RankedHypothesis& h : d.hypotheses) {
     a.hypotheses.push_back(h);
@@ -334,11 +364,25 @@ bool needs_true_fit(const ScoredCase& c) {
 
 Scores score(const std::vector<ScoredCase>& cases) {
   std::array<std::vector<ScoredCase>, 2> counting, hidden;  // absolute, contrasts
+  Scores s;
   for (const ScoredCase& c : cases) {
     const bool contrast = std::ranges::count(kContrastParts, c.truth.part) > 0;
     (c.truth.counts() ? counting : hidden)[contrast].push_back(c);
   }
-  Scores s;
+  std::map<std::string, Cases> harmless;
+  for (const ScoredCase& c : cases)
+    for (const auto& [name, rival] : c.prediction.rivals)
+      if (is_harmless(c.truth)) harmless[name].push_back(&c);
+  for (const auto& [name, list] : harmless)
+    s.unbounded_alarms[name] =
+        share(list, [&](const ScoredCase& c) { return !c.prediction.rivals.at(name).named.empty(); });
+  for (const std::size_t half : {0U, 1U}) {
+    std::vector<ScoredCase> both = counting[half];
+    std::ranges::move(hidden[half], std::back_inserter(both));
+    silence_rivals(both);
+    counting[half].clear(), hidden[half].clear();
+    for (ScoredCase& c : both) (c.truth.counts() ? counting : hidden)[half].push_back(std::move(c));
+  }
   if (!counting[0].empty() || !hidden[0].empty()) {
     s.lines = absolute_lines(counting[0]);
     add_hidden_lines("", "singles", counting[0], hidden[0], s.lines);
@@ -347,7 +391,8 @@ Scores score(const std::vector<ScoredCase>& cases) {
     std::ranges::move(contrast_lines(counting[1]), std::back_inserter(s.lines));
     add_hidden_lines("contrast", "changed", counting[1], hidden[1], s.lines);
   }
-  s.unbeaten = unbeaten_lines(s.lines);
+  for (const ScoreLine& l : s.lines)
+    if (l.rival && l.rival->value && l.score.value && *l.rival->value > *l.score.value) s.beaten_on.push_back(l.key);
   return s;
 }
 
@@ -400,9 +445,9 @@ std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases) {
   l.push_back(first_line("top1_current", "right effect first, current logged too", 0.88, 0.97,
                          of_parts(cases, {"singles_current"})));
   l.push_back(line("group_top1", "right group first", Bar::at_least, 0.92, 0.98, share(singles, right_group),
-                   of_baseline(singles, baseline_group)));
+                   of_rivals(singles, rival_group)));
   l.push_back(line("top3", "right effect among three", Bar::at_least, 0.95, 0.99, share(singles, among_three),
-                   of_baseline(singles, baseline_among_three)));
+                   of_rivals(singles, rival_among_three)));
   l.push_back(
       first_line("top1_typical", "right effect first at typical magnitude", 0.80, 0.93, of_parts(cases, {"typical"})));
   l.push_back(line("suspects", "given that an effect is missing: it is among the three named", Bar::at_least, 0.60,
@@ -414,9 +459,8 @@ std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases) {
                                    {"own_parameters", "false alarm: own parameters"},
                                    {"conventions", "false alarm: other conventions"}}) {
     const Cases harmless = of_parts(cases, {part});
-    l.push_back(line(std::string("false_alarm_") + part, what, Bar::at_most, kFalseAlarms, 0.02,
-                     share(harmless, false_alarm),
-                     of_baseline(harmless, [](const CaseTruth&, const Baseline& b) { return !b.named.empty(); })));
+    l.push_back(
+        line(std::string("false_alarm_") + part, what, Bar::at_most, kFalseAlarms, 0.02, share(harmless, false_alarm)));
   }
   l.push_back(redeclared_line(of_parts(cases, {"redeclared"}), singles));
   l.push_back(line("unknown", "withheld or outside: \"unknown\"", Bar::at_least, 0.75, 0.90,
@@ -450,10 +494,13 @@ std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases) {
   const auto of = [&](const char* part) { return of_parts(cases, {part}); };
   const Cases changed = of("changed"), strange = of_parts(cases, {"changed_withheld", "changed_outside"});
   l.push_back(first_line("contrast_top1", "contrast: right effect first", 0.85, 0.95, changed));
+  const auto noticed = [](const CaseTruth&, const Rival& r) { return !r.named.empty(); };
+  l.push_back(line("contrast_noticed", "contrast: that something changed, whatever is named", Bar::at_least, 0.95, 0.99,
+                   share(changed, false_alarm), of_rivals(changed, noticed)));
   l.push_back(line("contrast_group_top1", "contrast: right group first", Bar::at_least, 0.92, 0.98,
-                   share(changed, right_group), of_baseline(changed, baseline_group)));
+                   share(changed, right_group), of_rivals(changed, rival_group)));
   l.push_back(line("contrast_top3", "contrast: right effect among three", Bar::at_least, 0.97, 0.99,
-                   share(changed, among_three), of_baseline(changed, baseline_among_three)));
+                   share(changed, among_three), of_rivals(changed, rival_among_three)));
   l.push_back(first_line("contrast_short_reference", "contrast: right first, reference of 10 s", 0.75, 0.90,
                          of("changed_short_reference")));
   l.push_back(
@@ -464,8 +511,7 @@ std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases) {
        {std::tuple{"unchanged", "false_alarm_contrast", "contrast: harmless session, anything named"},
         {"unchanged_calm", "false_alarm_contrast_calm", "contrast: harmless, reference in hover and on slow paths"}}) {
     const Cases harmless = of(part);
-    l.push_back(line(key, what, Bar::at_most, kFalseAlarms, 0.02, share(harmless, false_alarm),
-                     of_baseline(harmless, [](const CaseTruth&, const Baseline& b) { return !b.named.empty(); })));
+    l.push_back(line(key, what, Bar::at_most, kFalseAlarms, 0.02, share(harmless, false_alarm)));
   }
   const auto left = [](const ScoredCase& c) {
     return c.prediction.kind == "unknown" || c.prediction.kind == "remainder";
@@ -496,36 +542,23 @@ std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases) {
 /// What the other rows leave out, so that no choice of what counts hides a case. `part`: whose cases are added up.
 void add_hidden_lines(const std::string& key, const std::string& part, const std::vector<ScoredCase>& counting,
                       const std::vector<ScoredCase>& hidden, std::vector<ScoreLine>& lines) {
-  const std::string begin = key.empty() ? "" : key + "_", says = key.empty() ? "" : key + ", ";
-  Cases every = of_parts(counting, {part});
+  const auto add = [&](const char* end, const char* what, const ScoreValue& score, const NamedScore& rival = {}) {
+    ScoreLine l;
+    l.key = key.empty() ? end : key + "_" + end;
+    l.what = key.empty() ? what : key + ", " + what;
+    l.score = score;
+    if (rival) l.rival_name = rival->first, l.rival = rival->second;
+    lines.push_back(std::move(l));
+  };
+  Cases every = of_parts(counting, {part}), own;
   std::ranges::move(of_parts(hidden, {part}), std::back_inserter(every));
-  lines.push_back({begin + "all_top1",
-                   says + "right first, also of effects that sessions hide",
-                   "",
-                   "",
-                   share(every, named_alone),
-                   {},
-                   {},
-                   of_baseline(every, baseline_first)});
-  Cases own;
   for (const ScoredCase& c : hidden) own.push_back(&c);
-  lines.push_back({begin + "hidden_right",
-                   says + "effects that sessions hide: unchanged, or right",
-                   "",
-                   "",
-                   share(own, [](const ScoredCase& c) { return right(c.truth, c.prediction); }),
-                   {},
-                   {},
-                   {}});
-  lines.push_back(
-      {begin + "hidden_wrong",
-       says + "effects that sessions hide: a wrong name",
-       "",
-       "",
-       share(own, [](const ScoredCase& c) { return names_effects(c.prediction) && !right(c.truth, c.prediction); }),
-       {},
-       {},
-       {}});
+  const auto is_right = [](const ScoredCase& c) { return right(c.truth, c.prediction); };
+  add("all_top1", "right first, also of effects that sessions hide", share(every, named_alone),
+      of_rivals(every, rival_first));
+  add("hidden_right", "effects that sessions hide: unchanged, or right", share(own, is_right));
+  add("hidden_wrong", "effects that sessions hide: a wrong name",
+      share(own, [&](const ScoredCase& c) { return names_effects(c.prediction) && !is_right(c); }));
 }
 
 }  // namespace

@@ -70,7 +70,7 @@ struct Answer {
   std::vector<std::string> suspects;  ///< most probable effects given that one is missing
   double none = 0, parameters = 0, unknown = 0;
   std::optional<double> nominal, refit, floor;  ///< mean losses: vehicle file, parameters fitted, noise alone
-  std::optional<Baseline> best_rmse;
+  std::map<std::string, Rival> rivals;
   std::string manoeuvre;  ///< the proposed flight; empty: none
   std::optional<Where> where;
 };
@@ -91,13 +91,16 @@ struct ScoreLine {
   std::string key, what, must, aim;
   ScoreValue score;
   std::optional<bool> meets_must, meets_aim;
-  std::optional<ScoreValue> best_rmse;  ///< the baseline's; none: the score does not apply to it
+  /// The best rival at the diagnosis' own share of false alarms; none: the score applies to no rival.
+  std::optional<ScoreValue> rival;
+  std::string rival_name;
 };
 
 struct Scores {
   std::vector<ScoreLine> lines;
-  /// Rows on which the diagnosis does not beat the baseline by a standard error; none: it has too many false alarms.
-  std::optional<std::vector<std::string>> unbeaten;
+  std::vector<std::string> beaten_on;  ///< keys of rows on which a rival is better
+  /// Share of harmless robots at which a rival raises an alarm if all that it says counts.
+  std::map<std::string, ScoreValue> unbounded_alarms;
 };
 
 Scores score(const std::vector<ScoredCase>& cases);

@@ -155,7 +155,7 @@ bool fit_truths(const ScoreCommand& command, Bench& bench) {
           if (std::ranges::count(bench.cases[open[k]].truth.effects, std::string(e.info.id)) == 0)
             others.emplace_back(e.info.id);
         Question q = bench.predictions.question(c, others);
-        q.baseline = false;
+        q.rivals = false;
         q.experiments.clear();
         io::write_atomically(file_of(open[k]), to_json(command.predictor(q)).dump(1) + "\n");
       });
@@ -187,7 +187,7 @@ bool fly_proposals(const ScoreCommand& command, Bench& bench) {
         const PublicCase& c = bench.manifest.cases[open[k]];
         const Label& label = bench.labels.at(c.number);
         Question q = bench.predictions.question(c, c.withheld);
-        q.baseline = false;
+        q.rivals = false;
         q.experiments.clear();
         const std::string& name = bench.cases[open[k]].prediction.manoeuvre;
         const auto manoeuvre = std::ranges::find(manoeuvres, name, &gap::Manoeuvre::name);
@@ -226,17 +226,23 @@ std::string figure(const std::optional<double>& value) {
 std::string interval(const ScoreValue& s) { return s.value ? figure(s.low) + " to " + figure(s.high) : "-"; }
 
 std::string table(const std::string& title, const Scores& scores) {
-  std::string text =
-      "| " + title + " | must | aim | measured | 95 % interval | count | best RMSE |\n|---|---|---|---|---|---|---|\n";
+  std::string text;
+  for (const ScoreLine& l : scores.lines)
+    if (std::ranges::count(scores.beaten_on, l.key))
+      text += (text.empty() ? "At the same share of false alarms a simple rival is better: " : "; ") + l.what + " (" +
+              l.rival_name + " " + figure(l.rival->value) + ", the diagnosis " + figure(l.score.value) + ")";
+  if (!text.empty()) text += ".\n\n";
+  text +=
+      "| " + title + " | must | aim | measured | 95 % interval | count | best rival |\n|---|---|---|---|---|---|---|\n";
   for (const ScoreLine& l : scores.lines)
     text += "| " + l.what + " | " + l.must + " | " + l.aim + " | " + figure(l.score.value) +
             (l.meets_must && !*l.meets_must ? " (missed)" : "") + " | " + interval(l.score) + " | " +
-            std::to_string(l.score.count) + " | " + (l.best_rmse ? figure(l.best_rmse->value) : "-") + " |\n";
-  if (scores.unbeaten)
-    text += "\nBaseline best RMSE, within the bar of false alarms: " +
-            (scores.unbeaten->empty() ? "beaten on every row"
-                                      : "not beaten by a standard error on " + io::joined(*scores.unbeaten)) +
-            ".\n";
+            std::to_string(l.score.count) + " | " + (l.rival ? figure(l.rival->value) + ", " + l.rival_name : "-") +
+            " |\n";
+  for (const auto& [name, alarms] : scores.unbounded_alarms)
+    text += "\n" + name + ", if all that it says counts, names something at " + figure(alarms.value) +
+            " of the harmless robots.";
+  if (!scores.unbounded_alarms.empty()) text += "\n";
   return text;
 }
 
@@ -251,11 +257,13 @@ void add(Json& json, const std::string& key, const ScoreValue& s) {
 Json scores_json(const Scores& scores, std::size_t cases) {
   Json json = {{"cases", cases}};
   for (const ScoreLine& l : scores.lines) add(json, l.key, l.score);
-  Json best_rmse = Json::object();
   for (const ScoreLine& l : scores.lines)
-    if (l.best_rmse) add(best_rmse, l.key, *l.best_rmse);
-  if (scores.unbeaten) best_rmse["unbeaten"] = *scores.unbeaten;
-  json["best_rmse"] = std::move(best_rmse);
+    if (l.rival) {
+      add(json["rival"], l.key, *l.rival);
+      json["rival"][l.key + "_name"] = l.rival_name;
+    }
+  json["beaten_on"] = scores.beaten_on;
+  for (const auto& [name, alarms] : scores.unbounded_alarms) add(json["unbounded_alarms"], name, alarms);
   return json;
 }
 

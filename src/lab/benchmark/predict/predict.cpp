@@ -2,7 +2,7 @@
 
 #include "flappy/vehicle_file.hpp"
 #include "gap/diagnose/diagnose.hpp"
-#include "lab/benchmark/predict/best_rmse.hpp"
+#include "lab/benchmark/predict/rivals.hpp"
 
 namespace flappy::benchmark {
 
@@ -38,7 +38,11 @@ Prediction predict(const Question& q) {
   Prediction p;
   if (d.corrected) {
     p.corrected = text_of(*std::move(d.corrected));
-    if (q.baseline) p.best_rmse = best_rmse(d.flights, d.inference);
+    if (q.rivals) {
+      p.rivals["best RMSE"] = best_rmse(d.flights, d.inference);
+      p.rivals["largest residual"] = largest_residual(d.flights, d.inference);
+      if (!q.reference.empty()) p.rivals["Hotelling"] = hotelling(d.flights);
+    }
   }
   p.diagnosis = std::move(d.result);
   return p;

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,18 +13,21 @@
 
 namespace flappy::benchmark {
 
-/// The answer of the simpler method that the diagnosis is compared with (best_rmse.hpp).
-struct Baseline {
-  std::vector<std::string> named;    ///< ids of the effects that it says are present; empty: none
+/// The answer of a simple method that the diagnosis is compared with (rivals.hpp).
+struct Rival {
+  std::vector<std::string> named;    ///< ids of the effects that it says are present, or kSomething; empty: none
   std::vector<std::string> ranking;  ///< ids of effects, the most likely first; may lack effects that it cannot judge
+  double strength = 0;               ///< of what it says; 0: it has nothing to say
 };
+/// What a rival names that sees a change, but no cause.
+inline constexpr const char* kSomething = "something";
 
 /// The prediction of a case, made before its label is opened.
 struct Prediction {
   gap::Diagnosis diagnosis;
-  std::optional<Baseline> best_rmse;  ///< none: not asked for, or the logs are faulty
-  std::string corrected;              ///< text of the corrected vehicle file; empty if the logs are faulty
-  bool crashed = false;               ///< the robot crashed in the proposed flight, so nothing was predicted
+  std::map<std::string, Rival> rivals;  ///< by name; empty: not asked for, or the logs are faulty
+  std::string corrected;                ///< text of the corrected vehicle file; empty if the logs are faulty
+  bool crashed = false;                 ///< the robot crashed in the proposed flight, so nothing was predicted
 };
 
 /// Whether a verdict gives no single answer: it is a group, or its probability is below one half.
@@ -35,7 +39,7 @@ struct Question {
   /// TOML files. All but the vehicle may be empty: gap::DiagnosisSettings.
   std::filesystem::path vehicle, priors, discrepancy, verdict, sessions;
   std::vector<std::string> withheld;  ///< effects to leave out of the catalogue
-  bool baseline = true;               ///< also compute Prediction::best_rmse
+  bool rivals = true;                 ///< also compute Prediction::rivals
   /// Folder of manoeuvres (*.toml), one of which is proposed if the verdict abstains; empty: none.
   std::filesystem::path experiments;
 };
