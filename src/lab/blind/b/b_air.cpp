@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lab/blind/b/b_laws.hpp"
+
 namespace flappy::blind::b {
 namespace {
 
@@ -26,6 +28,14 @@ double lift_coefficient(double alpha) {
   return fit * std::tanh(alpha / (3 * kDegree)) * std::tanh((kPi / 2 - alpha) / (6 * kDegree));
 }
 
+double WingAir::bend_share(double x) {
+  // of the density x^(p-1) (1-x)^(q-1), whose largest value is at (p - 1) / (p + q - 2)
+  const double n = kCentroid * (1 - kCentroid) / (kGyration * kGyration - kCentroid * kCentroid) - 1;
+  const double p = kCentroid * n, q = (1 - kCentroid) * n;
+  const double share = beta_chord(std::clamp(x, 1e-6, 1 - 1e-6)) / beta_chord((p - 1) / (p + q - 2));
+  return share * share * share;
+}
+
 double drag_coefficient(double alpha) { return 1.92 - 1.55 * std::cos(2.04 * alpha - 9.82 * kDegree); }
 
 Polar::Polar(double lift, double drag) {
@@ -46,8 +56,9 @@ WingAir::WingAir(const RobotParameters& parameters, const EffectMagnitudes& effe
       density_(parameters.density_kg_m3),
       added_(Eigen::Matrix3d::Zero()) {
   const Side& s = parameters.side[side];
-  const double lost =
-      effect_magnitudes.damaged_side == static_cast<int>(side) ? 0.05 * effect_magnitudes[kWingDamage] : 0;
+  const double worn = effect_magnitudes.damaged_side == static_cast<int>(side) ? effect_magnitudes[kWingDamage] : 0;
+  flap_ = effect_magnitudes.torn_side == static_cast<int>(side) ? effect_magnitudes[kTornFlap] : 0;
+  flap_side_ = effect_magnitudes.flap_opens;
   const double width = length_ / kStrips;
   reference_r_ = kGyration * length_;
   reference_chord_ = s.mean_chord_m * beta_chord(kGyration);
@@ -60,16 +71,15 @@ WingAir::WingAir(const RobotParameters& parameters, const EffectMagnitudes& effe
     strip.chord = s.mean_chord_m * beta_chord(strip.r / length_);
     area += strip.chord * width;
   }
-  // Few strips miss some area, so chords are stretched to give the file's. Damage cuts half of the lost area from the
-  // last strip, the rest from the two before.
+  // Few strips miss some area, so chords are stretched to give the file's.
   const double stretch = length_ * s.mean_chord_m / area;
   for (std::size_t i = 0; i < kStrips; ++i) {
     Strip& strip = strips_[i];
     strip.chord *= stretch;
-    if (i + 3 >= kStrips) {
-      const double cut = (i + 1 == kStrips ? 0.5 : 0.25) * lost * length_ * s.mean_chord_m / width;
-      strip.chord = std::max(0.1 * strip.chord, strip.chord - cut);
-    }
+    const double station = strip.r / length_;
+    strip.chord *= std::max(0.1, 1 - worn * worn_share(station));
+    strip.bend = bend_share(station);
+    strip.flap = station > kFlapFrom && station < kFlapTo ? 1 : 0;
     const double c = strip.chord;
     strip.pressure = 0.5 * density_ * c * width;
     strip.share = strip.r / reference_r_;
@@ -82,7 +92,7 @@ WingAir::WingAir(const RobotParameters& parameters, const EffectMagnitudes& effe
       added_(0, 0) += kPi / 128 * density_ * c * c * c * c * width * effect_magnitudes[kAddedMass];
     }
   }
-  rotational_lift_ = effect_magnitudes[kRotationalLift] * kPi * 0.75 * 2 * s.lift;
+  rotational_lift_ = effect_magnitudes[kRotationalLift] * 2 * s.lift;
   twists_ = effect_magnitudes.any(kWingFlexibility);
   bends_ = effect_magnitudes.any(kEdgeBending);
 }
@@ -91,6 +101,17 @@ double WingAir::area_m2() const {
   double area = 0;
   for (const Strip& s : strips_) area += 2 * s.pressure / density_;
   return area;
+}
+
+double WingAir::circulation_of(double x, double z) const {
+  const double share = std::abs(x) / (std::abs(x) + std::abs(z) + 1e-9);
+  return (x * z > 0 ? -1.0 : 1.0) * std::sqrt(x * x + z * z) * polar_.at(share).lift;
+}
+
+std::array<double, 2> WingAir::settled(const Flow& flow) const {
+  const double x = flow.shoulder_m_s.x() - flow.rate_rad_s.z() * sign_ * reference_r_;
+  const double z = flow.shoulder_m_s.z() + flow.rate_rad_s.x() * sign_ * reference_r_;
+  return {kA[0] * circulation_of(x, z), kA[1] * circulation_of(x, z)};
 }
 
 WingAir::Load WingAir::load(const Flow& flow) const {
@@ -103,8 +124,7 @@ WingAir::Load WingAir::load(const Flow& flow) const {
 
   const auto [rx, rz] = at(reference_r_);
   const double speed = std::sqrt(rx * rx + rz * rz);
-  const double share = std::abs(rx) / (std::abs(rx) + std::abs(rz) + 1e-9);
-  const double circulation = (rx * rz > 0 ? -1.0 : 1.0) * speed * polar_.at(share).lift;
+  const double circulation = circulation_of(rx, rz);
   double deficit = 0;
   for (std::size_t i = 0; i < 2; ++i) {
     deficit += kA[i] * circulation - flow.lag[i];
@@ -121,7 +141,7 @@ WingAir::Load WingAir::load(const Flow& flow) const {
     }
     double turn_cosine = 1, turn_sine = 0;
     if (twists_) {
-      const double turn = flow.twist_rad * s.r / length_;
+      const double turn = flow.bend_rad * s.bend;
       turn_cosine = std::cos(turn);
       turn_sine = std::sin(turn);
       const double x = turn_cosine * ux - turn_sine * uz;
@@ -134,14 +154,16 @@ WingAir::Load WingAir::load(const Flow& flow) const {
     const double behind = s.chord * (uz >= 0 ? c.centre : 0.92 - c.centre);
     double x = (ux > 0 ? -c.normal : c.normal) * square - deficit * s.share * uz;
     double z = (uz > 0 ? c.chordwise : -c.chordwise) * square + deficit * s.share * ux;
-    x *= s.pressure;
-    z *= s.pressure;
+    const double pressure =
+        flap_ != 0 && s.flap != 0 ? s.pressure * std::max(0.0, 1 - flap_ * flap_share(flap_side_ * ux)) : s.pressure;
+    x *= pressure;
+    z *= pressure;
     if (rotational_lift_ != 0) {
-      // The wing rotates about its leading edge (x0 = 0). The measured coefficient falls with the angular velocity.
+      // The measured coefficient falls with the angular velocity [2].
       const double u = std::sqrt(square);
       const double reduced = std::abs(flow.rotation_rate_rad_s) * s.chord / (u + 0.5);
       const double forward = u * uz / (az + 0.3);  // positive if the leading edge leads
-      x += rotational_lift_ * s.pressure * s.chord * flow.rotation_rate_rad_s * forward / (1 + reduced / 0.4);
+      x += rotational_lift_ * turning_coefficient(reduced) * pressure * s.chord * flow.rotation_rate_rad_s * forward;
     }
     double force_x = x, force_z = z;
     if (twists_) {

@@ -74,9 +74,10 @@ class WingAir {
   /// Instantaneous flow: velocities relative to the air, in the wing's frame.
   struct Flow {
     Vector3d shoulder_m_s, rate_rad_s;
-    double rotation_rate_rad_s = 0;                ///< rate of the rotation hinge
-    double wake_rad_s = 0;                         ///< rotation of the wake air about the stroke axis
-    double twist_rad = 0, bending_rate_rad_s = 0;  ///< at the tip
+    double rotation_rate_rad_s = 0;  ///< rate of the rotation hinge
+    double wake_rad_s = 0;           ///< rotation of the wake air about the stroke axis
+    double bend_rad = 0;             ///< of the membrane, where the chord is longest
+    double bending_rate_rad_s = 0;   ///< at the tip
     double sin_rotation = 0, cos_rotation = 1;
     double gain = 1;  ///< factor on the force, by nearby surfaces and by clap and fling
     std::array<double, 2> lag{};
@@ -86,20 +87,28 @@ class WingAir {
     std::array<double, 2> lag_rate{};
   };
   Load load(const Flow& flow) const;
+  /// Lags of a circulation that has long been what this flow makes it.
+  std::array<double, 2> settled(const Flow& flow) const;
 
   /// Sedov's inertia of the air for (w_y, w_z, v_x at the shoulder); zero if added_mass has magnitude 0.
   const Eigen::Matrix3d& added() const { return added_; }
   double area_m2() const;
   double length_m() const { return length_; }
+  /// Change of the chord's angle at a station (r/R) over that where the chord is longest, which is cubed: b_laws.hpp.
+  static double bend_share(double station);
 
  private:
   struct Strip {
     double r, pressure, chord, share;  ///< pressure: 1/2 rho c dr; share: weight of the lag
+    double bend, flap;                 ///< bend_share(); whether a torn flap is in it
   };
+  double circulation_of(double x_m_s, double z_m_s) const;
+
   Polar polar_;
   std::array<Strip, kStrips> strips_;
   double sign_, length_, density_;
   double reference_r_, reference_chord_, turning_force_, turning_torque_, rotational_lift_;
+  double flap_side_, flap_;  ///< side of the air that opens the flap (1: from behind, -1: from before); magnitude
   bool twists_, bends_;
   Eigen::Matrix3d added_;
 };

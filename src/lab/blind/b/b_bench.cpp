@@ -34,7 +34,7 @@ BenchProgramme::BenchProgramme(const Assignment& a, std::size_t run, const Robot
     : run_(run), points_(bench_points(run)) {
   const Shares limit = {f.amplitude_limit_V, f.difference_limit_V, f.bias_limit_V, f.split_cycle_limit};
   for (std::size_t i = 0; i < 4; ++i) middle_[i] = kMiddle[i] * limit[i], reach_[i] = kReach[i] * limit[i];
-  Random random(a.seed, draw_number(kBenchNumber + run, a.session), Stream::kProgramme);
+  Random random(a.seed, draw_number(kBenchNumber + run, programme_session(a)), Stream::kProgramme);
   for (Shares& point : points_)
     for (double& share : point) share += random.uniform(-kShift, kShift);
   for (double t = 0; t < kSweep_s; t += random.uniform(kShortestStep_s, kLongestStep_s))
@@ -128,7 +128,7 @@ FamilyFlight run_on_bench(const Assignment& a, std::size_t run, double lasts_s) 
     const Beat sent = programme.inputs(now);
     if (tick >= 0) add_command(f, sent, now, kBenchRest_s, command);
     if (a.power) sensors.before_tick(robot, now);
-    robot.drive(waveform(f, radio.arrived(sent, now), now + kBenchRest_s));
+    robot.drive(radio.arrived(sent, now), now + kBenchRest_s);
     for (int step = 1; step <= kStepsPerTick; ++step) {
       robot.led_step(clamped, 0);
       const double ends = now + step * kStep_s;

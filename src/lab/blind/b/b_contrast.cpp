@@ -9,13 +9,11 @@
 namespace flappy::blind::b {
 namespace {
 
-/// Specific force in front of the IMU's mount, with the effects of the accelerometer itself.
+/// Specific force in front of the IMU's mount, in axes that may be out of square.
 Vector3d at_imu(const Robot& robot, const Felt& felt, const Vector3d& place) {
   const EffectMagnitudes& a = robot.plant().effect_magnitudes();
-  Vector3d force = felt.at(place);
-  if (a.any(kAccelerometerMisalignment)) force += (a[kAccelerometerMisalignment] * a.misalignment).cross(force);
-  if (a.any(kVibrationRectification)) force += 1e-3 * a[kVibrationRectification] * force.cwiseProduct(force);
-  return force;
+  const Vector3d force = felt.at(place);
+  return a.any(kAccelerometerMisalignment) ? skewed(force, a[kAccelerometerMisalignment] * a.skew) : force;
 }
 
 /// The torso is led along the path while the drivers get the sent inputs.
@@ -26,6 +24,8 @@ Contrast led(const Assignment& a, const Case& c, std::size_t flight, double trim
   std::copy(path.pose.front().begin(), path.pose.front().end(), robot.state().begin());
   Radio radio(a.seed, drawn, c.effect_magnitudes[kCommandDropout], -trim_s);
   SoftMount mount(c.effect_magnitudes[kSoftImuMount]);
+  const double square = c.effect_magnitudes[kVibrationRectification];
+  Vector3d filtered(0, 0, kGravity_m_s2);
   Contrast out;
   const double beat_s = 1 / c.parameters.flapping_Hz;
   // Number of the first whole beat of the log, by the driver's phase.
@@ -35,7 +35,7 @@ Contrast led(const Assignment& a, const Case& c, std::size_t flight, double trim
   const std::size_t ticks = std::min(sent.size(), path.pose.size() / kStepsPerTick);
   for (std::size_t k = 0; k < ticks; ++k) {
     const double begins = static_cast<double>(k) * kTick_s;
-    robot.drive(waveform(c.parameters, radio.arrived(sent[k], begins - trim_s), begins));
+    robot.drive(radio.arrived(sent[k], begins - trim_s), begins);
     for (int step = 0; step < kStepsPerTick; ++step) {
       const std::size_t at = k * kStepsPerTick + static_cast<std::size_t>(step);
       if (at + 1 >= path.acceleration.size()) return out;
@@ -51,11 +51,16 @@ Contrast led(const Assignment& a, const Case& c, std::size_t flight, double trim
         ++beat;
       }
       robot.led_step(path, at);
-      // Impacts at stops last a few steps, so every step counts. A soft mount settles in the 0.1 s before the log.
+      // Impacts at stops last a few steps, so every step counts. A soft mount and the sensor's low-pass settle in the
+      // 0.1 s before the log.
       const double left = static_cast<double>(beat) * beat_s - 1e-9 - time;
       if (left > 0.1) continue;
       const Felt felt = robot.felt_now();
-      const Vector3d force = mount.shaken(at_imu(robot, felt, c.sensors.imu_place_m));
+      Vector3d force = mount.shaken(at_imu(robot, felt, c.sensors.imu_place_m));
+      if (square != 0) {
+        filtered = low_pass(filtered, force, c.sensors.bandwidth_hz, kStep_s);
+        force += rectified(filtered, square);
+      }
       if (left > 0) continue;
       const double phase = 2 * std::numbers::pi * (time + kStep_s) / beat_s;
       const std::array<double, 5> waves = {1, 2 * std::cos(phase), 2 * std::sin(phase), 2 * std::cos(2 * phase),
@@ -77,6 +82,7 @@ FamilyFlight fly_programme(const Assignment& a, std::size_t number, const Times&
                            std::vector<Beat>* sent) {
   const Case c = make_case(a);
   const Programme programme(a, number, c.parameters, c.room);
+  // noise, gusts and jitter are the session's, whichever programme is flown
   Flight flight(a, c, draw_number(number, a.session), programme.start_m(), programme.start_heading_rad(), times.trim_s);
   flight.record(path);
   Beat beat;

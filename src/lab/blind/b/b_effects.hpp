@@ -50,9 +50,9 @@ enum Effect : std::size_t {
   kHingeCreep,
   kCommandDropout,
   kMagnetSaturation,
-  kGearEccentricity,
+  kTornFlap,
   kBandAgeing,
-  kCommonSupply,
+  kSpringSlip,
   kEffects,
 };
 
@@ -71,22 +71,26 @@ struct EffectMagnitudes {
 
   int damaged_side = 0;           ///< 0: left, 1: right
   double wind_direction_rad = 0;  ///< the wind blows towards it, from x of W
-  /// Displacement of the torso's centre of mass in B, horizontal, 1 mm long.
+  /// Displacement of the torso's centre of mass in B.
   Eigen::Vector3d com_m = Eigen::Vector3d::Zero();
-  Eigen::Vector3d marker_m = Eigen::Vector3d::Zero();      ///< displacement of the markers in B, 2 mm long
-  Eigen::Vector3d products = Eigen::Vector3d::Zero();      ///< xy, xz, yz, as shares of the mean moment
-  Eigen::Vector3d misalignment = Eigen::Vector3d::Zero();  ///< rotation vector, 0.02 rad long
-  Eigen::Vector3d gyro_drift = Eigen::Vector3d::Zero();    ///< bias that the gyroscope reaches when warm, rad/s
-  double mocap_tilt_direction_rad = 0;                     ///< horizontal axis of the tilt, from x of W
-  /// +1: the wing's centre of mass is further from the leading edge, -1: nearer.
-  std::array<double, 2> wing_inertia{1, 1};
-  double wing_product = 1;                                  ///< +1 or -1: sign of the wing's product of inertia yz
+  std::size_t marker = 0;                                ///< which of kMarkers_m moved
+  Eigen::Vector3d marker_m = Eigen::Vector3d::Zero();    ///< its displacement in B
+  Eigen::Vector3d products = Eigen::Vector3d::Zero();    ///< xy, xz, yz, as shares of the mean moment
+  Eigen::Vector3d skew = Eigen::Vector3d::Zero();        ///< of the accelerometer's axes: a, b, c of skewed()
+  Eigen::Vector3d gyro_drift = Eigen::Vector3d::Zero();  ///< way of the bias that the gyroscope warms up to
+  double mocap_tilt_direction_rad = 0;                   ///< horizontal axis of the tilt, from x of W
+  double mocap_scale_sign = 1;                           ///< +1: the room is reported too large
+  double wing_com_m = 0;  ///< by which both wings' centres of mass are farther from the leading edge
+  double wing_product_kg_m2 =
+      0;  ///< added to the left wing's product of inertia yz; the right one's is its mirror image
   Eigen::Vector2d tether_foot_m = Eigen::Vector2d::Zero();  ///< x, y of the anchor in W
-  double delay_sign = 1;                                    ///< +1: motion capture is later than declared; -1: earlier
+  double delay_sign = 1;                                    ///< +1: motion capture gets later; -1: earlier
   Eigen::Vector3d screw_m = Eigen::Vector3d::Zero();        ///< place of the loose screw in B
-  std::array<double, 2> cogging_phase_rad{}, gear_phase_rad{};  ///< on each side
-  std::array<double, 2> creep_sign{1, 1};                       ///< +1 or -1 on each side: way in which the stops creep
-  std::array<double, 2> ageing{1, 1};  ///< 0.6 to 1.4 on each side: factor of the band's loss of stiffness
+  std::array<double, 2> cogging_phase_rad{};                ///< on each side
+  int torn_side = 0;                                        ///< of the torn flap; 0: left, 1: right
+  double flap_opens = 1;  ///< +1: air from behind opens the flap, as the wing sweeps backward; -1: from before
+  std::array<double, 2> creep_sign{1, 1};  ///< +1 or -1 on each side: way in which the stops creep
+  std::array<double, 2> ageing{1, 1};      ///< 0.6 to 1.4 on each side: factor of the band's loss of stiffness
 };
 
 /// InputError for an effect unknown or named twice, or a magnitude outside 0 to 4.

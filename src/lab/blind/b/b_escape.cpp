@@ -73,7 +73,7 @@ bool within(const Standing& s, const EscapeAssignment::Bounds& b) {
 FamilyEscape fly_escape(const Assignment& a, std::size_t number, const EscapeAssignment& rules, double trim_s) {
   const Case c = make_case(a);
   const std::uint64_t flight = draw_number(1000 + number, a.session);
-  Random random(a.seed, flight, Stream::kStart);
+  Random random(a.seed, draw_number(1000 + number, programme_session(a)), Stream::kStart);
   Vector3d start;
   for (std::size_t k = 0; k < 3; ++k)
     start[static_cast<Eigen::Index>(k)] = rules.start_m[k] + rules.start_half_m[k] * random.uniform(-1, 1);

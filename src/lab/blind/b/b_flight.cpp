@@ -19,7 +19,11 @@ Case make_case(const Assignment& a) {
   c.header.ambient = {c.parameters.density_kg_m3, c.room.ground_z_m, c.room.ceiling_z_m, {{0, c.room.wall_y_m, 0, -1}}};
   c.sensors = draw_sensors(a, c.parameters.side[0].motor.voltage_limit_V, c.header);
   if (a.own_parameters) draw_parameters(a.seed, c.parameters);
-  if (a.session > 0) change(draw_session(a.seed, a.session), c.parameters, c.sensors);
+  if (a.session > 0) {
+    const SessionChange by = draw_session(a.seed, a.session);
+    change(by, c.parameters, c.sensors);
+    c.gains = by.gains;
+  }
   if (a.changes.swapped_wings) swap_wings(c.parameters, c.effect_magnitudes);
   if (a.changes.added_mass_kg > 0) {
     const auto& at = a.changes.added_at_m;
@@ -34,7 +38,7 @@ Flight::Flight(const Assignment& a, const Case& c, std::uint64_t flight, const V
     : robot_(c.parameters, c.effect_magnitudes, c.room, a.seed, flight),
       sensors_(a, c.sensors, robot_, flight, trim_s, a.power, a.wings),
       observer_(c.header, start, heading),
-      pilot_(c.parameters),
+      pilot_(c.parameters, c.gains),
       radio_(a.seed, flight, c.effect_magnitudes[kCommandDropout], -trim_s),
       trim_s_(trim_s) {
   robot_.put(start, heading);
@@ -76,7 +80,9 @@ std::string Flight::tick(const Beat& sent, bool may_tumble) {
   const double now = time_s();
   const RobotParameters& f = robot_.plant().parameters();
   if (now >= -1e-9) add_command(f, sent, now, trim_s_, log_.command);
-  const std::string how = fly(waveform(f, radio_.arrived(sent, now), now + trim_s_), may_tumble);
+  sensors_.before_tick(robot_, now);
+  robot_.drive(radio_.arrived(sent, now), now + trim_s_);
+  const std::string how = fly(may_tumble);
   observer_.tick(sensors_, time_s());  // takes the samples, which are then no firmware's
   return how;
 }
@@ -96,13 +102,13 @@ std::string Flight::tick(OnBoard& firmware) {
   log_.command.t_s.push_back(now);
   log_.command.left_voltage_V.push_back(volts[0]);
   log_.command.right_voltage_V.push_back(volts[1]);
-  return fly(volts, true);
-}
-
-std::string Flight::fly(const std::array<double, 2>& volts, bool may_tumble) {
-  const double now = time_s();
   sensors_.before_tick(robot_, now);
   robot_.drive(volts);
+  return fly(true);
+}
+
+std::string Flight::fly(bool may_tumble) {
+  const double now = time_s();
   for (int step = 1; step <= kStepsPerTick; ++step) {
     if (path_) {
       std::array<double, 13> pose;

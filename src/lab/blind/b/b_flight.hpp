@@ -15,6 +15,7 @@ struct Case {
   Surroundings room;
   flightlog::FlightHeader header;
   SensorTruth sensors;
+  PilotGains gains;
 };
 Case make_case(const Assignment& a);
 
@@ -63,7 +64,8 @@ class Flight {
   Radio radio_;
   double trim_s_;
   long ticks_ = 0;
-  std::string fly(const std::array<double, 2>& volts, bool may_tumble);
+  /// Flies the tick whose voltages or beat the drivers have.
+  std::string fly(bool may_tumble);
   Path* path_ = nullptr;
   flightlog::FlightLog log_;
 };

@@ -85,14 +85,17 @@ Beat Pilot::steer(const View& view, const Target& target) {
     velocity[i] = velocity_notch_[k](view.velocity_m_s[i], parameters_.flapping_Hz);
   }
   const double dt = kPeriod_s;
-  Vector3d wanted = target.velocity_m_s + Vector3d(2.2, 2.2, 4).cwiseProduct(target.position_m - view.position_m);
+  const PilotGains& k = gains_;
+  const double near_level = 2.2 * k.position, near_up = 4 * k.height;
+  Vector3d wanted =
+      target.velocity_m_s + Vector3d(near_level, near_level, near_up).cwiseProduct(target.position_m - view.position_m);
   const double level = wanted.head<2>().norm();
   if (level > 1.3) wanted.head<2>() *= 1.3 / level;
   wanted.z() = std::clamp(wanted.z(), -0.8, 0.8);
   const Vector3d error = wanted - velocity;
   held_acceleration_ += dt * Vector3d(1.2, 1.2, 0).cwiseProduct(error);
   held_acceleration_ = held_acceleration_.cwiseMax(-2.5).cwiseMin(2.5);
-  Vector3d acceleration = Vector3d(3.2, 3.2, 0).cwiseProduct(error) + held_acceleration_;
+  Vector3d acceleration = 3.2 * k.velocity * Vector3d(1, 1, 0).cwiseProduct(error) + held_acceleration_;
   const double lean = acceleration.head<2>().norm();
   if (lean > 5) acceleration.head<2>() *= 5 / lean;
 
@@ -108,10 +111,10 @@ Beat Pilot::steer(const View& view, const Target& target) {
   const double upright = std::max(0.5, (view.attitude * Vector3d::UnitZ()).z());
 
   Beat b;
-  b.amplitude_V = std::clamp((lift_V_ + 4.0 * error.z()) / (0.5 + 0.5 * upright), 5.0, 17.0);
-  b.difference_V = std::clamp(roll_ + 1.9 * roll_error - 0.16 * rate.x(), -2.8, 2.8);
-  b.bias_V = std::clamp(pitch_ + 3.0 * pitch_error - 0.28 * rate.y(), -3.3, 3.3);
-  b.split_cycle = std::clamp(yaw_ + 0.16 * yaw_error - 0.014 * rate.z(), -0.12, 0.12);
+  b.amplitude_V = std::clamp((lift_V_ + 4.0 * k.climb * error.z()) / (0.5 + 0.5 * upright), 5.0, 17.0);
+  b.difference_V = std::clamp(roll_ + 1.9 * k.roll * roll_error - 0.16 * k.roll_rate * rate.x(), -2.8, 2.8);
+  b.bias_V = std::clamp(pitch_ + 3.0 * k.pitch * pitch_error - 0.28 * k.pitch_rate * rate.y(), -3.3, 3.3);
+  b.split_cycle = std::clamp(yaw_ + 0.16 * k.yaw * yaw_error - 0.014 * k.yaw_rate * rate.z(), -0.12, 0.12);
   return b;
 }
 
@@ -123,7 +126,7 @@ Programme::Programme(const Assignment& a, std::uint64_t flight, const RobotParam
     legs_.push_back({-1e3, 1, Vector3d(x, y, z), facing});
     return;
   }
-  Random random(a.seed, draw_number(flight, a.session), Stream::kProgramme);
+  Random random(a.seed, draw_number(flight, programme_session(a)), Stream::kProgramme);
   const double heading = random.uniform(-kPi, kPi);
   const double turn_rad_s = a.calm ? 0.25 : 3;
   double now = 0, facing = heading;

@@ -42,9 +42,13 @@ struct Target {
   double heading_rad = 0;
 };
 
+/// Session whose programmes are flown.
+inline std::size_t programme_session(const Assignment& a) { return a.programme_of.value_or(a.session); }
+
 class Pilot {
  public:
-  explicit Pilot(const RobotParameters& parameters) : parameters_(parameters) {}
+  explicit Pilot(const RobotParameters& parameters, const PilotGains& gains = {})
+      : parameters_(parameters), gains_(gains) {}
   /// Called every second tick.
   Beat steer(const View& view, const Target& target);
   /// Inputs that the integrators hold.
@@ -59,6 +63,7 @@ class Pilot {
     double operator()(double x, double frequency_hz);
   };
   RobotParameters parameters_;
+  PilotGains gains_;
   std::array<Notch, 3> rate_notch_, velocity_notch_;
   Vector3d held_acceleration_ = Vector3d::Zero();
   double roll_ = 0, pitch_ = 0, yaw_ = 0, lift_V_ = 10;

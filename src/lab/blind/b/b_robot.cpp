@@ -23,11 +23,35 @@ std::array<double, 2> waveform(const RobotParameters& parameters, const Beat& b,
   return volts;
 }
 
+Gusts::Gusts(Random random) {
+  // bins of equal width in the logarithm of frequency; the variance of a cosine is half its amplitude's square
+  constexpr double kLow_hz = 0.02, kHigh_hz = 25;
+  const double ratio = std::pow(kHigh_hz / kLow_hz, 1.0 / kLines);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    double low = kLow_hz;
+    for (Line& line : line_[axis]) {
+      const double frequency = low * std::pow(ratio, random.uniform()), width = low * (ratio - 1);
+      line.amplitude_m_s = kGust_m_s * kGustShare[axis] * std::sqrt(2 * gust_density(frequency, axis) * width);
+      line.rate_rad_s = 2 * std::numbers::pi * frequency;
+      line.phase_rad = random.uniform(0, 2 * std::numbers::pi);
+      low *= ratio;
+    }
+  }
+}
+
+Vector3d Gusts::at(double time) const {
+  Vector3d sum = Vector3d::Zero();
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (const Line& line : line_[axis])
+      sum[static_cast<Eigen::Index>(axis)] += line.amplitude_m_s * std::cos(line.rate_rad_s * time + line.phase_rad);
+  return sum;
+}
+
 Robot::Robot(RobotParameters parameters, const EffectMagnitudes& effect_magnitudes, const Surroundings& room,
              std::uint64_t seed, std::uint64_t flight)
     : plant_(std::move(parameters), effect_magnitudes),
       room_(room),
-      gusts_(seed, flight, Stream::kEffect, kWind),
+      gusts_(Random(seed, flight, Stream::kEffect, kWind)),
       slow_(plant_.fresh()) {
   supply_ = plant_.parameters().full_supply;
   felt_.acceleration = {Vector3d::Zero(), Vector3d::Zero()};
@@ -43,9 +67,18 @@ void Robot::put(const Vector3d& position, double heading) {
 }
 
 void Robot::drive(const std::array<double, 2>& voltage) {
-  steps_ = 0;
+  beat_.reset();
   wanted_ = voltage;
-  if (plant_.effect_magnitudes().any(kCommandDelay)) history_.push_back(voltage);
+  steps_ = 0;
+  advance_slow();
+  ++tick_;
+}
+
+void Robot::drive(const Beat& beat, double time) {
+  beat_ = beat;
+  tick_begins_s_ = time;
+  in_tick_s_ = 0;
+  steps_ = 0;
   advance_slow();
   ++tick_;
 }
@@ -55,80 +88,65 @@ void Robot::advance_slow() {
   const RobotParameters& f = plant_.parameters();
   const double t = static_cast<double>(tick_) * kTick_s;
   if (a.any(kWindingHeating)) {
-    // Thermal network of two nodes, winding and housing, with parameters typical of an 8 mm motor.
-    constexpr double kWinding_J_K = 0.12, kHousing_J_K = 1.0, kInside_K_W = 14, kOutside_K_W = 50;
     for (std::size_t j = 0; j < 2; ++j) {
-      const double inside = (winding_K_[j] - housing_K_[j]) / kInside_K_W;
-      winding_K_[j] += (heat_J_[j] - inside * kTick_s) / kWinding_J_K;
-      housing_K_[j] += (inside - housing_K_[j] / kOutside_K_W) * kTick_s / kHousing_J_K;
-      slow_.resistance_ohm[j] = f.side[j].motor.resistance_ohm * (1 + 0.00393 * a[kWindingHeating] * winding_K_[j]);
-      slow_.torque_constant_Nm_A[j] =
-          f.side[j].motor.torque_constant_Nm_A * (1 - 0.002 * a[kWindingHeating] * housing_K_[j]);
+      const Motor& motor = f.side[j].motor;
+      heat_[j].take(heat_J_[j], kTick_s);
+      slow_.resistance_ohm[j] = motor.resistance_ohm * (1 + heat_[j].resistance(a[kWindingHeating]));
+      slow_.torque_constant_Nm_A[j] = motor.torque_constant_Nm_A * (1 + heat_[j].torque_constant(a[kWindingHeating]));
       heat_J_[j] = 0;
     }
   }
   if (a.any(kBatterySag)) {
-    // Thevenin circuit as in Suti, Di Rito, Mattei, Energies 15 (2022): charge, resistance, one relaxation.
-    constexpr double kHover_A = 0.5, kRelaxes_s = 1.5;
-    const double load = load_As_ / kTick_s;
-    charge_As_ += load_As_;
-    relaxed_A_ += (load - relaxed_A_) * kTick_s / kRelaxes_s;
-    const double sags = a[kBatterySag] * (0.01 * load + 0.01 * relaxed_A_ + 0.05 / 60 * charge_As_) / kHover_A;
-    supply_ = std::max(0.2, f.full_supply - sags);
+    sag_.take(load_As_ / kTick_s, kTick_s);
+    supply_ = std::max(0.2, f.full_supply - sag_.loss_V(a[kBatterySag]) / f.side[0].motor.voltage_limit_V);
   }
   load_As_ = 0;
   if (a.any(kWind)) {
-    // Dryden's first-order longitudinal filter, with the length scale of a room.
-    constexpr double kGust_m_s = 0.06, kStays_s = 0.8;
-    const double keep = std::exp(-kTick_s / kStays_s);
-    for (double& g : gust_) g = keep * g + kGust_m_s * std::sqrt(1 - keep * keep) * gusts_.normal();
-    slow_.wind_m_s =
-        a[kWind] * (0.3 * Vector3d(std::cos(a.wind_direction_rad), std::sin(a.wind_direction_rad), 0) + gust_);
+    const double c = std::cos(a.wind_direction_rad), s = std::sin(a.wind_direction_rad);
+    Vector3d along = gusts_.at(t);
+    along.x() += kWind_m_s * wind_profile(x_[2] - room_.ground_z_m);
+    slow_.wind_m_s = a[kWind] * Vector3d(c * along.x() - s * along.y(), s * along.x() + c * along.y(), along.z());
   }
   for (std::size_t j = 0; j < 2; ++j) {
     if (a.any(kHingeCreep))
-      slow_.stop_shift_rad[j] = a.creep_sign[j] * 2 * std::numbers::pi / 180 * a[kHingeCreep] * (1 - std::exp(-t / 8));
-    if (a.any(kBandAgeing)) slow_.stiffness[j] = 1 - 0.04 * a[kBandAgeing] * a.ageing[j] * (1 - std::exp(-t / 6));
+      slow_.stop_shift_rad[j] = a.creep_sign[j] * kCreep_rad * a[kHingeCreep] * (1 - std::exp(-t / kCreeps_s));
+    if (a.any(kBandAgeing))
+      slow_.stiffness[j] = 1 - kAgeing * a[kBandAgeing] * a.ageing[j] * (1 - std::exp(-t / kAges_s));
   }
-  if (a.any(kBandAgeing)) slow_.extra_damping = 0.03 * a[kBandAgeing];
+  if (a.any(kBandAgeing)) slow_.extra_damping = kAgedDamping * a[kBandAgeing];
 }
 
 void Robot::set_voltages(double h) {
   const EffectMagnitudes& a = plant_.effect_magnitudes();
+  const RobotParameters& f = plant_.parameters();
+  if (const double now = tick_begins_s_ + in_tick_s_; beat_ && now >= next_hold_s_ - 1e-9) {
+    wanted_ = waveform(f, *beat_, now);
+    // the hold's clock has begun with the waveform's
+    next_hold_s_ = (std::floor(now / f.hold_s + 1e-6) + 1) * f.hold_s;
+  }
   std::array<double, 2> volts = wanted_;
   if (a.any(kCommandDelay)) {
-    // The delay is 0.3 beats, plus and minus 0.25 ms in alternate beats.
-    const double beat = std::floor(static_cast<double>(tick_) * kTick_s * plant_.parameters().flapping_Hz);
-    const double late =
-        a[kCommandDelay] * (0.3 / plant_.parameters().flapping_Hz + 0.25e-3 * (std::fmod(beat, 2) < 1 ? 1 : -1));
-    const double now =
-        static_cast<double>(history_.size() - 1) + static_cast<double>(steps_) / kStepsPerTick - late / kTick_s;
-    volts = now < 0 ? std::array<double, 2>{} : history_[static_cast<std::size_t>(now)];
+    if (history_.empty() || history_.back().second != wanted_) history_.emplace_back(clock_s_, wanted_);
+    const long beat = std::lround(std::floor(clock_s_ * f.flapping_Hz));
+    const double then = clock_s_ - command_delay_s(beat, a[kCommandDelay]) + 1e-9;
+    const auto later = std::find_if(history_.rbegin(), history_.rend(), [&](const auto& from) { return from.first <= then; });
+    volts = later == history_.rend() ? std::array<double, 2>{} : later->second;
   }
   for (std::size_t j = 0; j < 2; ++j) {
     double v = volts[j];
-    if (a.any(kDriverDeadZone)) {
-      const double zone = 0.4 * a[kDriverDeadZone];
-      v -= zone * v / std::sqrt(v * v + zone * zone);
-    }
+    if (a.any(kDriverDeadZone)) v += dead_time_V(v, a[kDriverDeadZone]);
     v *= supply_;
-    if (a.any(kCommonSupply)) {
-      const double together = std::abs(current_[0]) + std::abs(current_[1]);
-      v -= std::clamp(v / 2, -1.0, 1.0) * 0.8 * a[kCommonSupply] * together;
-    }
-    if (a.any(kDriverBandwidth)) {
-      const double keep = std::exp(-h / (0.5e-3 * a[kDriverBandwidth]));
-      pole_1_[j] = keep * pole_1_[j] + (1 - keep) * v;
-      pole_2_[j] = keep * pole_2_[j] + (1 - keep) * pole_1_[j];
-      v = pole_2_[j];
-    }
+    if (a.any(kDriverBandwidth)) v = mean_[j].take(v, h, kMean_s * a[kDriverBandwidth]);
     applied_[j] = v;
   }
+  in_tick_s_ += h;
+  clock_s_ += h;
 }
 
 std::array<double, 2> Robot::back(const State& x) const {
   const std::size_t at = plant_.effect_magnitudes().any(kGearBacklash) ? kRotorRate : kStrokeRate;
-  return {plant_.ratio(x, 0) * x[at], plant_.ratio(x, 1) * x[at + 1]};
+  return {plant_.parameters().side[0].motor.gear_ratio * x[at],
+          plant_.parameters().side[1].motor.gear_ratio * x[at + 1]};
 }
 
 std::array<double, 2> Robot::currents(double h, const std::array<double, 2>& from,

@@ -10,9 +10,12 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "lab/blind/b/b_laws.hpp"
 #include "lab/blind/b/b_random.hpp"
 #include "lab/blind/b/plant.hpp"
 
@@ -22,8 +25,29 @@ inline constexpr int kStepsPerTick = 20;
 inline constexpr double kTick_s = 1e-3;  ///< period of the drivers' updates
 inline constexpr double kStep_s = kTick_s / kStepsPerTick;
 
+/// Gusts of the wind's spectrum: cosines in bins of frequency, each with a random phase.
+class Gusts {
+ public:
+  explicit Gusts(Random random);
+  /// m/s: along the mean wind, across, up; of magnitude 1.
+  Vector3d at(double time_s) const;
+
+ private:
+  static constexpr std::size_t kLines = 40;
+  struct Line {
+    double amplitude_m_s, rate_rad_s, phase_rad;
+  };
+  std::array<std::array<Line, kLines>, 3> line_;
+};
+
 struct Beat {
   double amplitude_V = 0, difference_V = 0, bias_V = 0, split_cycle = 0;
+};
+
+/// Factors on the pilot's proportional gains, which somebody tunes between sessions.
+struct PilotGains {
+  double position = 1, height = 1, velocity = 1, climb = 1;
+  double roll = 1, pitch = 1, yaw = 1, roll_rate = 1, pitch_rate = 1, yaw_rate = 1;
 };
 
 /// Voltages of the drivers (left, right) at a time since the start of any beat: two half periods of a cosine, whose
@@ -45,6 +69,9 @@ class Robot {
   void put(const Vector3d& position_m, double heading_rad);
   /// Begins a tick and commands the drivers' voltages (V; left, right).
   void drive(const std::array<double, 2>& voltage_V);
+  /// Begins a tick at `time_s` with the inputs of a beat. The driver takes a voltage from their waveform and holds it
+  /// for the file's driver.hold_s.
+  void drive(const Beat& beat, double time_s);
   void step(double h = kStep_s);
   /// Advances one step with the torso led along a path; `at`: index of the step in the path.
   void led_step(const Path& path, std::size_t at);
@@ -80,15 +107,19 @@ class Robot {
 
   Plant plant_;
   Surroundings room_;
-  Random gusts_;
+  Gusts gusts_;
   State x_{};
-  std::array<double, 2> current_{}, wanted_{}, applied_{}, pole_1_{}, pole_2_{};
-  std::vector<std::array<double, 2>> history_;  ///< commanded voltages of past ticks, for the command delay
+  std::array<double, 2> current_{}, wanted_{}, applied_{};
+  std::array<RunningMean, 2> mean_;
+  std::optional<Beat> beat_;  ///< what the driver's waveform is made of; none: voltages
+  double clock_s_ = 0, tick_begins_s_ = 0, in_tick_s_ = 0, next_hold_s_ = -1e9;
+  std::vector<std::pair<double, std::array<double, 2>>> history_;  ///< commanded voltages, for the command delay
   Slow slow_;
   Felt felt_;
-  std::array<double, 2> winding_K_{}, housing_K_{}, heat_J_{};
-  double supply_ = 1, charge_As_ = 0, relaxed_A_ = 0, load_As_ = 0;
-  Vector3d gust_ = Vector3d::Zero();
+  std::array<Heat, 2> heat_;
+  std::array<double, 2> heat_J_{};
+  Sag sag_;
+  double supply_ = 1, load_As_ = 0;
   long tick_ = 0;
   int steps_ = 0;
 };

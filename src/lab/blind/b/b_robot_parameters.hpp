@@ -57,6 +57,9 @@ inline constexpr double kGravity_m_s2 = 9.81, kPi = std::numbers::pi, kDegree = 
 /// Reads a vehicle file. Throws InputError if a parameter is missing or out of range.
 RobotParameters read_parameters(const std::filesystem::path& file);
 
+/// What the file of the shipped vehicle states, for laws that are asked for without a file; without its name and hash.
+RobotParameters nominal_parameters();
+
 /// Draws each body and side independently: sd of masses 3 %, inertias 7 %, centres and hinges 0.3 mm, springs 5 %, rest
 /// angles 1 deg, stops 2 deg, resistance 7 %, torque constant 3 %, friction 30 %, air coefficients 5 %; redrawn beyond
 /// 3 sd.

@@ -124,8 +124,9 @@ Sensors::Sensors(const Assignment& a, const SensorTruth& truth, const Robot& rob
   gyro_bias_ = normals(imu_random_).cwiseProduct(Vector3d(0.02, 0.03, 0.015));
   accel_bias_ = 0.02 * normals(imu_random_);
   warming_ = 1e-3 * normals(imu_random_);
-  accel_turn_ = turned(effect_magnitudes_[kAccelerometerMisalignment] * effect_magnitudes_.misalignment);
-  const double tilt = 0.01 * effect_magnitudes_[kMocapTilt], way = effect_magnitudes_.mocap_tilt_direction_rad;
+  const double tilt = kTilt_rad * effect_magnitudes_[kMocapTilt], way = effect_magnitudes_.mocap_tilt_direction_rad;
+  scale_ = kWand * effect_magnitudes_[kMocapTilt] * effect_magnitudes_.mocap_scale_sign;
+  misfit_ = misfit(effect_magnitudes_.marker, effect_magnitudes_[kMarkerOffset] * effect_magnitudes_.marker_m);
   tilt_ = Eigen::Quaterniond(Eigen::AngleAxisd(tilt, Vector3d(std::cos(way), std::sin(way), 0)));
   next_imu_s_ = -trim_s + imu_random_.uniform(0.001, 0.003);
   next_own_s_ = -trim_s + imu_random_.uniform(0, 1e-3);
@@ -146,17 +147,14 @@ void Sensors::imu_step(const Robot& robot, double time) {
   Vector3d gyro = 0.5 * (gyro_felt_ + gyro_now), accel = 0.5 * (accel_felt_ + accel_now);
   gyro_felt_ = gyro_now;
   accel_felt_ = accel_now;
-  if (effect_magnitudes_.any(kAccelerometerMisalignment)) accel = accel_turn_ * accel;
+  if (effect_magnitudes_.any(kAccelerometerMisalignment))
+    accel = skewed(accel, effect_magnitudes_[kAccelerometerMisalignment] * effect_magnitudes_.skew);
   gyro = gyro_mount_.shaken(gyro);
   accel = accel_mount_.shaken(accel);
-  // An asymmetric proof mass rectifies vibration before any filter (Ang, Khosla, Riviere, IEEE Sensors J. 7 (2007)).
-  if (effect_magnitudes_.any(kVibrationRectification))
-    accel += 1e-3 * effect_magnitudes_[kVibrationRectification] * accel.cwiseProduct(accel);
   gyro_before_ = gyro_;
   accel_before_ = accel_;
-  const double keep = std::exp(-kStep_s * kTurn * truth_.bandwidth_hz);
-  gyro_ = keep * gyro_ + (1 - keep) * gyro;
-  accel_ = keep * accel_ + (1 - keep) * accel;
+  gyro_ = low_pass(gyro_, gyro, truth_.bandwidth_hz, kStep_s);
+  accel_ = low_pass(accel_, accel, truth_.bandwidth_hz, kStep_s);
   if (truth_.sample == Sample::kMean) {
     window_.push_back({gyro_, accel_});
     while (static_cast<double>(window_.size()) > truth_.averaging_s / kStep_s) window_.pop_front();
@@ -187,13 +185,13 @@ void Sensors::imu_sample(double time, const Vector3d& gyro, const Vector3d& acce
   const double on = time + trim_s_;
   Vector3d rate = gyro + gyro_bias_ + warming_ * (1 - std::exp(-on / 40));
   if (effect_magnitudes_.any(kGyroBias)) {
-    // Warm-up, and a first-order Gauss-Markov process, the usual model of bias instability in data sheets.
-    const double keep = std::exp(-1 / (6 * truth_.imu_rate_hz));
-    wandering_ = keep * wandering_ + std::sqrt(1 - keep * keep) * 0.012 * normals(drift_random_);
-    rate += effect_magnitudes_[kGyroBias] * (effect_magnitudes_.gyro_drift * (1 - std::exp(-on / 5)) + wandering_);
+    const double keep = gyro_keeps(1 / truth_.imu_rate_hz);
+    wandering_ = keep * wandering_ + std::sqrt(1 - keep * keep) * kGyroWanders_rad_s * normals(drift_random_);
+    rate += effect_magnitudes_[kGyroBias] * (effect_magnitudes_.gyro_drift * gyro_warm_up(on) + wandering_);
   }
   rate += truth_.gyro_noise_rad_s * normals(imu_random_);
-  const Vector3d force = accel + accel_bias_ + truth_.accel_noise_m_s2 * normals(imu_random_);
+  const Vector3d curved = rectified(accel, effect_magnitudes_[kVibrationRectification]);
+  const Vector3d force = accel + curved + accel_bias_ + truth_.accel_noise_m_s2 * normals(imu_random_);
   ImuSample s;
   s.arrival_s = time + truth_.imu_late_s;
   for (int k = 0; k < 3; ++k) {
@@ -217,8 +215,10 @@ void Sensors::mocap_step(const Robot& robot, double time) {
   const State& x = robot.state();
   Eigen::Quaterniond attitude(x[kQuaternion], x[kQuaternion + 1], x[kQuaternion + 2], x[kQuaternion + 3]);
   Vector3d position = robot.position();
-  if (effect_magnitudes_.any(kMarkerOffset))
-    position += attitude * (effect_magnitudes_[kMarkerOffset] * effect_magnitudes_.marker_m);
+  if (effect_magnitudes_.any(kMarkerOffset)) {
+    position += attitude * misfit_.shift_m;
+    attitude = attitude * Eigen::Quaterniond(turned(misfit_.turn_rad));
+  }
   if (!truth_.marker_m.isZero(0)) {
     position += attitude * truth_.marker_m;
     attitude = attitude * Eigen::Quaterniond(truth_.marker_turn);
@@ -228,7 +228,7 @@ void Sensors::mocap_step(const Robot& robot, double time) {
     attitude = attitude * Eigen::Quaterniond(Eigen::AngleAxisd(kTurn / 3, Vector3d::UnitZ()));
   }
   if (effect_magnitudes_.any(kMocapTilt)) {
-    position = tilt_ * position;
+    position = misplaced(position, tilt_, scale_);
     attitude = tilt_ * attitude;
   }
   attitude = attitude * Eigen::Quaterniond(turned(turn));
@@ -236,8 +236,8 @@ void Sensors::mocap_step(const Robot& robot, double time) {
   if (attitude.dot(last_attitude_) < 0) attitude.coeffs() *= -1;
   last_attitude_ = attitude;
   // Waiting for the network: exponential jitter, less its mean, so that the declared mean latency holds.
-  const double late_s =
-      std::max(2e-4, truth_.mocap_late_s + 5e-3 * effect_magnitudes_[kMocapDelay] * effect_magnitudes_.delay_sign);
+  const double late_s = std::max(
+      2e-4, truth_.mocap_late_s + effect_magnitudes_.delay_sign * clock_late_s(time, effect_magnitudes_[kMocapDelay]));
   const double jitter = 0.5 * std::min(1e-3 * -std::log(1 - late) - 1e-3, 5e-3);
   MocapSample s{time + late_s + jitter, position + noise, attitude};
   if (!mocap_samples_.empty()) s.arrival_s = std::max(s.arrival_s, mocap_samples_.back().arrival_s + 1e-5);

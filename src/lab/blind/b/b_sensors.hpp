@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "lab/blind/b/b_laws.hpp"
 #include "lab/blind/b/b_robot.hpp"
 #include "lab/blind/family.hpp"
 
@@ -93,7 +94,6 @@ class Sensors {
   bool power_, wings_;
   Random imu_random_, mocap_random_, power_random_, wings_random_, drift_random_;
   Vector3d gyro_bias_, accel_bias_, warming_, wandering_ = Vector3d::Zero();
-  Matrix3d accel_turn_;
   Vector3d gyro_felt_ = Vector3d::Zero(), accel_felt_ = Vector3d::Zero();
   Vector3d gyro_ = Vector3d::Zero(), accel_ = Vector3d::Zero(), gyro_before_ = Vector3d::Zero(),
            accel_before_ = Vector3d::Zero();
@@ -103,7 +103,10 @@ class Sensors {
   std::array<Vector3d, 2> held_{Vector3d::Zero(), Vector3d::Zero()};
   double next_imu_s_, imu_jitter_s_ = 0, next_own_s_, next_mocap_s_, next_wings_s_, next_power_s_;
   int lost_ = 0;
-  Eigen::Quaterniond tilt_, last_attitude_ = Eigen::Quaterniond::Identity();
+  Eigen::Quaterniond tilt_;
+  double scale_ = 0;
+  Misfit misfit_;
+  Eigen::Quaterniond last_attitude_ = Eigen::Quaterniond::Identity();
   std::vector<ImuSample> imu_samples_;
   std::vector<MocapSample> mocap_samples_;
   std::size_t imu_taken_ = 0, mocap_taken_ = 0;

@@ -32,6 +32,10 @@ SessionChange draw_session(std::uint64_t seed, std::size_t session) {
   c.imu_late_s = within(0.1e-3);
   c.clamp_turn_rad = any_way(random, 0.1 * kDegree);
   c.clamp_m = any_way(random, 0.1e-3);
+  PilotGains& g = c.gains;
+  for (double* gain : {&g.position, &g.height, &g.velocity, &g.climb, &g.roll, &g.pitch, &g.yaw, &g.roll_rate,
+                       &g.pitch_rate, &g.yaw_rate})
+    *gain += within(0.04);
   return c;
 }
 
@@ -69,7 +73,7 @@ void swap_wings(RobotParameters& robot, EffectMagnitudes& effects) {
       link->inertia_kg_m2 = mirror * link->inertia_kg_m2 * mirror;
     }
   effects.damaged_side = 1 - effects.damaged_side;
-  std::swap(effects.wing_inertia[0], effects.wing_inertia[1]);
+  effects.torn_side = 1 - effects.torn_side;
   std::swap(effects.creep_sign[0], effects.creep_sign[1]);
 }
 

@@ -25,6 +25,7 @@ struct SessionChange {
   double imu_late_s = 0;             ///< where the bus's poll falls after the start of the board: up to 0.1 ms
   Vector3d clamp_turn_rad{0, 0, 0};  ///< clamped anew on the bench: up to 0.1 deg and 0.1 mm, any way
   Vector3d clamp_m{0, 0, 0};
+  PilotGains gains;  ///< somebody tunes the pilot: each within 4 %
 };
 
 /// In any direction, of a length that is uniform up to `longest`.

@@ -9,6 +9,7 @@
 #include "lab/blind/b/b_effects.hpp"
 #include "lab/blind/b/b_escape.hpp"
 #include "lab/blind/b/b_flight.hpp"
+#include "lab/blind/b/b_laws.hpp"
 
 namespace flappy::blind::b {
 namespace {
@@ -43,6 +44,9 @@ class FamilyB final : public Family {
     out.crashed = !out.how.empty();
     out.log = flown.log(flown.time_s());
     return out;
+  }
+  std::vector<double> law(const std::string& effect, std::span<const double> at) const override {
+    return law_of(effect, at);
   }
   FamilyEscape escape(const Assignment& a, std::size_t number, const EscapeAssignment& rules) const override {
     return fly_escape(a, number, rules);

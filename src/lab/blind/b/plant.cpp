@@ -7,9 +7,19 @@
 namespace flappy::blind::b {
 namespace {
 
-constexpr double kScrewMass_kg = 0.3e-3, kScrewGap_m = 0.6e-3;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-double decay(double distance, double length) { return std::exp(-std::max(distance, 0.0) / length); }
+Wrench times(const Matrix6d& inertia, const Twist& t) {
+  Vector6d column;
+  column << t.w, t.v;
+  const Vector6d f = inertia * column;
+  return {f.head<3>(), f.tail<3>()};
+}
+
+/// Wrench that air of an inertia needs which moves and speeds up (Kirchhoff).
+Wrench air_takes(const Matrix6d& inertia, const Twist& moves, const Twist& speeds_up) {
+  return times(inertia, speeds_up) + cross(moves, times(inertia, moves));
+}
 
 }  // namespace
 
@@ -30,7 +40,7 @@ Matrix3d rotation_matrix(const State& x) {
 }
 
 Plant::Plant(RobotParameters parameters, const EffectMagnitudes& effect_magnitudes)
-    : f_(std::move(parameters)), a_(effect_magnitudes), wing_{WingAir(f_, a_, 0), WingAir(f_, a_, 1)}, spread_rad_{} {
+    : f_(std::move(parameters)), a_(effect_magnitudes), wing_{WingAir(f_, a_, 0), WingAir(f_, a_, 1)} {
   Link torso = f_.torso;
   torso.com_m += a_[kComOffset] * a_.com_m;
   const double mean = torso.inertia_kg_m2.trace() / 3;
@@ -41,13 +51,11 @@ Plant::Plant(RobotParameters parameters, const EffectMagnitudes& effect_magnitud
   torso_ = inertia_at(torso.mass_kg, torso.com_m, torso.inertia_kg_m2, Matrix3d::Identity(), Vector3d::Zero());
   for (std::size_t j = 0; j < 2; ++j) {
     Link& wing = f_.side[j].wing;
-    const double change = 0.1 * a_[kWingInertia] * a_.wing_inertia[j];
-    wing.com_m.z() *= 1 + change;
-    const double product =
-        change * a_.wing_product * std::sqrt(wing.inertia_kg_m2(1, 1) * wing.inertia_kg_m2(2, 2)) * (j == 0 ? 1 : -1);
+    // the same on both wings; products of inertia with y are mirror images
+    wing.com_m.z() -= a_[kWingInertia] * a_.wing_com_m;
+    const double product = a_[kWingInertia] * a_.wing_product_kg_m2 * (j == 0 ? 1 : -1);
     wing.inertia_kg_m2(1, 2) += product;
     wing.inertia_kg_m2(2, 1) += product;
-    spread_rad_[j] = a_.any(kSpringHardening) ? 1 / std::sqrt(0.6 * a_[kSpringHardening]) : 0;
   }
 }
 
@@ -87,12 +95,22 @@ void Plant::place(const State& x, std::size_t side, SideNow& now) const {
 double Plant::near_gain(const Vector3d& shoulder_W, const Vector3d& tip_W, const Surroundings& room) const {
   double gain = 1;
   const double height = 0.5 * (shoulder_W.z() + tip_W.z());
-  // Exponential laws are finite at contact, unlike Cheeseman and Bennett's. In-Ground-Effect Modeling ..., J. Dyn.
-  // Syst. Meas. Control 141, 071013; Modelling of Ground and Ceiling Effects (University of Bolzano).
-  if (a_.any(kGroundEffect)) gain += 0.14 * a_[kGroundEffect] * decay(height - room.ground_z_m, 0.075);
-  if (a_.any(kCeilingEffect)) gain += 0.12 * a_[kCeilingEffect] * decay(room.ceiling_z_m - height, 0.06);
-  if (a_.any(kWallEffect)) gain -= 0.05 * a_[kWallEffect] * decay(room.wall_y_m - tip_W.y(), 0.08);
+  if (a_.any(kGroundEffect)) gain += a_[kGroundEffect] * ground_share(height - room.ground_z_m);
+  if (a_.any(kCeilingEffect)) gain += a_[kCeilingEffect] * ceiling_share(room.ceiling_z_m - height);
+  if (a_.any(kWallEffect)) gain -= a_[kWallEffect] * wall_loss(room.wall_y_m - tip_W.y());
   return gain;
+}
+
+std::array<double, 2> Plant::added_moments(std::size_t side, const State& x, double stroke_rad_s2,
+                                           double rotation_rad_s2) const {
+  SideNow now;
+  place(x, side, now);
+  const Matrix6d air = now.added_twist * wing_[side].added() * now.added_twist.transpose();
+  const Twist edge = now.s1 * x[kStrokeRate + side], wing = edge + now.s2 * x[kRotationRate + side];
+  const Twist speeds_up =
+      now.s1 * stroke_rad_s2 + now.s2 * rotation_rad_s2 + cross(edge, now.s2) * x[kRotationRate + side];
+  const Wrench takes = air_takes(air, wing, speeds_up);
+  return {-dot(now.s1, takes), -dot(now.s2, takes)};
 }
 
 Wrench Plant::on_torso(const State& x, const Matrix3d& R, const Slow& slow, const Surroundings& room) const {
@@ -100,27 +118,21 @@ Wrench Plant::on_torso(const State& x, const Matrix3d& R, const Slow& slow, cons
   const Vector3d position(x[0], x[1], x[2]);
   const Vector3d w(x[kRate], x[kRate + 1], x[kRate + 2]);
   if (a_.any(kBodyDrag) && has_air) {
-    // Cross-flow drag: each axis has its own area and uses its own component of velocity.
-    const Vector3d centre(0, 0, -3e-3), area(1.6e-3, 1.3e-3, 1.0e-3);
+    const Vector3d centre(0, 0, -3e-3);
     const Vector3d v =
         Vector3d(x[kVelocity], x[kVelocity + 1], x[kVelocity + 2]) + w.cross(centre) - R.transpose() * slow.wind_m_s;
-    sum = sum +
-          at_point(centre, -0.5 * f_.density_kg_m3 * a_[kBodyDrag] * area.cwiseProduct(v.cwiseAbs().cwiseProduct(v)));
+    sum = sum + at_point(centre, a_[kBodyDrag] * body_drag_N(v, f_.density_kg_m3));
   }
   if (a_.any(kWallEffect) && has_air) {
     // The mirror image of the wings' downwash pulls the robot towards the wall, at the stroke plane.
-    const double near = decay(room.wall_y_m - position.y() - f_.around_m, 0.08);
-    const Vector3d pull(0, 0.04 * a_[kWallEffect] * f_.mass_kg() * kGravity_m_s2 * near, 0);
+    const double share = wall_pull(room.wall_y_m - position.y() - f_.around_m);
+    const Vector3d pull(0, a_[kWallEffect] * f_.mass_kg() * kGravity_m_s2 * share, 0);
     sum = sum + at_point(Vector3d(0, 0, f_.above_m), R.transpose() * pull);
   }
   if (a_.any(kTether)) {
-    // A cable from below the torso to the ground. Its hanging part pulls down by its weight; horizontally, a shallow
-    // catenary: weight times distance over eight times the sag, a third of the height.
-    const double weight = 0.2e-3 * a_[kTether] * room.gravity_m_s2;
-    const double height = std::max(position.z() - room.ground_z_m, 0.0);
-    const Vector3d to_foot(a_.tether_foot_m.x() - position.x(), a_.tether_foot_m.y() - position.y(), 0);
     const Vector3d pull =
-        weight * (to_foot.norm() * 3 / 8 / (height + 0.3) * to_foot - (height + 0.15) * Vector3d::UnitZ());
+        a_[kTether] * tether_N(position.x() - a_.tether_foot_m.x(), position.y() - a_.tether_foot_m.y(),
+                               position.z() - room.ground_z_m, room.gravity_m_s2);
     sum = sum + at_point(Vector3d(0, 0, -0.02), R.transpose() * pull);
   }
   return sum;
@@ -172,18 +184,11 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
 
     // Added mass has inertia but no weight. Accelerations are relative to free fall, so gravity is added for it.
     Eigen::Matrix<double, 6, 6> air = Eigen::Matrix<double, 6, 6>::Zero();
-    const auto in_air = [&](const Twist& t) {
-      Vector6d column;
-      column << t.w, t.v;
-      const Vector6d f = air * column;
-      return Wrench{f.head<3>(), f.tail<3>()};
-    };
     if (added) {
       air = now.added_twist * wing_[j].added() * now.added_twist.transpose();
-      const Twist through{v2.w, v2.v - wind_B};
-      wing_takes = wing_takes + in_air({a2.w, a2.v + gravity_B}) + cross(through, in_air(through));
-      f1 = f1 + in_air(now.s1);
-      f2 = f2 + in_air(now.s2);
+      wing_takes = wing_takes + air_takes(air, {v2.w, v2.v - wind_B}, {a2.w, a2.v + gravity_B});
+      f1 = f1 + times(air, now.s1);
+      f2 = f2 + times(air, now.s2);
       whole_added += air;
     }
     Wrench side_load = Wrench{Vector3d::Zero(), Vector3d::Zero()} - edge_takes - wing_takes;
@@ -199,29 +204,25 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
       flow.cos_rotation = now.cosine;
       flow.lag = {x[kLag + 2 * j], x[kLag + 2 * j + 1]};
       if (a_.any(kWakeCapture)) {
-        constexpr double kStays_s = 4e-3;
-        rate[kWake + j] = (psi_rate - x[kWake + j]) / kStays_s;
-        flow.wake_rad_s = 0.015 * a_[kWakeCapture] * x[kWake + j];
+        rate[kWake + j] = wake_rate(psi_rate, x[kWake + j]);
+        flow.wake_rad_s = kWakeShare * a_[kWakeCapture] * x[kWake + j];
       }
-      if (a_.any(kWingFlexibility)) flow.twist_rad = x[kTwist + j];
+      if (a_.any(kWingFlexibility)) flow.bend_rad = x[kBend + j];
       if (a_.any(kGroundEffect) || a_.any(kCeilingEffect) || a_.any(kWallEffect)) {
         const Vector3d span = (j == 0 ? 1 : -1) * s.wing_length_m * now.edge.col(1);
         flow.gain = near_gain(position + R * s.shoulder_m, position + R * (s.shoulder_m + span), room);
       }
       if (a_.any(kClapAndFling)) {
-        // Lehmann, Sane, Dickinson (2005): up to 17 % within 10 to 12 degrees; more while wings separate.
         const double sum = x[kStroke] + x[kStroke + 1];
-        const double apart = std::numbers::pi - std::abs(sum);
-        const double parting = 0.5 * (1 - smooth_sign(sum * (x[kStrokeRate] + x[kStrokeRate + 1]), 40));
-        flow.gain += 0.17 * a_[kClapAndFling] * (0.3 + 0.7 * parting) / (1 + std::exp((apart - 0.6) / 0.12));
+        flow.gain += a_[kClapAndFling] *
+                     clap_share(std::numbers::pi - std::abs(sum), sum * (x[kStrokeRate] + x[kStrokeRate + 1]));
       }
       if (a_.any(kEdgeBending)) {
         // The bending of the tip follows the load on the wing with a time constant of 1 ms; its rate moves the strips.
-        constexpr double kFollows_s = 1e-3;
         WingAir::Flow stiff = flow;
         const WingAir::Load on = wing_[j].load(stiff);
         const double push = on.force_N.x() * now.cosine + on.force_N.z() * now.sine;  // along x of the leading edge
-        rate[kBending + j] = (0.044 * a_[kEdgeBending] * push / 0.08 - x[kBending + j]) / kFollows_s;
+        rate[kBending + j] = (kEdgeBend_rad * a_[kEdgeBending] * push / 0.08 - x[kBending + j]) / kEdgeFollows_s;
         flow.bending_rate_rad_s = std::clamp(rate[kBending + j], -120.0, 120.0);
         rate[kBending + j] = flow.bending_rate_rad_s;
       }
@@ -229,12 +230,8 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
       rate[kLag + 2 * j] = on.lag_rate[0];
       rate[kLag + 2 * j + 1] = on.lag_rate[1];
       if (a_.any(kWingFlexibility)) {
-        // Twist linear along the span (Guan, Yu, Appl. Math. Mech. 35 (2014)), proportional to the hinge torque.
-        constexpr double kFollows_s = 0.8e-3, kHover_Nm = 4e-4;
-        rate[kTwist + j] =
-            (8 * std::numbers::pi / 180 * a_[kWingFlexibility] * std::clamp(on.torque_Nm.y() / kHover_Nm, -3.0, 3.0) -
-             x[kTwist + j]) /
-            kFollows_s;
+        rate[kBend + j] =
+            (a_[kWingFlexibility] * bend_angle(-on.force_N.x() / kHoverNormal_N) - x[kBend + j]) / kBendFollows_s;
       }
       const Vector3d force = now.wing * on.force_N;
       const Wrench air_load{now.wing * on.torque_Nm + s.shoulder_m.cross(force), force};
@@ -244,11 +241,10 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
     }
 
     const Motor& m = s.motor;
-    const double n = ratio(x, j), sign = j == 0 ? 1 : -1;
+    const double n = m.gear_ratio, sign = j == 0 ? 1 : -1;
     stroke_load += stroke_torque(x, j, current[j], slow, rate);
-    const double softer = 1 / (1 + 4 * a_[kStopCompliance]);
-    rotation_load += hinge_torque(s.rotation, x[kRotation + j], theta_rate, kRotationStop * softer, kStopLoss,
-                                  slow.stop_shift_rad[j]);
+    rotation_load += hinge_torque(s.rotation, x[kRotation + j], theta_rate, kRotationStop, kStopLoss,
+                                  slow.stop_shift_rad[j], a_[kStopCompliance]);
 
     // Angular momentum of the rotor along the stroke axis; it turns against the wing.
     const double turning = play ? x[kRotorRate + j] : psi_rate;
@@ -338,7 +334,7 @@ double Plant::energy_J(const State& x, const Surroundings& room) const {
     const Motor& m = f_.side[j].motor;
     const double sign = j == 0 ? 1 : -1, relative = m.gear_ratio * x[kStrokeRate + j];
     energy += 0.5 * m.rotor_inertia_kg_m2 * relative * relative - m.rotor_inertia_kg_m2 * relative * sign * torso.w.z();
-    energy += spring_energy(j, x[kStroke + j]);
+    energy += spring_energy(j, x);
     whole = whole + now.edge_inertia + now.wing_inertia;
   }
   const Vector3d up = rotation_matrix(x).row(2).transpose();

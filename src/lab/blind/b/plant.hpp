@@ -26,18 +26,19 @@
 
 #include "lab/blind/b/b_air.hpp"
 #include "lab/blind/b/b_effects.hpp"
+#include "lab/blind/b/b_laws.hpp"
 #include "lab/blind/b/b_robot_parameters.hpp"
 #include "lab/blind/b/spatial.hpp"
 
 namespace flappy::blind::b {
 
 inline constexpr double kInductance_H = 0.2e-3;
-inline constexpr double kFrictionOver_rad_s = 6;                 ///< hinge rate over which dry friction is smoothed
+inline constexpr double kFrictionOver_rad_s = 6;  ///< hinge rate over which dry friction is smoothed
+/// Normal force of a wing, in the mean of its absolute value, in hover of the nominal robot; a test holds it to this.
+inline constexpr double kHoverNormal_N = 0.09;
 inline constexpr double kRotationStop = 2.0, kStrokeStop = 8.0;  ///< stiffness, Nm/rad^1.5
 /// c of the stops, s/rad: the restitution is e = 1 - c d'. At a third of it, wings rebound differently in each beat.
 inline constexpr double kStopLoss = 1e-2;
-
-inline double smooth_sign(double x, double over) { return std::tanh(x / over); }
 
 enum Place : std::size_t {
   kPosition = 0,    // of the torso's origin in W
@@ -52,12 +53,13 @@ enum Place : std::size_t {
   kRotorRate = 23,
   kLag = 25,  // two for each side
   kWake = 29,
-  kTwist = 31,
+  kBend = 31,
   kBending = 33,
   kBristle = 35,
   kScrew = 37,
   kScrewRate = 38,
-  kStates = 39,
+  kSlip = 39,  // deflection of the spring's part that is held by a slipping clamp
+  kStates = 41,
 };
 using State = std::array<double, kStates>;
 
@@ -101,13 +103,16 @@ class Plant {
   void rates(const State& x, const std::array<double, 2>& current_A, const Slow& slow, const Surroundings& room,
              const Prescribed* prescribed, State& rate, Felt& felt) const;
 
+  /// Moments (stroke axis, rotation axis) of the added mass of air on a wing of a torso that rests.
+  std::array<double, 2> added_moments(std::size_t side, const State& x, double stroke_rad_s2,
+                                      double rotation_rad_s2) const;
+  /// Factor on the forces of a wing by nearby surfaces.
+  double near_gain(const Vector3d& shoulder_W, const Vector3d& tip_W, const Surroundings& room) const;
   /// Kinetic energy plus potential energy of springs and weight.
   double energy_J(const State& x, const Surroundings& room) const;
   /// Linear and angular momentum about the origin of W, in W.
   Wrench momentum_W(const State& x) const;
 
-  /// Gear ratio at this stroke: rotor rate over stroke rate.
-  double ratio(const State& x, std::size_t side) const;
   Slow fresh() const;
 
   const RobotParameters& parameters() const { return f_; }
@@ -118,19 +123,17 @@ class Plant {
  private:
   struct SideNow;
   void place(const State& x, std::size_t side, SideNow& now) const;
-  double hinge_torque(const Hinge& hinge, double angle, double rate, double stiffness, double restitution,
-                      double shift) const;
+  double hinge_torque(const Hinge& hinge, double angle, double rate, double stiffness, double restitution, double shift,
+                      double pad) const;
   double stroke_torque(const State& x, std::size_t side, double current_A, const Slow& slow, State& rate) const;
-  double spring_torque(std::size_t side, double stroke_rad, double stiffness) const;
-  double spring_energy(std::size_t side, double stroke_rad) const;
-  double near_gain(const Vector3d& shoulder_W, const Vector3d& tip_W, const Surroundings& room) const;
+  double spring_torque(std::size_t side, const State& x, double stiffness) const;
+  double spring_energy(std::size_t side, const State& x) const;
   Wrench on_torso(const State& x, const Matrix3d& R, const Slow& slow, const Surroundings& room) const;
 
   RobotParameters f_;
   EffectMagnitudes a_;
   std::array<WingAir, 2> wing_;
   Inertia torso_;
-  std::array<double, 2> spread_rad_;  ///< scale of the hardening spring's hyperbolic sine; 0: linear
 };
 
 Matrix3d rotation_matrix(const State& x);

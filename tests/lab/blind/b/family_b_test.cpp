@@ -52,9 +52,9 @@ TEST(FamilyBEffects, OfGroundAndCeilingVanishFarAway) {
   EXPECT_GT(more("ground_effect", 0.02), 0.05);
   EXPECT_LT(more("ground_effect", 0.02), 0.14) << "it stays finite";
   EXPECT_LT(more("ground_effect", 0.15), more("ground_effect", 0.05));
-  EXPECT_NEAR(more("ground_effect", 1.9), 0, 1e-9);
+  EXPECT_NEAR(more("ground_effect", 1.9), 0, 3e-4);
   EXPECT_GT(more("ceiling_effect", 1.95), 0.05);
-  EXPECT_NEAR(more("ceiling_effect", 0.1), 0, 1e-9);
+  EXPECT_NEAR(more("ceiling_effect", 0.1), 0, 5e-4);
 }
 
 TEST(FamilyBEffects, DrawToTheWall) {
@@ -63,7 +63,7 @@ TEST(FamilyBEffects, DrawToTheWall) {
   };
   EXPECT_GT(to_wall(0.89), 0.1);
   EXPECT_GT(to_wall(0.89), 3 * std::abs(to_wall(0.75)));
-  EXPECT_NEAR(to_wall(-1), 0, 1e-6);
+  EXPECT_NEAR(to_wall(-1), 0, 1e-3);
 }
 
 TEST(FamilyBEffects, OfDragOpposeMotionEvenInSign) {
@@ -88,7 +88,8 @@ TEST(FamilyBEffects, HaveTheirSigns) {
   EXPECT_NEAR(felt_at({{"clap_and_fling", 1}}, {0, 0, 1}).acceleration.v.z(), none.z(), 1e-6)
       << "the wings are far apart";
   const std::size_t side = static_cast<std::size_t>(effect_magnitudes_of({}, 3).damaged_side);
-  EXPECT_NEAR(plant({{"wing_damage", 1}}).wing(side).area_m2() / plant().wing(side).area_m2(), 0.95, 1e-6);
+  EXPECT_NEAR(plant({{"wing_damage", 1}}).wing(side).area_m2() / plant().wing(side).area_m2(),
+              1 - family_effects()[kWingDamage].numbers[1], 1e-12);
   EXPECT_NEAR(plant({{"wing_damage", 1}}).wing(1 - side).area_m2() / plant().wing(1 - side).area_m2(), 1, 1e-12);
   EXPECT_NEAR(plant().wing(0).area_m2(), 0.07 * 0.021212121212121, 1e-12) << "the file's area";
   EXPECT_GT(plant({{"added_mass", 1}}).wing(0).added().trace(), 0);
@@ -97,7 +98,7 @@ TEST(FamilyBEffects, HaveTheirSigns) {
   // less stroke, so less thrust
   const RobotParameters f = nominal();
   const double thrust = held(f, {10, 0, 0, 0}).f.z();
-  for (const char* effect : {"coulomb_friction", "driver_dead_zone", "outside_common_supply"})
+  for (const char* effect : {"coulomb_friction", "driver_dead_zone", "outside_torn_flap"})
     EXPECT_LT(held(f, {10, 0, 0, 0}, {{effect, 1}}).f.z(), thrust) << effect;
 }
 
@@ -124,7 +125,7 @@ TEST(FamilyBEffects, AreInTheCatalogueOrOutside) {
   const std::vector<FamilyEffect>& all = family_effects();
   ASSERT_EQ(all.size(), static_cast<std::size_t>(kEffects));
   EXPECT_EQ(all[kMocapDelay].id, "mocap_delay");
-  EXPECT_EQ(all[kCommonSupply].id, "outside_common_supply");
+  EXPECT_EQ(all[kSpringSlip].id, "outside_spring_slip");
   const std::vector<std::string> channels = {"specific_force_x",
                                              "specific_force_y",
                                              "specific_force_z",
@@ -223,6 +224,49 @@ TEST(FamilyBSession, HasOtherRowsUnderTheSameHeader) {
   }
 }
 
+TEST(FamilyBSession, FliesTheProgrammeOfAnother) {
+  const Times brief{0.1, 0.15};
+  Assignment a = assignment({{"wind", 1}, {"gyro_bias", 1}});
+  a.own_parameters = a.conventions = a.power = a.wings = true;
+  a.session = 2;
+  const std::string own = bytes(fly_programme(a, 1, brief).log);
+  a.programme_of = 2;
+  EXPECT_TRUE(bytes(fly_programme(a, 1, brief).log) == own);
+  a.programme_of = 0;
+  const Case c = make_case(a);
+  const Programme flown(a, 1, c.parameters, c.room);
+  const flightlog::FlightLog other = fly_programme(a, 1, brief).log;
+  Assignment first = a;
+  first.programme_of.reset();
+  first.session = 0;
+  const Programme of_first(first, 1, c.parameters, c.room);
+  for (double t = 0; t < 10; t += 0.1) {
+    EXPECT_EQ(flown.target(t).position_m, of_first.target(t).position_m);
+    EXPECT_EQ(flown.excitation(t).bias_V, of_first.excitation(t).bias_V);
+  }
+  // what session 2 draws stays: the first sample of the wings comes when it did
+  first.session = 2;
+  const flightlog::FlightLog same_noise = fly_programme(first, 1, brief).log;
+  EXPECT_EQ(other.wings->t_s.front(), same_noise.wings->t_s.front());
+  EXPECT_EQ(make_case(a).parameters.torso.mass_kg, make_case(first).parameters.torso.mass_kg);
+}
+
+TEST(FamilyBSession, HasGustsOfItsOwnInContrasts) {
+  const Times brief{0.1, 0.15};
+  Assignment a = assignment();
+  a.programme_of = 0;
+  std::array<Vector3d, 2> gust;
+  for (std::size_t session = 0; session < 2; ++session)
+    gust[session] = Gusts(Random(a.seed, draw_number(0, session), Stream::kEffect, kWind)).at(0.1);
+  EXPECT_GT((gust[1] - gust[0]).norm(), 1e-3);
+  a.session = 1;
+  const Contrast one = contrast_of(a, 0, "wind", 1, brief);
+  a.session = 0;
+  const Contrast zero = contrast_of(a, 0, "wind", 1, brief);
+  ASSERT_EQ(one.change.size(), zero.change.size());
+  EXPECT_NE(one.change, zero.change);
+}
+
 TEST(FamilyBSession, KeepsTheRobotsEffectsAndTheKindsOfFlights) {
   Assignment a = assignment({{"com_offset", 1}});
   const Case drawn = make_case(a);
@@ -277,7 +321,9 @@ TEST(FamilyBSession, DrawsWithinItsBounds) {
       {0.1 * kDegree, [](const auto& c) { return c.clamp_turn_rad.norm(); }},
       {0.1e-3, [](const auto& c) { return c.clamp_m.norm(); }},
       {0.4e-3, [](const auto& c) { return c.mocap_late_s; }},
-      {0.1e-3, [](const auto& c) { return c.imu_late_s; }}};
+      {0.1e-3, [](const auto& c) { return c.imu_late_s; }},
+      {0.04, [](const auto& c) { return c.gains.position - 1; }},
+      {0.04, [](const auto& c) { return c.gains.yaw_rate - 1; }}};
   for (std::size_t i = 0; i < uniform.size(); ++i)
     EXPECT_NEAR(spread(uniform[i].first, uniform[i].second), std::sqrt(1.0 / 3), 0.07) << i;
   for (int axis = 0; axis < 2; ++axis)
@@ -372,7 +418,7 @@ double roll(const Assignment& a) {
 }
 
 TEST(FamilyBChanges, SwapTheWingsWithTheirFaults) {
-  for (const char* effect : {"wing_damage", "wing_inertia"}) {
+  for (const char* effect : {"wing_damage", "outside_torn_flap"}) {
     // the declared torso is not quite symmetric, which turns a hundredth of the moment into another axis
     Assignment a = assignment({{effect, 2}});
     const double none = roll(assignment()), before = roll(a) - none;
