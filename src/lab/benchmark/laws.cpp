@@ -301,7 +301,10 @@ const std::vector<LawQuestion>& law_questions() {
        {"stroke_moment_Nm", "rotation_moment_Nm"}},
       {"rotational_lift",
        {{"rotation_rad", -1, 1, 7}, {"stroke_rad_s", -250, 250, 7}, {"rotation_rad_s", -150, 150, 7}},
-       {"normal_force_N"}},
+       {"normal_force_N"},
+       nullptr,
+       // the left wing's leading edge leads
+       [](const std::vector<double>& at) { return at[0] * at[1] < 0; }},
       {"wake_capture", {{"since_reversal_s", 0, 0.012, 25}, {"peak_rad_s", 150, 300, 4}}, {"force_share"}},
       {"clap_and_fling", {{"gap_rad", 0.02, 1, 50}}, {"lift_share"}},
       {"wing_flexibility", {{"station", 0.1, 1, 19}, {"load_share", -2, 2, 9}}, {"twist_rad"}},
@@ -349,6 +352,7 @@ std::vector<std::vector<double>> grid_of(const LawQuestion& question) {
       }
     all = std::move(longer);
   }
+  if (question.occurs) std::erase_if(all, [&](const std::vector<double>& at) { return !question.occurs(at); });
   return all;
 }
 

@@ -26,6 +26,7 @@ struct LawQuestion {
   /// How outcomes on the grid become numbers that do not depend on drawn directions. Null: they are compared as they are.
   std::vector<std::vector<double>> (*invariants)(const std::vector<std::vector<double>>& at,
                                                  const std::vector<std::vector<double>>& outcomes) = nullptr;
+  bool (*occurs)(const std::vector<double>& at) = nullptr;  ///< leaves points out that flight does not have; null: none
 };
 
 /// For every effect of the catalogue that has a law. Others are geometry: a mass or an axis lies elsewhere.
