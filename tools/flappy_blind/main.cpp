@@ -177,7 +177,6 @@ Json check_laws(const std::vector<std::string>& names, const std::filesystem::pa
 }
 
 void add_question_options(io::Command& c, benchmark::BenchQuestions& q) {
-  c.option("folders", q.folders, "of flappy-blind make").required();
   c.option("--vehicle", q.vehicle, "the robot as declared, where it is elsewhere now");
   c.option("--priors", q.priors, "what is uncertain of the vehicle").shows_default();
   c.option("--discrepancy", q.discrepancy,
@@ -292,12 +291,15 @@ int main(int argc, char** argv) {
   make.option("--threads", made.threads, "0: one for each processor").range(0, 1024);
   io::Command score = program.app().command("score", "diagnoses every case, then opens the labels and compares");
   benchmark::ScoreCommand scored;
+  score.option("folders", scored.folders, "of flappy-blind make");
   blind::add_question_options(score, scored);
-  score.option("--out", scored.out, "folder for score.md and score.csv; none: the first of those");
+  score.option("--cases", scored.cases, "cases.jsonl of other scores, of other machines or days: added to the table");
+  score.option("--out", scored.out, "folder for score.md, score.csv and cases.jsonl; none: the first of those");
   score.flag("--proposals", scored.proposals,
              "fly what undecided diagnoses of part singles propose, changes to the robot included");
   io::Command plan = program.app().command("plan", "before scoring: what plans expect of the diagnoses of each case");
   benchmark::BenchQuestions foreseen;
+  plan.option("folders", foreseen.folders, "of flappy-blind make").required();
   blind::add_question_options(plan, foreseen);
   io::Command calibrate = program.app().command("calibrate", "learns from scored cases how much evidence counts");
   benchmark::CalibrateCommand calibrated;

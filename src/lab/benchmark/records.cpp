@@ -181,11 +181,139 @@ Label label_from(const Json& json) {
   return l;
 }
 
+namespace {
+
+Json rivals_json(const std::map<std::string, Rival>& rivals) {
+  Json json = Json::object();
+  for (const auto& [name, r] : rivals)
+    json[name] = {{"named", r.named}, {"ranking", r.ranking}, {"strength", r.strength}};
+  return json;
+}
+
+std::map<std::string, Rival> rivals_from(const Json& json) {
+  std::map<std::string, Rival> rivals;
+  for (const auto& [name, r] : json.items())
+    rivals[name] = {r.at("named").get<Names>(), r.at("ranking").get<Names>(), r.at("strength")};
+  return rivals;
+}
+
+Json number_or_null(const std::optional<double>& x) { return x ? Json(*x) : Json(nullptr); }
+std::optional<double> optional_number(const Json& json) {
+  return json.is_null() ? std::nullopt : std::optional(json.get<double>());
+}
+
+Json to_json(const Answer& a, const CaseTruth& truth) {
+  constexpr double kRare = 1e-3;
+  Json sets = Json::array(), hypotheses = Json::array();
+  for (const gap::RankedHypothesis& s : a.sets)
+    if (s.probability >= kRare || s.effects == truth.effects || s.effects == a.effects)
+      sets.push_back({{"effects", s.effects},
+                      {"probability", s.probability},
+                      {"loss", number_or_null(s.loss)},
+                      {"loss_gain_sd", s.loss_gain_sd}});
+  // of the hypotheses, the evidence of the best with the true effect and of the best without it
+  if (truth.effects.size() == 1)
+    for (const bool own : {true, false}) {
+      const gap::RankedHypothesis* best = nullptr;
+      for (const gap::RankedHypothesis& h : a.hypotheses)
+        if ((std::ranges::count(h.effects, truth.effects.front()) > 0) == own &&
+            (!best || h.explained() > best->explained()))
+          best = &h;
+      if (best) hypotheses.push_back({{"effects", best->effects}, {"explained", best->explained()}});
+    }
+  return {{"kind", a.kind},
+          {"effects", a.effects},
+          {"probability", a.probability},
+          {"sets", sets},
+          {"hypotheses", hypotheses},
+          {"suspects", a.suspects},
+          {"none", a.none},
+          {"parameters", a.parameters},
+          {"unknown", a.unknown},
+          {"nominal", number_or_null(a.nominal)},
+          {"refit", number_or_null(a.refit)},
+          {"floor", number_or_null(a.floor)},
+          {"rivals", rivals_json(a.rivals)},
+          {"manoeuvre", a.manoeuvre},
+          {"where", a.where ? Json::array({a.where->channel, a.where->regime}) : Json(nullptr)}};
+}
+
+Answer answer_from(const Json& json) {
+  Answer a;
+  a.kind = json.at("kind");
+  a.effects = json.at("effects").get<Names>();
+  a.probability = json.at("probability");
+  for (const Json& s : json.at("sets")) {
+    gap::RankedHypothesis& h = a.sets.emplace_back();
+    h.effects = s.at("effects").get<Names>();
+    h.probability = s.at("probability");
+    h.loss = optional_number(s.at("loss"));
+    h.loss_gain_sd = s.at("loss_gain_sd");
+  }
+  for (const Json& s : json.at("hypotheses")) {
+    gap::RankedHypothesis& h = a.hypotheses.emplace_back();
+    h.effects = s.at("effects").get<Names>();
+    h.log_evidence = s.at("explained");
+  }
+  a.suspects = json.at("suspects").get<Names>();
+  a.none = json.at("none"), a.parameters = json.at("parameters"), a.unknown = json.at("unknown");
+  a.nominal = optional_number(json.at("nominal"));
+  a.refit = optional_number(json.at("refit"));
+  a.floor = optional_number(json.at("floor"));
+  a.rivals = rivals_from(json.at("rivals"));
+  a.manoeuvre = json.at("manoeuvre");
+  if (const Json& w = json.at("where"); !w.is_null()) a.where = Where{w.at(0), w.at(1)};
+  return a;
+}
+
+}  // namespace
+
+Json to_json(const CaseRecord& r) {
+  const CaseTruth& t = r.scored.truth;
+  Json json = {{"family", r.family},
+               {"set", r.set},
+               {"commit", r.commit},
+               {"number", r.number},
+               {"row", r.row},
+               {"part", t.part},
+               {"effects", t.effects},
+               {"channels", t.channels},
+               {"regimes", t.regimes},
+               {"seed", t.seed},
+               {"draw", t.draw},
+               {"over_sessions", t.over_sessions},
+               {"answer", to_json(r.scored.prediction, t)}};
+  if (r.scored.true_fit) json["true_fit"] = to_json(*r.scored.true_fit, t);
+  if (r.scored.after_next) json["after_next"] = to_json(*r.scored.after_next, t);
+  if (const auto& f = r.scored.foreseen) json["foreseen"] = Json::array({f->nats, f->probability});
+  return json;
+}
+
+CaseRecord case_record_from(const Json& json, const std::string& where) {
+  try {
+    CaseRecord r{json.at("family"), json.at("set"), json.at("commit"), json.at("number"), json.at("row"), {}};
+    CaseTruth& t = r.scored.truth;
+    t.part = json.at("part");
+    t.effects = json.at("effects").get<Names>();
+    t.channels = json.at("channels").get<Names>();
+    t.regimes = json.at("regimes").get<Names>();
+    t.seed = json.at("seed"), t.draw = json.at("draw");
+    t.over_sessions = json.at("over_sessions").get<std::vector<double>>();
+    r.scored.prediction = answer_from(json.at("answer"));
+    if (json.contains("true_fit")) r.scored.true_fit = answer_from(json.at("true_fit"));
+    if (json.contains("after_next")) r.scored.after_next = answer_from(json.at("after_next"));
+    if (json.contains("foreseen")) r.scored.foreseen = Foresight{json.at("foreseen").at(0), json.at("foreseen").at(1)};
+    return r;
+  } catch (const Json::exception& e) {
+    throw io::InputError(where + ": " + e.what() + "; accepted: a line that flappy-blind score wrote");
+  }
+}
+
 Json to_json(const Prediction& p) {
-  Json rivals = Json::object();
-  for (const auto& [name, r] : p.rivals)
-    rivals[name] = {{"named", r.named}, {"ranking", r.ranking}, {"strength", r.strength}};
-  return {{"diagnosis", to_json(p.diagnosis)}, {"rivals", rivals}, {"corrected", p.corrected}, {"crashed", p.crashed}};
+  return {{"diagnosis", to_json(p.diagnosis)},
+          {"rivals", rivals_json(p.rivals)},
+          {"corrected", p.corrected},
+          {"crashed", p.crashed}};
 }
 
 Prediction read_prediction(const std::filesystem::path& file) {
@@ -193,8 +321,7 @@ Prediction read_prediction(const std::filesystem::path& file) {
   try {
     Prediction p;
     p.diagnosis = gap::diagnosis_from(json.at("diagnosis"), file);
-    for (const auto& [name, r] : json.at("rivals").items())
-      p.rivals[name] = {r.at("named").get<Names>(), r.at("ranking").get<Names>(), r.at("strength")};
+    p.rivals = rivals_from(json.at("rivals"));
     p.corrected = json.at("corrected");
     p.crashed = json.at("crashed");
     return p;

@@ -65,6 +65,17 @@ Json to_json(const PlannedCase& planned);
 Json to_json(const Label& label);
 Label label_from(const Json& json);
 
+/// What the scores need of a case: a line of cases.jsonl. Of hypotheses and sets, those that no score reads are left out.
+struct CaseRecord {
+  std::string family, set, commit;  ///< `commit`: of the prediction
+  std::size_t number = 0;           ///< in its benchmark
+  std::string row;                  ///< its line in score.csv
+  ScoredCase scored;
+};
+Json to_json(const CaseRecord& record);
+/// InputError at `where` (file:line) if it is no record.
+CaseRecord case_record_from(const Json& json, const std::string& where);
+
 Json to_json(const Prediction& prediction);
 /// InputError if the file is not a prediction.
 Prediction read_prediction(const std::filesystem::path& file);

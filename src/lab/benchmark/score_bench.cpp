@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <memory>
 #include <set>
+#include <sstream>
+#include <tuple>
 
 #include "flappy/vehicle_file.hpp"
 #include "io/append_file.hpp"
@@ -267,35 +269,57 @@ Json scores_json(const Scores& scores, std::size_t cases) {
   return json;
 }
 
-std::string case_lines(const Bench& bench) {
-  std::string text;
+/// Line of score.csv.
+std::string case_line(const Bench& bench, std::size_t i, const Json& prediction) {
+  const ScoredCase& c = bench.cases[i];
+  const Answer& p = c.prediction;
+  const Label& label = bench.labels.at(bench.manifest.cases[i].number);
+  std::string magnitudes, over_sessions;
+  for (const blind::BlindEffect& e : label.planned.effects)
+    magnitudes += (magnitudes.empty() ? "" : "+") + io::shortest_digits(e.magnitude);
+  for (const OverSessions& o : label.over_sessions)
+    over_sessions += (over_sessions.empty() ? "" : "+") + io::format("%.3g", o.ratio);
+  const bool alone = c.truth.part == "singles" || c.truth.part == "changed";
+  const std::optional<double> closed = alone ? closure(c) : std::nullopt;
+  return io::joined({std::to_string(label.planned.number), c.truth.part, io::joined(c.truth.effects, "+"), magnitudes,
+                     over_sessions, p.kind, io::joined(p.effects, "+"), figure(p.probability),
+                     right(c.truth, p) ? "1" : "0", closed ? figure(closed) : "",
+                     io::shortest_digits(prediction.at("seconds").get<double>()), p.where ? p.where->channel : "",
+                     p.where ? p.where->regime : "", std::to_string(c.truth.seed), std::to_string(c.truth.draw),
+                     bench.manifest.family, bench.manifest.set, prediction.at("commit").get<std::string>()},
+                    ",");
+}
+
+std::vector<CaseRecord> records_of(const Bench& bench) {
+  std::vector<CaseRecord> all;
   for (std::size_t i = 0; i < bench.cases.size(); ++i) {
-    const ScoredCase& c = bench.cases[i];
-    const Answer& p = c.prediction;
-    const Label& label = bench.labels.at(bench.manifest.cases[i].number);
-    const std::size_t number = label.planned.number;
+    const std::size_t number = bench.manifest.cases[i].number;
     const Json prediction = bench.predictions.read(number);
-    std::string magnitudes, over_sessions;
-    for (const blind::BlindEffect& e : label.planned.effects)
-      magnitudes += (magnitudes.empty() ? "" : "+") + io::shortest_digits(e.magnitude);
-    for (const OverSessions& o : label.over_sessions)
-      over_sessions += (over_sessions.empty() ? "" : "+") + io::format("%.3g", o.ratio);
-    const bool alone = c.truth.part == "singles" || c.truth.part == "changed";
-    const std::optional<double> closed = alone ? closure(c) : std::nullopt;
-    text += std::to_string(number) + "," + c.truth.part + "," + io::joined(c.truth.effects, "+") + "," + magnitudes +
-            "," + over_sessions + "," + p.kind + "," + io::joined(p.effects, "+") + "," + figure(p.probability) + "," +
-            (right(c.truth, p) ? "1" : "0") + "," + (closed ? figure(closed) : "") + "," +
-            io::shortest_digits(prediction.at("seconds").get<double>()) + "," + (p.where ? p.where->channel : "") +
-            "," + (p.where ? p.where->regime : "") + "," + std::to_string(c.truth.seed) + "," +
-            std::to_string(c.truth.draw) + "," + bench.manifest.family + "," + bench.manifest.set + "," +
-            prediction.at("commit").get<std::string>() + "\n";
+    all.push_back({bench.manifest.family, bench.manifest.set, prediction.at("commit"), number,
+                   case_line(bench, i, prediction), bench.cases[i]});
   }
-  return text;
+  return all;
+}
+
+std::vector<CaseRecord> read_records(const fs::path& file) {
+  std::vector<CaseRecord> all;
+  std::istringstream lines(io::read_text(file));
+  std::size_t number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    const std::string where = file.string() + ":" + std::to_string(++number);
+    const Json json = Json::parse(line, nullptr, false);
+    if (json.is_discarded())
+      throw io::InputError(where + ": is no JSON; accepted: a line that flappy-blind score wrote");
+    all.push_back(case_record_from(json, where));
+  }
+  return all;
 }
 
 }  // namespace
 
 Json score_bench(const ScoreCommand& command) {
+  if (command.folders.empty() && (command.cases.empty() || command.out.empty()))
+    throw io::InputError("score: no folders; accepted: folders of flappy-blind make, or --cases with --out");
   std::vector<std::unique_ptr<Bench>> benches;
   for (const fs::path& folder : command.folders) {
     benches.push_back(std::make_unique<Bench>(command, folder));
@@ -314,27 +338,38 @@ Json score_bench(const ScoreCommand& command) {
     }
   }
 
+  std::vector<CaseRecord> records;
+  std::set<std::string> undetectable;
+  std::size_t never = 0;
+  for (const auto& b : benches) {
+    std::ranges::move(records_of(*b), std::back_inserter(records));
+    for (const Json& id : b->truths.at("undetectable"))
+      undetectable.insert(b->manifest.family + ": " + id.get<std::string>());
+    never += b->truths.at("never_fly").size();
+  }
+  for (const fs::path& file : command.cases) std::ranges::move(read_records(file), std::back_inserter(records));
+
   std::map<std::string, std::vector<ScoredCase>> by_family;
   std::vector<ScoredCase> all;
-  std::set<std::string> sets, commits, undetectable;
-  std::size_t never = 0, drawn_again = 0;
+  std::set<std::string> sets, commits;
+  std::set<std::tuple<std::string, std::string, std::string, std::uint64_t, std::size_t>> seen;
+  std::size_t drawn_again = 0;
   std::string lines =
       "case,part,effects,magnitudes,over_sessions,verdict,named,probability,right,closure,seconds,channel,regime,seed,"
-      "draw,"
-      "family,set,commit\n";
-  std::set<std::string> families;
-  for (const auto& b : benches) families.insert(b->manifest.family);
-  for (const auto& b : benches) {
-    std::vector<ScoredCase>& own = by_family[b->manifest.family];
-    own.insert(own.end(), b->cases.begin(), b->cases.end());
-    all.insert(all.end(), b->cases.begin(), b->cases.end());
-    sets.insert(b->manifest.set);
-    for (const Json& id : b->truths.at("undetectable"))
-      undetectable.insert((families.size() > 1 ? b->manifest.family + ": " : "") + id.get<std::string>());
-    never += b->truths.at("never_fly").size();
-    for (const ScoredCase& c : b->cases) drawn_again += c.truth.draw;
-    for (const PublicCase& c : b->manifest.cases) commits.insert(b->predictions.read(c.number).at("commit"));
-    lines += case_lines(*b);
+      "draw,family,set,commit\n";
+  std::string json_lines;
+  for (const CaseRecord& r : records) {
+    const CaseTruth& t = r.scored.truth;
+    if (!seen.emplace(r.family, r.set, t.part, t.seed, r.number).second)
+      throw io::InputError("case " + std::to_string(r.number) + " of family " + r.family + ", " + t.part +
+                           ": is given twice; accepted: each case once");
+    by_family[r.family].push_back(r.scored);
+    all.push_back(r.scored);
+    sets.insert(r.set);
+    commits.insert(r.commit);
+    drawn_again += t.draw;
+    lines += r.row + "\n";
+    json_lines += to_json(r).dump() + "\n";
   }
   const Scores scores = score(all);
   Json json = scores_json(scores, all.size());
@@ -357,6 +392,7 @@ Json score_bench(const ScoreCommand& command) {
   io::make_folder(out);
   io::write_atomically(out / "score.md", text);
   io::write_atomically(out / "score.csv", lines);
+  io::write_atomically(out / "cases.jsonl", json_lines);
   std::printf("%s\n", io::shown_by(out.string()).c_str());
   json["undetectable"] = undetectable;
   json["never_fly"] = never;

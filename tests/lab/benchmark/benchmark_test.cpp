@@ -133,6 +133,22 @@ TEST_F(Benchmark, PredictsSealsAndScores) {
     for (const char* end : {"", "_low", "_high"}) EXPECT_TRUE(json.contains(std::string(key) + end)) << key << end;
   // once more: nothing is asked again
   EXPECT_EQ(score_bench(command()), json);
+
+  // the same table from what it wrote of the cases, without their flights
+  ScoreCommand merged;
+  merged.cases = {bench / "cases.jsonl"};
+  merged.out = root_ / "merged";
+  const nlohmann::ordered_json again = score_bench(merged);
+  EXPECT_EQ(again.at("families"), json.at("families"));
+  EXPECT_EQ(io::read_text(merged.out / "score.csv"), io::read_text(bench / "score.csv"));
+  merged.cases.push_back(merged.cases.front());
+  EXPECT_TRUE(test::refusal([&] { score_bench(merged); }).ends_with(": is given twice; accepted: each case once"));
+  const std::string cases = io::read_text(bench / "cases.jsonl");
+  io::write_atomically(bench / "half.jsonl", cases.substr(0, cases.size() / 4));
+  merged.cases = {bench / "half.jsonl"};
+  EXPECT_EQ(test::refusal([&] { score_bench(merged); }),
+            (bench / "half.jsonl").string() + ":1: is no JSON; accepted: a line that flappy-blind score wrote");
+  fs::remove(bench / "half.jsonl");
   EXPECT_EQ(asked_, 3);
 
   const auto refused = [&] { return test::refusal([&] { score_bench(command()); }); };
