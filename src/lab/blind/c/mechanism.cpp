@@ -1,8 +1,10 @@
 #include "lab/blind/c/mechanism.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <mutex>
 #include <stdexcept>
+#include <vector>
 
 #include "lab/blind/c/mjcf.hpp"
 
@@ -40,12 +42,57 @@ Eigen::Map<const Eigen::Vector3d> vector_of(const mjtNum* at) { return Eigen::Ma
 // support's force from the solver's tolerance.
 constexpr double kClampMass_kg = 1e3, kClampInertia_kg_m2 = 1;
 
+/// An ellipsoid's velocity and rate in its axes per rate of each coordinate, and its virtual mass and moment of inertia.
+struct Carried {
+  Eigen::Matrix3d R;  ///< from its axes to W
+  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 32> v, w;
+  Eigen::Vector3d mass, moment;
+};
+
+Carried carried(const mjModel& m, const mjData& d, std::ptrdiff_t geom) {
+  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, 32> along(3, m.nv), about(3, m.nv);
+  mj_jac(&m, &d, along.data(), about.data(), d.geom_xpos + 3 * geom, m.geom_bodyid[geom]);
+  Carried c;
+  c.R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(d.geom_xmat + 9 * geom);
+  c.v = c.R.transpose() * along;
+  c.w = c.R.transpose() * about;
+  const mjtNum* fluid = m.geom_fluid + mjNFLUID * geom;
+  const double scale = m.opt.density * fluid[0];
+  c.mass = scale * vector_of(fluid + 6);
+  c.moment = scale * vector_of(fluid + 9);
+  return c;
+}
+
+/// J' q' of an ellipsoid's centre, m/s^2, and of its rate, rad/s^2, in W: its accelerations where all q'' are zero.
+std::pair<Eigen::Vector3d, Eigen::Vector3d> drift_of(const mjModel& m, const mjData& d, std::ptrdiff_t geom) {
+  std::vector<int> chain;  // bodies from the torso's child on
+  for (int body = m.geom_bodyid[geom]; m.body_parentid[body] != 0; body = m.body_parentid[body]) chain.push_back(body);
+  const int torso = m.body_rootid[m.geom_bodyid[geom]];
+  Eigen::Vector3d at = vector_of(d.xpos + 3 * torso), a = Eigen::Vector3d::Zero(), turn = a;
+  Eigen::Vector3d w = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(d.xmat + 9 * torso) *
+                      vector_of(d.qvel + m.jnt_dofadr[m.body_jntadr[torso]] + 3);
+  const auto go_to = [&](const Eigen::Vector3d& next) {
+    const Eigen::Vector3d by = next - at;
+    a += turn.cross(by) + w.cross(w.cross(by));
+    at = next;
+  };
+  for (auto body = chain.rbegin(); body != chain.rend(); ++body)
+    for (int joint = m.body_jntadr[*body]; joint < m.body_jntadr[*body] + m.body_jntnum[*body]; ++joint) {
+      go_to(vector_of(d.xanchor + 3 * joint));
+      const Eigen::Vector3d rate = d.qvel[m.jnt_dofadr[joint]] * vector_of(d.xaxis + 3 * joint);
+      turn += w.cross(rate);
+      w += rate;
+    }
+  go_to(vector_of(d.geom_xpos + 3 * geom));
+  return {a, turn};
+}
+
 }  // namespace
 
 Mechanism::Mechanism(const RobotParameters& parameters, const Build& build, double step_s)
     : model_(compiled(mjcf_text(parameters, build, step_s)), mj_deleteModel),
       data_(mj_makeData(model_.get()), mj_deleteData),
-      added_mass_(build.added_mass) {
+      added_mass_(build.added_mass > 0) {
   mjModel& m = *model_;
   const std::array<std::string, 2> names = {"left", "right"};
   for (std::size_t side = 0; side < 2; ++side) {
@@ -64,10 +111,11 @@ Mechanism::Mechanism(const RobotParameters& parameters, const Build& build, doub
       strips_[side][i] = mj_name2id(&m, mjOBJ_GEOM, (names[side] + "_strip_" + std::to_string(i)).c_str());
     std::memcpy(strip_quat_[side].data(), m.geom_quat + 4 * strips_[side].back(), sizeof strip_quat_[side]);
   }
-  // Geoms without aerodynamic force, and the torso, have no virtual mass.
+  // Only the wings have virtual mass, and only with its effect.
   for (std::ptrdiff_t geom = 0; geom < m.ngeom; ++geom) {
+    const bool of_wing = std::ranges::count(strips_[0], geom) + std::ranges::count(strips_[1], geom) > 0;
     mjtNum* fluid = m.geom_fluid + mjNFLUID * geom;
-    if (fluid[1] == 0 || geom == mj_name2id(&m, mjOBJ_GEOM, "torso")) std::fill(fluid + 6, fluid + mjNFLUID, 0.0);
+    for (int i = 6; i < mjNFLUID; ++i) fluid[i] *= of_wing ? build.added_mass : 0;
   }
   mj_forward(&m, data_.get());
 }
@@ -129,8 +177,11 @@ void Mechanism::step(const std::array<double, 2>& motor_Nm, const std::array<dou
   mjModel* m = model_.get();
   mjData* d = data_.get();
   mj_step1(m, d);
-  if (added_mass_ > 0) add_virtual_mass();
   mju_zero(d->qfrc_applied, static_cast<int>(m->nv));
+  if (added_mass_) {
+    add_virtual_mass();
+    Eigen::Map<Eigen::VectorXd>(d->qfrc_applied, m->nv) -= virtual_mass_bias();
+  }
   for (std::size_t side = 0; side < 2; ++side) {
     d->qfrc_applied[drive_v_[side]] += motor_Nm[side];
     d->qfrc_applied[stroke_v_[side]] += spring_Nm[side];
@@ -160,25 +211,21 @@ void Mechanism::clamp() {
   for (int i = 0; i < 6; ++i) model_->dof_armature[i] = i < 3 ? kClampMass_kg : kClampInertia_kg_m2;
 }
 
-// M += J^T (m_A, I_A) J, virtual masses and moments of each ellipsoid, implicitly.
+// The air's momentum about an ellipsoid moves with it: p = m_A v, h = I_A w in its axes, v and w without the wind.
+// Kirchhoff's equations [Lamb, Hydrodynamics, 6th ed. 1932, chapter VI] give the force on it
+//   F = -(m_A dv/dt + w x p),  T = -(I_A dw/dt + w x h + v x p)
+// and the air has the energy (v.p + w.h)/2. The products do no work, and are MuJoCo's. In coordinates q, with dv/dt in the
+// axes of the ellipsoid R^T (J q'' + J' q') - w x v, the rest is M_A q'' + b, M_A = J^T (m_A, I_A) J.
+// Wind is taken as steady.
 void Mechanism::add_virtual_mass() {
   mjModel* m = model_.get();
   mjData* d = data_.get();
   const int nv = static_cast<int>(m->nv);
-  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, 32> along(3, nv), about(3, nv);
   for (const auto& wing : strips_)
     for (const std::ptrdiff_t geom : wing) {
-      mj_jac(m, d, along.data(), about.data(), d->geom_xpos + 3 * geom, m->geom_bodyid[geom]);
-      const mjtNum* fluid = m->geom_fluid + mjNFLUID * geom;
-      const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R(d->geom_xmat + 9 * geom);
-      const double scale = added_mass_ * m->opt.density * fluid[0];
-      const Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, 32> v = R.transpose() * along,
-                                                                             w = R.transpose() * about;
-      const Eigen::Vector3d mass = scale * vector_of(fluid + 6), moment = scale * vector_of(fluid + 9);
+      const Carried c = carried(*m, *d, geom);
       const auto add = [&](int i, int j, mjtNum& to) {
-        double sum = 0;
-        for (int k = 0; k < 3; ++k) sum += mass[k] * v(k, i) * v(k, j) + moment[k] * w(k, i) * w(k, j);
-        to += sum;
+        to += c.v.col(i).dot(c.mass.cwiseProduct(c.v.col(j))) + c.w.col(i).dot(c.moment.cwiseProduct(c.w.col(j)));
       };
       for (int i = 0; i < nv; ++i)
 #if mjVERSION_HEADER < 300  // a row of M from its diagonal on, by parents
@@ -188,6 +235,51 @@ void Mechanism::add_virtual_mass() {
 #endif
     }
   mj_factorM(m, d);
+}
+
+Eigen::VectorXd Mechanism::virtual_mass_bias() const {
+  const mjModel& m = *model_;
+  const mjData& d = *data_;
+  const Eigen::Map<const Eigen::VectorXd> rates(d.qvel, m.nv);
+  const Eigen::Vector3d wind_W = vector_of(m.opt.wind);
+  Eigen::VectorXd bias = Eigen::VectorXd::Zero(m.nv);
+  for (const auto& wing : strips_)
+    for (const std::ptrdiff_t geom : wing) {
+      const Carried c = carried(m, d, geom);
+      const auto [along_W, about_W] = drift_of(m, d, geom);
+      const Eigen::Vector3d v = c.v * rates - c.R.transpose() * wind_W, w = c.w * rates;
+      bias += c.v.transpose() * c.mass.cwiseProduct(c.R.transpose() * along_W - w.cross(v)) +
+              c.w.transpose() * c.moment.cwiseProduct(c.R.transpose() * about_W);
+    }
+  return bias;
+}
+
+Eigen::VectorXd Mechanism::virtual_mass_load(const Eigen::VectorXd& accelerations) const {
+  const mjModel& m = *model_;
+  const mjData& d = *data_;
+  const Eigen::Map<const Eigen::VectorXd> rates(d.qvel, m.nv);
+  Eigen::VectorXd load = -virtual_mass_bias();
+  for (const auto& wing : strips_)
+    for (const std::ptrdiff_t geom : wing) {
+      const Carried c = carried(m, d, geom);
+      const Eigen::Vector3d v = c.v * rates, w = c.w * rates;
+      const Eigen::Vector3d p = c.mass.cwiseProduct(v), h = c.moment.cwiseProduct(w);
+      load -= c.v.transpose() * (c.mass.cwiseProduct(c.v * accelerations) + w.cross(p)) +
+              c.w.transpose() * (c.moment.cwiseProduct(c.w * accelerations) + w.cross(h) + v.cross(p));
+    }
+  return load;
+}
+
+double Mechanism::virtual_mass_energy() const {
+  const Eigen::Map<const Eigen::VectorXd> rates(data_->qvel, model_->nv);
+  double energy_J = 0;
+  for (const auto& wing : strips_)
+    for (const std::ptrdiff_t geom : wing) {
+      const Carried c = carried(*model_, *data_, geom);
+      const Eigen::Vector3d v = c.v * rates, w = c.w * rates;
+      energy_J += (v.dot(c.mass.cwiseProduct(v)) + w.dot(c.moment.cwiseProduct(w))) / 2;
+    }
+  return energy_J;
 }
 
 // For a prescribed torso t, all other coordinates w change by M_ww da_w = -M_wt da_t.

@@ -1,8 +1,9 @@
 // One robot in MuJoCo: an MJCF text of its parameters, one mjModel and one mjData. A wing has two ellipsoids of the
 // fluid model [1], at nodes and with areas of the Gauss quadrature for the planform's moments r00, r11, r22, r33: force
 // and moment about the shoulder are the whole planform's where of second degree in the radius. Chord: of an ellipse of
-// the wing's length and area, its middle 0.55 mean chords behind the leading edge. MuJoCo omits the force of the
-// virtual mass under acceleration [1]; only the effect added_mass adds it. Up to 3.13 MuJoCo's lift has a floor of 1e-15 in
+// the wing's length and area, its middle 0.55 mean chords behind the leading edge. Without the effect added_mass a wing has
+// no virtual mass: MuJoCo's model has only the products of velocities of its force, and those alone would be no fluid's.
+// Up to 3.13 MuJoCo's lift has a floor of 1e-15 in
 // a denominator, which takes lift from these wings below 0.8 m/s: other versions have other robots (Family::engine).
 // Clamped: with a mass A and a moment of inertia added to the six coordinates t of the torso, and w the others,
 //   (M_tt + A) a_t + M_tw a_w = f_t,
@@ -86,6 +87,11 @@ class Mechanism {
   void twist(std::size_t side, double angle_rad);
   void set_friction(std::size_t side, double torque_Nm);
 
+  /// Generalised force (N, Nm) of the virtual mass on all coordinates, at these accelerations, in still air.
+  Eigen::VectorXd virtual_mass_load(const Eigen::VectorXd& accelerations) const;
+  /// Energy of the air that the virtual mass stands for, J.
+  double virtual_mass_energy() const;
+
   /// Advances one step. Motor torques are behind the gear; `wrench` acts on the torso at its origin. `held` prescribes
   /// the torso's acceleration; motion() still returns that of a free torso.
   void step(const std::array<double, 2>& motor_Nm, const std::array<double, 2>& spring_Nm, const Wrench& wrench,
@@ -99,6 +105,7 @@ class Mechanism {
 
  private:
   void add_virtual_mass();
+  Eigen::VectorXd virtual_mass_bias() const;
   void hold_torso(const Motion& held);
 
   std::unique_ptr<mjModel, void (*)(mjModel*)> model_;
@@ -106,7 +113,7 @@ class Mechanism {
   std::array<int, 2> stroke_q_{}, stroke_v_{}, rotation_q_{}, rotation_v_{}, drive_q_{}, drive_v_{};
   std::array<std::array<std::ptrdiff_t, kStrips>, 2> strips_{};
   std::array<std::array<double, 4>, 2> strip_quat_{};
-  double added_mass_ = 0;
+  bool added_mass_ = false;
   bool clamped_ = false;
   Motion clamp_;
   Wrench support_;
