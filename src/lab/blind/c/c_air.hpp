@@ -19,18 +19,23 @@ class Air {
   Wrench act(Mechanism& mechanism, double step_s);
 
  private:
-  double room_factor(const Mechanism& mechanism, std::size_t side, double wall_m) const;
+  /// Change of factor, and the wing's share of the pull of the wall.
+  std::pair<double, double> room(const Mechanism& mechanism, const Motion& torso, std::size_t side) const;
   double wing_factor(std::size_t side) const;
   void blow(Mechanism& mechanism, double step_s);
 
   const RobotParameters* parameters_;
-  double ground_, ceiling_, wall_, wake_, clap_, flexibility_, wind_, tether_, downwash_;
+  double ground_, ceiling_, wall_, wake_, fling_, flexibility_, wind_, tether_, downwash_, snap_;
   Random random_;
-  Eigen::Vector3d mean_wind_ = Eigen::Vector3d::Zero(), gust_ = Eigen::Vector3d::Zero(),
-                  anchor_ = Eigen::Vector3d::Zero();
-  std::array<double, 2> travelled_m_{}, met_{}, direction_{}, twist_rad_{};
+  Eigen::Vector3d mean_wind_ = Eigen::Vector3d::Zero(), anchor_ = Eigen::Vector3d::Zero(), rising_, falling_;
+  double pulse_;  ///< part of the rising pulse that has passed, from 0 to 0.5
+  std::array<double, 2> travelled_m_{}, met_rad_{}, opened_rad_{}, direction_{}, twist_rad_{}, camber_{}, camber_to_{};
   double stroke_rate_squared_ = 0;
   bool any_factor_;
 };
+
+/// Where a wing's axis is at a radius, in W.
+Eigen::Vector3d reach_W(const RobotParameters& parameters, const Motion& torso, std::size_t side, double stroke_rad,
+                        double radius_m);
 
 }  // namespace flappy::blind::c

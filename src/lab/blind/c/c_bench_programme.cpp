@@ -57,7 +57,7 @@ constexpr double kStepUp_s = 0.1, kLowest = 0.75, kHighest = 1.25, kTone = 0.12;
 
 BenchProgramme::BenchProgramme(const Assignment& a, std::size_t run, const RobotParameters& parameters)
     : run_(run), parameters_(&parameters), points_(kPoints.at(run)) {
-  Random random(a.seed, "bench points", stream_of(a, run));
+  Random random(a.seed, "bench points", programme_stream_of(a, run));
   for (BenchPoint& point : points_)
     for (double* value : {&point.amplitude, &point.difference, &point.bias, &point.split_cycle})
       *value *= 1 + kJitter * random.uniform(-1, 1);

@@ -2,14 +2,9 @@
 
 #include <algorithm>
 
+#include "lab/blind/c/c_laws.hpp"
+
 namespace flappy::blind::c {
-namespace {
-
-constexpr double kWindingToAir_K_W = 45, kWinding_J_K = 0.35;  // typical of a 6 mm coreless motor, not measured
-constexpr double kHover_A = 0.19;                              // battery current of a hovering nominal robot
-constexpr double kInternal_ohm = 1.2, kBuffer_s = 5e-3;
-
-}  // namespace
 
 Inputs clipped(Inputs in, const RobotParameters& parameters) {
   in.amplitude_V = std::clamp(in.amplitude_V, 0.0, parameters.amplitude_limit_V);
@@ -31,26 +26,45 @@ std::array<double, 2> beat_voltages(const Inputs& in, double phase, const RobotP
   return volts;
 }
 
+double task_phase(std::uint64_t seed) { return Random(seed, "slow task").uniform(); }
+
+double winding_A(double drive_V, double command_V, double resistance_ohm, double bridge, double battery_V) {
+  if (bridge == 0) return drive_V / resistance_ohm;
+  // the drop grows with the current, so the root is between 0 and what flows without it
+  double none = 0, all = drive_V / resistance_ohm;
+  for (int i = 0; i < 40; ++i) {
+    const double mid = (none + all) / 2;
+    const double over_V = resistance_ohm * mid + bridge * laws::bridge_loss_V(command_V, mid, battery_V) - drive_V;
+    (over_V * drive_V > 0 ? all : none) = mid;
+  }
+  return (none + all) / 2;
+}
+
 Drive::Drive(const RobotParameters& parameters, const Magnitudes& magnitudes, std::uint64_t seed, std::size_t flight)
     : parameters_(&parameters),
-      dead_zone_V_(0.4 * magnitudes[Effect::kDriverDeadZone]),
-      pole_s_(0.5e-3 * magnitudes[Effect::kDriverBandwidth]),
-      delay_s_(0.3 / parameters.flapping_Hz * magnitudes[Effect::kCommandDelay]),
+      bridge_(magnitudes[Effect::kDriverDeadZone]),
+      slew_(magnitudes[Effect::kDriverBandwidth]),
+      delay_(magnitudes[Effect::kCommandDelay]),
       heating_(magnitudes[Effect::kWindingHeating]),
       sag_(magnitudes[Effect::kBatterySag]),
-      eccentricity_(0.04 * magnitudes[Effect::kGearEccentricity]),
       ripple_(0.08 * magnitudes[Effect::kCommutatorRipple]),
-      shared_ohm_(1.5 * magnitudes[Effect::kSharedSupply]),
+      hunting_(magnitudes[Effect::kConverterHunting]),
       jitter_s_(0.4e-3 * magnitudes[Effect::kDriverJitter]),
+      task_phase_(task_phase(seed)),
       random_(seed, "driver", flight),
       full_V_(kBattery_V * parameters.supply),
       battery_V_(full_V_) {
+  fan(0);
   Random once(seed, "gears");
   for (double& phase : gear_phase_) phase = once.uniform(0, 2 * M_PI);
+  hunting_phase_ = once.uniform(0, 2 * M_PI);
 }
 
+void Drive::fan(double airspeed_m_s) { airspeed_m_s_ = std::hypot(laws::kWash_m_s, airspeed_m_s); }
+
 void Drive::command(double now_s, const std::array<double, 2>& voltages) {
-  waiting_.push_back({now_s + delay_s_ + jitter_s_ * random_.uniform(), voltages});
+  const double delay_s = delay_ > 0 ? laws::task_delay_s(now_s, task_phase_, delay_) : 0;
+  waiting_.push_back({now_s + delay_s + jitter_s_ * random_.uniform(), voltages});
 }
 
 std::array<double, 2> Drive::torques(double now_s, double step_s, const std::array<double, 2>& angles,
@@ -60,40 +74,36 @@ std::array<double, 2> Drive::torques(double now_s, double step_s, const std::arr
     waiting_.erase(waiting_.begin());
   }
   std::array<double, 2> torques{};
-  double drawn_A = 0, bus_A = 0;
+  double drawn_A = 0;
   for (std::size_t side = 0; side < 2; ++side) {
     const Motor& motor = parameters_->sides[side].motor;
     double volts = applied_[side];
-    if (dead_zone_V_ > 0) volts -= dead_zone_V_ * volts / std::sqrt(volts * volts + dead_zone_V_ * dead_zone_V_);
-    if (pole_s_ > 0) {
-      const double kept = std::exp(-step_s / pole_s_);
-      once_[side] = volts + kept * (once_[side] - volts);
-      twice_[side] = once_[side] + kept * (twice_[side] - once_[side]);
-      volts = twice_[side];
-    }
+    if (slew_ > 0) volts = slewed_[side] = laws::slewed_V(slewed_[side], volts, step_s, slew_);
+    const double command = volts;
     volts *= battery_V_ / kBattery_V;
-    if (shared_ohm_ > 0) volts *= 1 - std::min(0.5, shared_ohm_ * bus_A_ / kBattery_V);
-    const double gear = motor.gear_ratio * (1 + eccentricity_ * std::sin(6 * angles[side] + gear_phase_[side]));
     const double constant =
         motor.torque_constant_Nm_A * (1 + ripple_ * std::cos(2 * motor.gear_ratio * angles[side] + gear_phase_[side]));
     const double resistance = motor.resistance_ohm * (1 + kCopper_1_K * warmth_K_[side]);
-    const double current = (volts - constant * gear * rates[side]) / resistance;
+    const double back_V = constant * motor.gear_ratio * rates[side];
+    const double current = winding_A(volts - back_V, command, resistance, bridge_, kBattery_V);
+    drawn_A += volts * current / kBattery_V;
+    if (bridge_ > 0) volts -= bridge_ * laws::bridge_loss_V(command, current, kBattery_V);
     if (heating_ > 0)
-      warmth_K_[side] +=
-          step_s / kWinding_J_K * (heating_ * current * current * resistance - warmth_K_[side] / kWindingToAir_K_W);
+      warmth_K_[side] =
+          laws::warmed_K(warmth_K_[side], heating_ * current * current * resistance, airspeed_m_s_, step_s);
     voltages_[side] = volts;
     currents_[side] = current;
-    torques[side] = gear * motor.efficiency * constant * current;
-    drawn_A += volts * current / kBattery_V;
-    bus_A += std::abs(volts * current) / kBattery_V;
+    torques[side] = motor.gear_ratio * motor.efficiency * constant * current;
   }
-  bus_A_ = bus_A;
+  double source_V = full_V_;
   if (sag_ > 0) {
-    load_A_ += step_s / kBuffer_s * (drawn_A - load_A_);
+    load_A_ += step_s / laws::kBuffer_s * (drawn_A - load_A_);
     charge_As_ += step_s * load_A_;
-    battery_V_ =
-        full_V_ * std::max(0.3, 1 - sag_ * 0.05 * charge_As_ / (60 * kHover_A)) - sag_ * kInternal_ohm * load_A_;
+    source_V = std::max(0.3 * full_V_, full_V_ - sag_ * laws::sag_V(charge_As_, load_A_));
   }
+  battery_V_ = source_V;
+  if (hunting_ > 0)
+    battery_V_ *= 1 + hunting_ * laws::kHunting * std::sin(2 * M_PI * laws::kHunting_Hz * now_s + hunting_phase_);
   return torques;
 }
 

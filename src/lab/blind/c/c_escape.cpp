@@ -58,9 +58,9 @@ FamilyEscape escape_of(const Assignment& a, std::size_t number, const EscapeAssi
   Robot robot(a, stream);
   const RobotParameters& f = robot.parameters();
   const double tick_s = f.hold_s;
-  Pilot pilot(f, a.seed, stream_of(a, stream));
+  Pilot pilot(f, a, stream);
   Sensors sensors(a, stream, robot, sensor_parameters(a, robot));
-  Random random(a.seed, "escape", stream_of(a, number));
+  Random random(a.seed, "escape", programme_stream_of(a, number));
   Eigen::Vector3d start;
   for (std::size_t i = 0; i < 3; ++i)
     start[static_cast<int>(i)] = rules.start_m[i] + rules.start_half_m[i] * random.uniform(-1, 1);

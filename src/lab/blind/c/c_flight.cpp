@@ -41,7 +41,7 @@ Flown fly_one(const Assignment& a, std::size_t flight, bool keep_path, Length le
   Robot robot(a, flight);
   const RobotParameters& f = robot.parameters();
   Programme programme(a, flight, f);
-  Pilot pilot(f, a.seed, stream_of(a, flight));
+  Pilot pilot(f, a, flight);
   Sensors sensors(a, flight, robot, sensor_parameters(a, robot));
   const double tick_s = f.hold_s;
   const long before = std::lround(length.trim_s / tick_s), after = std::lround(length.flight_s / tick_s);

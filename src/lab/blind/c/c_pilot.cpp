@@ -2,17 +2,22 @@
 
 #include <algorithm>
 
+#include "lab/blind/c/c_session.hpp"
+
 namespace flappy::blind::c {
 namespace {
 
-// Gains were tested on the nominal robot and on 40 drawn ones.
-constexpr double kClimb_V_s2_m = 0.75;  // V per m/s^2: mass over the slope of thrust by voltage
-constexpr double kPlace_1_s = 3.2, kSpeed_1_s = 6, kSpeedHold_1_s2 = 4, kHeight_1_s = 5, kClimb_1_s = 8,
-                 kClimbHold_1_s2 = 6;
 constexpr double kMaxAcceleration = 4.5;
-// roll, pitch, yaw: V or split cycle per rad, per rad/s, and per rad s
-const Eigen::Vector3d kTurn(1.9, 2.6, 0.12), kTurnRate(0.15, 0.2, 0.012), kTurnHold(2.2, 3.0, 0.12);
 const Eigen::Vector3d kTurnHoldLimit(2.0, 2.5, 0.1);
+
+Pilot::Gains changed(Pilot::Gains g, const SessionChange& day) {
+  const std::array<double*, kPilotGains> all = {
+      &g.climb_V_s2_m,    &g.place_1_s,     &g.speed_1_s,     &g.speed_hold_1_s2, &g.height_1_s,    &g.climb_1_s,
+      &g.climb_hold_1_s2, &g.turn.x(),      &g.turn.y(),      &g.turn.z(),        &g.turn_rate.x(), &g.turn_rate.y(),
+      &g.turn_rate.z(),   &g.turn_hold.x(), &g.turn_hold.y(), &g.turn_hold.z()};
+  for (std::size_t i = 0; i < all.size(); ++i) *all[i] *= day.gains[i];
+  return g;
+}
 
 }  // namespace
 
@@ -25,8 +30,8 @@ Eigen::Vector3d rotation_between(const Eigen::Matrix3d& from, const Eigen::Matri
   return turn.angle() * turn.axis();
 }
 
-Pilot::Pilot(const RobotParameters& parameters, std::uint64_t seed, std::size_t flight)
-    : parameters_(&parameters), random_(seed, "pilot", flight) {
+Pilot::Pilot(const RobotParameters& parameters, const Assignment& a, std::size_t flight)
+    : parameters_(&parameters), gains_(changed({}, session_change(a))), random_(a.seed, "pilot", stream_of(a, flight)) {
   beat_ticks_ = static_cast<std::size_t>(std::max(1.0, std::round(1 / (parameters.flapping_Hz * parameters.hold_s))));
   late_ticks_ = 2;
   past_.resize(beat_ticks_ + late_ticks_);
@@ -80,21 +85,21 @@ void Pilot::carry(const Eigen::Vector3d& about_W, double turn_rad, const Eigen::
 }
 
 Inputs Pilot::fly(const Target& target, double tick_s) {
-  Eigen::Vector3d speed = target.velocity_W + kPlace_1_s * (target.position_W - view_.position_W);
-  speed.z() = target.velocity_W.z() + kHeight_1_s * (target.position_W.z() - view_.position_W.z());
+  Eigen::Vector3d speed = target.velocity_W + gains_.place_1_s * (target.position_W - view_.position_W);
+  speed.z() = target.velocity_W.z() + gains_.height_1_s * (target.position_W.z() - view_.position_W.z());
   const double level = speed.head<2>().norm();
   if (level > 1.2) speed.head<2>() *= 1.2 / level;
   speed.z() = std::clamp(speed.z(), -0.5, 0.7);
   const Eigen::Vector3d error = speed - view_.velocity_W;
-  Eigen::Vector3d wanted = kSpeed_1_s * error + hold_acceleration_ + target.acceleration_W;
+  Eigen::Vector3d wanted = gains_.speed_1_s * error + hold_acceleration_ + target.acceleration_W;
   wanted.z() = 0;
   if (wanted.norm() < kMaxAcceleration) {
-    hold_acceleration_ += kSpeedHold_1_s2 * tick_s * error;
+    hold_acceleration_ += gains_.speed_hold_1_s2 * tick_s * error;
     hold_acceleration_ = hold_acceleration_.cwiseMax(-2.0).cwiseMin(2.0);
   } else {
     wanted *= kMaxAcceleration / wanted.norm();
   }
-  climb_V_ = std::clamp(climb_V_ + kClimb_V_s2_m * kClimbHold_1_s2 * error.z() * tick_s, -3.0, 5.0);
+  climb_V_ = std::clamp(climb_V_ + gains_.climb_V_s2_m * gains_.climb_hold_1_s2 * error.z() * tick_s, -3.0, 5.0);
 
   const Eigen::Vector3d up = (wanted + Eigen::Vector3d(0, 0, Mechanism::kGravity_m_s2)).normalized();
   const Eigen::Vector3d nose(std::cos(target.heading_rad), std::sin(target.heading_rad), 0);
@@ -106,12 +111,14 @@ Inputs Pilot::fly(const Target& target, double tick_s) {
   turn = turn.cwiseMax(-0.7).cwiseMin(0.7);
 
   const Eigen::Vector3d rate = view_.rate_B;
-  hold_turn_ = (hold_turn_ + kTurnHold.cwiseProduct(turn) * tick_s).cwiseMax(-kTurnHoldLimit).cwiseMin(kTurnHoldLimit);
-  const Eigen::Vector3d out = kTurn.cwiseProduct(turn) - kTurnRate.cwiseProduct(rate) + hold_turn_;
+  hold_turn_ =
+      (hold_turn_ + gains_.turn_hold.cwiseProduct(turn) * tick_s).cwiseMax(-kTurnHoldLimit).cwiseMin(kTurnHoldLimit);
+  const Eigen::Vector3d out = gains_.turn.cwiseProduct(turn) - gains_.turn_rate.cwiseProduct(rate) + hold_turn_;
   const double lean = std::max(0.5, view_.R_WB(2, 2));
   trim_ = {kHover_V + climb_V_, hold_turn_.x(), hold_turn_.y(), hold_turn_.z()};
   Inputs inputs = {
-      (kHover_V + climb_V_ + kClimb_V_s2_m * (kClimb_1_s * error.z() + target.acceleration_W.z())) / std::sqrt(lean),
+      (kHover_V + climb_V_ + gains_.climb_V_s2_m * (gains_.climb_1_s * error.z() + target.acceleration_W.z())) /
+          std::sqrt(lean),
       out.x(), out.y(), out.z()};
   inputs.amplitude_V = std::clamp(inputs.amplitude_V, 6.0, 16.0);
   return clipped(inputs, *parameters_);

@@ -21,19 +21,30 @@ struct View {
 
 class Pilot {
  public:
-  Pilot(const RobotParameters& parameters, std::uint64_t seed, std::size_t flight);
+  /// Gains were tested on the nominal robot and on 40 drawn ones.
+  struct Gains {
+    double climb_V_s2_m = 0.75;  ///< V per m/s^2: mass over the slope of thrust by voltage
+    double place_1_s = 3.2, speed_1_s = 6, speed_hold_1_s2 = 4, height_1_s = 5, climb_1_s = 8, climb_hold_1_s2 = 6;
+    /// Roll, pitch, yaw: V or split cycle per rad, per rad/s, and per rad s.
+    Eigen::Vector3d turn = {1.9, 2.6, 0.12}, turn_rate = {0.15, 0.2, 0.012}, turn_hold = {2.2, 3.0, 0.12};
+  };
+
+  /// The session of `a` may change its gains.
+  Pilot(const RobotParameters& parameters, const Assignment& a, std::size_t flight);
 
   /// To be called once per tick, with the true motion.
   void look(const Motion& now, double tick_s);
   /// Moves the pilot's memory with a displaced robot: a turn about the world's z through `about_W`, then a shift.
   void carry(const Eigen::Vector3d& about_W, double turn_rad, const Eigen::Vector3d& shift_m);
   const View& view() const { return view_; }
+  const Gains& gains() const { return gains_; }
   Inputs fly(const Target& target, double tick_s);
   /// Inputs in hover: nominal values plus integrators, without feedback.
   Inputs trim() const { return trim_; }
 
  private:
   const RobotParameters* parameters_;
+  Gains gains_;
   Random random_;
   std::size_t beat_ticks_, late_ticks_;
   struct Sample {

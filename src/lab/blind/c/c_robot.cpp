@@ -1,5 +1,6 @@
 #include "lab/blind/c/c_robot.hpp"
 
+#include "lab/blind/c/c_laws.hpp"
 #include "lab/blind/c/c_session.hpp"
 
 namespace flappy::blind::c {
@@ -37,23 +38,24 @@ RobotParameters changed(RobotParameters f, const SessionChange& day) {
 /// Effects that only change parameters.
 RobotParameters faulty(RobotParameters f, const Magnitudes& magnitudes, std::uint64_t seed) {
   Random random(seed, "faults");
-  const double heading = random.uniform(0, 2 * M_PI), sign = random.sign(), other = random.sign(), wing = random.sign();
-  f.torso.com_m += 1e-3 * magnitudes[Effect::kComOffset] * f.mass_kg() / f.torso.mass_kg *
-                   Eigen::Vector3d(std::cos(heading), std::sin(heading), 0);
-  const double product = 0.05 * magnitudes[Effect::kInertiaProducts] * f.torso.inertia_kg_m2(0, 0);
-  for (const auto& [axis, way] : {std::pair{1, sign}, std::pair{2, other}}) {
-    f.torso.inertia_kg_m2(0, axis) += way * product;
-    f.torso.inertia_kg_m2(axis, 0) += way * product;
+  const double heading = random.uniform(0, 2 * M_PI), sign = random.sign(), other = random.sign(), wing = random.sign(),
+               lift = random.sign();
+  f.torso.com_m += magnitudes[Effect::kComOffset] * f.mass_kg() / f.torso.mass_kg *
+                   Eigen::Vector3d(kComLevel_m * std::cos(heading), kComLevel_m * std::sin(heading), lift * kComUp_m);
+  // a body at one side and below turns Ixz and Iyz; each is a share of the mean of its two moments
+  for (const auto& [axis, share] : {std::pair{0, sign * kProductXz}, std::pair{1, other * kProductYz}}) {
+    Eigen::Matrix3d& inertia = f.torso.inertia_kg_m2;
+    inertia(axis, 2) += magnitudes[Effect::kInertiaProducts] * share * std::sqrt(inertia(axis, axis) * inertia(2, 2));
+    inertia(2, axis) = inertia(axis, 2);
   }
   f.torso.inertia_kg_m2 = made_physical(f.torso.inertia_kg_m2);
   const double magnitude = magnitudes[Effect::kWingInertia];
-  for (Side& side : f.sides) {
-    if (magnitude > 0) {
-      side.wing.com_m.z() *= 1 + 0.1 * magnitude * wing;
-      const Eigen::Matrix3d turn =
-          Eigen::AngleAxisd(0.1 * magnitude * wing, Eigen::Vector3d::UnitX()).toRotationMatrix();
-      side.wing.inertia_kg_m2 = turn * side.wing.inertia_kg_m2 * turn.transpose();
-    }
+  for (std::size_t i = 0; i < 2; ++i) {
+    Side& side = f.sides[i];
+    side.wing.com_m.z() -= magnitude * wing * kWingCom_m;  // the same way from the leading edge on both sides
+    const double product = magnitude * wing * (i == 0 ? kWingProduct_kg_m2 : -kWingProduct_kg_m2);
+    side.wing.inertia_kg_m2(1, 2) += product;
+    side.wing.inertia_kg_m2(2, 1) += product;
     side.rotation.friction_Nm += 6e-5 * magnitudes[Effect::kHingeStiction];
   }
   return f;
@@ -78,18 +80,18 @@ void swap_wings(RobotParameters& f) {
 Build build_of(const Magnitudes& magnitudes, std::uint64_t seed, bool swapped_wings) {
   Random random(seed, "build");
   Build build;
-  build.damage = 0.05 * magnitudes[Effect::kWingDamage];
+  build.damage = kDamage * magnitudes[Effect::kWingDamage];
   build.damaged = random.below(2);
   if (swapped_wings) build.damaged = 1 - build.damaged;
-  build.backlash_rad = kDegree * magnitudes[Effect::kGearBacklash];
+  build.backlash_rad = kBacklash_rad * magnitudes[Effect::kGearBacklash];
   const double half_weight_Nm = 0.0611 * 0.0507;  // half the weight of 12.4 g at the planform's centre of pressure
   if (magnitudes[Effect::kSparBending] > 0)
     build.spar_stiffness_Nm_rad = half_weight_Nm / (0.5 * kDegree * magnitudes[Effect::kSparBending]);
   build.leg_mass_kg = 0.4e-3 * magnitudes[Effect::kLegFlexure];
-  build.body_drag_m2 = 1.5e-3 * magnitudes[Effect::kBodyDrag];
+  build.body_drag_m2 = kBodyDrag_m2 * magnitudes[Effect::kBodyDrag];
   build.rotational_lift = magnitudes[Effect::kRotationalLift];
   build.added_mass = magnitudes[Effect::kAddedMass];
-  build.stop_softness = 1 + 4 * magnitudes[Effect::kStopCompliance];
+  build.stop_softness = magnitudes[Effect::kStopCompliance];
   return build;
 }
 
@@ -109,11 +111,7 @@ Robot::Robot(const Assignment& a, std::size_t flight)
       std::make_unique<Mechanism>(parameters_, build_of(magnitudes_, a.seed, a.changes.swapped_wings), step_s_);
   drive_ = std::make_unique<Drive>(parameters_, magnitudes_, a.seed, stream_of(a, flight));
   air_ = std::make_unique<Air>(parameters_, magnitudes_, a.seed, stream_of(a, flight));
-  for (std::size_t side = 0; side < 2; ++side) {
-    const Motor& motor = parameters_.sides[side].motor;
-    friction_Nm_[side] =
-        motor.efficiency * motor.gear_ratio * motor.friction_Nm + parameters_.sides[side].stroke.friction_Nm;
-  }
+  for (std::size_t side = 0; side < 2; ++side) friction_Nm_[side] = dry_friction_Nm(parameters_.sides[side]);
 }
 
 void Robot::tick(const std::array<double, 2>& voltages, const std::function<void()>& after) {
@@ -134,24 +132,33 @@ void Robot::step(const Motion* held) {
   if (!m.is_finite()) return;  // otherwise MuJoCo writes warnings to a log file
   const double now_s = static_cast<double>(done_) * step_s_;
   const Wrench wrench = air_->act(m, step_s_);
+  drive_->fan(m.motion().velocity_W.norm());
   const std::array<double, 2> motor =
       drive_->torques(now_s, step_s_, {m.drive_angle(0), m.drive_angle(1)}, {m.drive_rate(0), m.drive_rate(1)});
   const double creep = 2 * kDegree * magnitudes_[Effect::kSpringCreep] * (1 - std::exp(-now_s / 6));
-  const double harder = std::sqrt(6 * 0.1 * magnitudes_[Effect::kSpringHardening]),
-               stiction = magnitudes_[Effect::kCoulombFriction];
+  const double harder = magnitudes_[Effect::kSpringHardening], stiction = magnitudes_[Effect::kCoulombFriction];
   std::array<double, 2> spring{};
   for (std::size_t side = 0; side < 2; ++side) {
     const Spring& of = parameters_.sides[side].spring;
     const double angle = m.stroke(side) - of.rest_rad - creep;
-    const double give = harder > 0 ? std::sinh(harder * angle) / harder : angle;
-    spring[side] = -(angle > 0 ? of.positive_Nm_rad : of.negative_Nm_rad) * give;
-    if (stiction > 0) {  // Stribeck: the excess friction at rest falls as exp(-(w/w_s)^2)
-      const double slip = m.drive_rate(side) / 120;
-      m.set_friction(side, friction_Nm_[side] * (1 + stiction * std::exp(-slip * slip)));
-    }
+    spring[side] = -stiffness_Nm_rad(of, angle) * angle + harder * second_spring_Nm(of, angle);
+    if (stiction > 0)
+      m.set_friction(side, friction_Nm_[side] * (1 + stiction * laws::tustin_share(m.drive_rate(side))));
   }
   m.step(motor, spring, wrench, held);
   ++done_;
+}
+
+double dry_friction_Nm(const Side& side) {
+  return side.motor.efficiency * side.motor.gear_ratio * side.motor.friction_Nm + side.stroke.friction_Nm;
+}
+
+double stiffness_Nm_rad(const Spring& spring, double angle_rad) {
+  return angle_rad > 0 ? spring.positive_Nm_rad : spring.negative_Nm_rad;
+}
+
+double second_spring_Nm(const Spring& spring, double angle_rad) {
+  return -stiffness_Nm_rad(spring, angle_rad) * laws::second_spring_rad(angle_rad);
 }
 
 Eigen::Vector3d specific_force_B(const Motion& motion, const Eigen::Vector3d& place_B) {

@@ -44,6 +44,19 @@ class Robot {
   long done_ = 0;
 };
 
+// Constants of effects on the bodies at magnitude 1. All: choice, as of a battery that slid in its tray, a cable on one side, and
+// a wing film of another thickness towards its edge.
+inline constexpr double kComLevel_m = 0.83e-3, kComUp_m = 0.46e-3;  ///< of the whole robot
+inline constexpr double kProductXz = 0.0737, kProductYz = 0.0551;   ///< over sqrt(Ixx Izz), sqrt(Iyy Izz) of the torso
+inline constexpr double kWingCom_m = 1.27e-3,
+                        kWingProduct_kg_m2 = 1.28e-9;  ///< of each wing, along and across the span
+
+/// Of motor and stroke hinge, before the wing.
+double dry_friction_Nm(const Side& side);
+double stiffness_Nm_rad(const Spring& spring, double angle_rad);
+/// Torque that the spring that engages adds to the linear one's, at an angle from rest.
+double second_spring_Nm(const Spring& spring, double angle_rad);
+
 /// Specific force at a point of B, in B (m/s^2): the reading of an ideal accelerometer.
 Eigen::Vector3d specific_force_B(const Motion& motion, const Eigen::Vector3d& place_B);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "lab/blind/c/c_laws.hpp"
 #include "lab/blind/c/c_session.hpp"
 
 namespace flappy::blind::c {
@@ -21,6 +22,26 @@ Eigen::Matrix3d turned(double angle, const Eigen::Vector3d& axis) {
 
 }  // namespace
 
+SensorFaults sensor_faults(const Magnitudes& magnitudes, std::uint64_t seed) {
+  Random random(seed, "sensor faults");
+  SensorFaults f;
+  f.warm = random.direction();
+  const Eigen::Vector3d axis = random.direction();
+  f.axes.setIdentity();
+  if (const double wrong = magnitudes[Effect::kAccelerometerMisalignment]; wrong > 0) {
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        if (i != j) f.axes(i, j) = wrong * laws::kCrossAxis * random.sign();
+    f.axes *= turned(wrong * laws::kDieTurn_rad, axis);
+  }
+  Random level(seed, "mocap faults");
+  const double lean = level.uniform(0, 2 * M_PI), set = level.uniform(0, 2 * M_PI);
+  f.bend = {std::cos(lean), std::sin(lean), 0};
+  f.stalk = {std::cos(set), std::sin(set), 0};
+  f.buffer_phase = level.uniform();
+  return f;
+}
+
 Sensors::Sensors(const Assignment& a, std::size_t flight, const Robot& robot, SensorParameters parameters)
     : f_(std::move(parameters)),
       clamped_(a.bench),
@@ -30,57 +51,63 @@ Sensors::Sensors(const Assignment& a, std::size_t flight, const Robot& robot, Se
       mocap_noise_(a.seed, "mocap", stream_of(a, flight)),
       power_noise_(a.seed, "power", stream_of(a, flight)),
       wing_noise_(a.seed, "wings", stream_of(a, flight)),
-      walk_(a.seed, "gyro walk", stream_of(a, flight)) {
+      walk_(a.seed, "gyro walk", stream_of(a, flight)),
+      step_s_(robot.step_s()),
+      faults_(sensor_faults(robot.magnitudes(), a.seed)) {
   const Magnitudes& magnitudes = robot.magnitudes();
-  bias_magnitude_ = 0.03 * magnitudes[Effect::kGyroBias];
-  rectification_ = 1e-3 * magnitudes[Effect::kVibrationRectification];
+  bias_ = magnitudes[Effect::kGyroBias];
+  rectification_ = magnitudes[Effect::kVibrationRectification];
   g_sensitivity_ = 1e-3 * magnitudes[Effect::kGyroGSensitivity];
-  delay_s_ = 5e-3 * magnitudes[Effect::kMocapDelay];
-  Random once(a.seed, "sensor faults");
-  warm_ = bias_magnitude_ * once.direction();
-  const Eigen::Vector3d axis = once.direction(), place = once.direction();
-  const double level = once.uniform(0, 2 * M_PI);
-  if (magnitudes[Effect::kAccelerometerMisalignment] > 0)
-    misaligned_ = turned(0.02 * magnitudes[Effect::kAccelerometerMisalignment], axis);
-  if (magnitudes[Effect::kMocapTilt] > 0)
-    tilt_ = turned(0.01 * magnitudes[Effect::kMocapTilt], Eigen::Vector3d(std::cos(level), std::sin(level), 0));
-  marker_offset_ = 2e-3 * magnitudes[Effect::kMarkerOffset] * place;
-  const double foam = magnitudes[Effect::kImuMount];
-  if (foam > 0) mount_rate_ = 2 * M_PI * 120 / std::sqrt(foam);
+  buffer_ = magnitudes[Effect::kMocapDelay];
+  bend_ = magnitudes[Effect::kMocapTilt];
+  stalk_ = magnitudes[Effect::kMarkerOffset];
+  notch_ = std::min(1.0, laws::kNotchDepth * magnitudes[Effect::kGyroNotch]);
 }
 
 void Sensors::after_step(const Robot& robot, double t_s) {
   ++count_;
   if (!clamped_) imu(robot, t_s);
+  if (!clamped_ && stalk_ > 0) swing(robot.mechanism().motion());
   if (!clamped_ && count_ % f_.mocap.steps == 0) mocap(robot, t_s);
   if (power_ && count_ % f_.power.steps == 0) power(robot, t_s);
   if (wings_ && count_ % f_.wings.steps == 0) wings(robot, t_s);
 }
 
-// Signal chain: position, mount, misalignment, rectification, axes, low-pass; then bias, noise and resolution.
+// A linear oscillator, driven by the torso's specific force.
+void Sensors::swing(const Motion& now) {
+  const double rate = 2 * M_PI * laws::kStalk_Hz / std::sqrt(stalk_);
+  const Eigen::Vector3d rest =
+      laws::stalk_rest_m(specific_force_B(now, Eigen::Vector3d::Zero()), faults_.stalk, stalk_);
+  if (count_ == 1) stalk_m_ = rest;
+  stalk_m_s_ += step_s_ * (rate * rate * (rest - stalk_m_) - 2 * laws::kStalkDamping * rate * stalk_m_s_);
+  stalk_m_ += step_s_ * stalk_m_s_;
+}
+
+// Signal chain: position, misalignment, rectification, axes, notch, low-pass; then bias, noise and resolution.
 void Sensors::imu(const Robot& robot, double t_s) {
   const Motion now = robot.mechanism().motion();
-  const double step_s = robot.step_s();
-  Eigen::Vector3d force = specific_force_B(now, f_.imu.position_m);
-  Vector6 seen;
-  seen << now.rate_B, force;
-  if (mount_rate_ > 0) {  // the inertial unit follows the torso through its mount as a second-order system
-    constexpr double damping = 0.2;
-    if (!settled_) foam_ = seen;
-    foam_rate_ += step_s * (mount_rate_ * mount_rate_ * (seen - foam_) - 2 * damping * mount_rate_ * foam_rate_);
-    foam_ += step_s * foam_rate_;
-    seen = foam_;
+  const Eigen::Vector3d acts = specific_force_B(now, f_.imu.position_m);
+  Eigen::Vector3d force = faults_.axes * acts;
+  if (rectification_ > 0) {
+    if (!settled_) level_ = force;
+    level_ += (1 - std::exp(-2 * M_PI * laws::kRectifiedFrom_Hz * step_s_)) * (force - level_);
+    for (int i = 0; i < 3; ++i) force[i] += rectification_ * laws::rectified_m_s2(force[i] - level_[i]);
   }
-  force = misaligned_ * seen.tail<3>();
-  if (rectification_ > 0) force += rectification_ * force.cwiseProduct(force);
+  Eigen::Vector3d rate = f_.imu.gyro_axes * now.rate_B + g_sensitivity_ * acts;
+  if (notch_ > 0) {  // less a band around the notch: b' = (w/Q)(x - b) - w s, s' = w b
+    const double w = 2 * M_PI * laws::kNotch_Hz;
+    notched_ += step_s_ * (w / laws::kNotchQuality * (rate - notched_) - w * notched_sum_);
+    notched_sum_ += step_s_ * w * notched_;
+    rate -= notch_ * notched_;
+  }
   Vector6 raw;
-  raw << f_.imu.gyro_axes * seen.head<3>() + g_sensitivity_ * seen.tail<3>(), f_.imu.accel_axes * force;
-  const double passed = 1 - std::exp(-2 * M_PI * f_.imu.bandwidth_hz * step_s);
+  raw << rate, f_.imu.accel_axes * force;
+  const double passed = 1 - std::exp(-2 * M_PI * f_.imu.bandwidth_hz * step_s_);
   if (!settled_) passed_ = raw;
   settled_ = true;
   passed_ += passed * (raw - passed_);
   sum_ += passed_;
-  if (bias_magnitude_ > 0) walked_ += bias_magnitude_ * std::sqrt(step_s / 10) * walk_.normal3();
+  if (bias_ > 0) walked_ += bias_ * laws::kGyroWalk_rad_s * std::sqrt(step_s_) * walk_.normal3();
   // kHeld: the sensor took its value half an interval earlier
   if (count_ % f_.imu.steps == f_.imu.steps / 2) held_ = passed_;
   if (count_ % f_.imu.steps != 0) return;
@@ -89,7 +116,8 @@ void Sensors::imu(const Robot& robot, double t_s) {
                                                          : Vector6(sum_ / static_cast<double>(f_.imu.steps));
   sum_.setZero();
   Eigen::Vector3d bias = f_.imu.gyro_bias;
-  if (bias_magnitude_ > 0) bias += warm_ * (1 - std::exp(-std::max(0.0, t_s + 5) / 6)) + walked_;
+  if (bias_ > 0)
+    bias += bias_ * laws::gyro_warmth_rad_s(static_cast<double>(count_) * step_s_) * faults_.warm + walked_;
   sample.head<3>() += bias + f_.imu.gyro_noise * imu_noise_.normal3();
   sample.tail<3>() += f_.imu.accel_noise * imu_noise_.normal3();
   const double arrives_s = (t_s + f_.imu.latency_s) * (1 + f_.fast_imu);
@@ -108,14 +136,14 @@ void Sensors::mocap(const Robot& robot, double t_s) {
   std::array<Eigen::Vector3d, 4> seen_W, model_B;
   std::size_t seen = 0;
   for (std::size_t i = 0; i < f_.mocap.markers_m.size(); ++i) {
-    const Eigen::Vector3d& marker = f_.mocap.markers_m[i];
+    const Eigen::Vector3d marker = f_.mocap.markers_m[i] + stalk_m_;
     const Eigen::Vector3d noise = f_.mocap.marker_noise_m * mocap_noise_.normal3();
     std::size_t cameras = 0;
     for (const Eigen::Vector3d& camera : f_.mocap.cameras_W)
       cameras += (now.R_WB * marker.normalized()).dot(camera) > -0.45;
     if (cameras < 2) continue;
     seen_W[seen] = now.position_W + now.R_WB * marker + noise;
-    model_B[seen++] = f_.mocap.model_m[i] - marker_offset_;
+    model_B[seen++] = f_.mocap.model_m[i];
   }
   const double loss = mocap_noise_.uniform(), length = mocap_noise_.uniform();
   if (lost_ > 0) --lost_;
@@ -131,12 +159,18 @@ void Sensors::mocap(const Robot& robot, double t_s) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double handed = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
   const Eigen::Matrix3d R = svd.matrixU() * Eigen::Vector3d(1, 1, handed).asDiagonal() * svd.matrixV().transpose();
-  const Eigen::Vector3d position = tilt_ * (mean_W - R * mean_B);
-  Eigen::Quaterniond q(Eigen::Matrix3d(tilt_ * R));
+  Eigen::Vector3d position = mean_W - R * mean_B;
+  Eigen::Quaterniond q(R);
+  if (bend_ > 0) {
+    const double lean = laws::bend_rad(position.z(), bend_);
+    q = Eigen::AngleAxisd(lean, Eigen::Vector3d::UnitZ().cross(faults_.bend)) * q;
+    position += laws::bent_by(position, faults_.bend, bend_);
+  }
   q.normalize();
   if (q.w() < 0) q.coeffs() *= -1;
-  const double arrives_s = (t_s + f_.mocap.latency_s + delay_s_) * (1 + f_.fast_mocap);
-  if (arrives_s < 0) return;
+  const double buffered_s = buffer_ > 0 ? laws::buffer_delay_s(t_s, faults_.buffer_phase, buffer_) : 0;
+  const double arrives_s = (t_s + f_.mocap.latency_s + buffered_s) * (1 + f_.fast_mocap);
+  if (arrives_s < 0 || (!mocap_.t_s.empty() && arrives_s <= mocap_.t_s.back())) return;  // thrown away by the buffer
   flightlog::Column* columns[8] = {&mocap_.t_s, &mocap_.x_m, &mocap_.y_m, &mocap_.z_m,
                                    &mocap_.qw,  &mocap_.qx,  &mocap_.qy,  &mocap_.qz};
   const double values[8] = {arrives_s, position.x(), position.y(), position.z(), q.w(), q.x(), q.y(), q.z()};

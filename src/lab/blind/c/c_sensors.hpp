@@ -46,6 +46,14 @@ struct SensorParameters {
 
 SensorParameters sensor_parameters(const Assignment& a, const Robot& robot);
 
+/// Properties of the sensors' effects that are drawn once.
+struct SensorFaults {
+  Eigen::Vector3d warm, bend, stalk;  ///< directions of the gyro's bias, the leaning verticals, and the stalks' set
+  Eigen::Matrix3d axes;               ///< of the accelerometer, from what acts to what it senses
+  double buffer_phase;                ///< from 0 to 1
+};
+SensorFaults sensor_faults(const Magnitudes& magnitudes, std::uint64_t seed);
+
 class Sensors {
  public:
   Sensors(const Assignment& a, std::size_t flight, const Robot& robot, SensorParameters parameters);
@@ -58,6 +66,7 @@ class Sensors {
 
  private:
   void imu(const Robot& robot, double t_s);
+  void swing(const Motion& now);
   void mocap(const Robot& robot, double t_s);
   void power(const Robot& robot, double t_s);
   void wings(const Robot& robot, double t_s);
@@ -65,14 +74,13 @@ class Sensors {
   SensorParameters f_;
   bool clamped_, power_, wings_;  ///< a clamped robot's motion is not recorded
   Random imu_noise_, mocap_noise_, power_noise_, wing_noise_, walk_;
-  double bias_magnitude_, rectification_, g_sensitivity_, delay_s_;
-  Eigen::Vector3d warm_ = Eigen::Vector3d::Zero(), walked_ = Eigen::Vector3d::Zero(),
-                  marker_offset_ = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d misaligned_ = Eigen::Matrix3d::Identity(), tilt_ = Eigen::Matrix3d::Identity();
-  double mount_rate_ = 0;
+  double step_s_, bias_, rectification_, g_sensitivity_, buffer_, bend_, stalk_, notch_;
+  SensorFaults faults_;
+  Eigen::Vector3d walked_ = Eigen::Vector3d::Zero(), level_ = Eigen::Vector3d::Zero(),
+                  stalk_m_ = Eigen::Vector3d::Zero(), stalk_m_s_ = Eigen::Vector3d::Zero(),
+                  notched_ = Eigen::Vector3d::Zero(), notched_sum_ = Eigen::Vector3d::Zero();
   using Vector6 = Eigen::Matrix<double, 6, 1>;
-  Vector6 passed_ = Vector6::Zero(), sum_ = Vector6::Zero(), held_ = Vector6::Zero(), foam_ = Vector6::Zero(),
-          foam_rate_ = Vector6::Zero();
+  Vector6 passed_ = Vector6::Zero(), sum_ = Vector6::Zero(), held_ = Vector6::Zero();
   std::size_t count_ = 0, lost_ = 0, imu_given_ = 0, mocap_given_ = 0;
   bool settled_ = false;
   flightlog::MocapStream mocap_;

@@ -5,6 +5,7 @@
 #include "lab/blind/c/c_effects.hpp"
 #include "lab/blind/c/c_escape.hpp"
 #include "lab/blind/c/c_flight.hpp"
+#include "lab/blind/c/c_law.hpp"
 #include "lab/blind/c/mechanism.hpp"
 
 namespace flappy::blind::c {
@@ -37,6 +38,9 @@ class FamilyC final : public Family {
   }
   FamilyEscape escape(const Assignment& a, std::size_t number, const EscapeAssignment& rules) const override {
     return escape_of(off_the_bench(a), number, rules);
+  }
+  std::vector<double> law(const std::string& effect, std::span<const double> at) const override {
+    return law_of(effect, at);
   }
 };
 

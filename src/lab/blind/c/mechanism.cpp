@@ -187,10 +187,10 @@ void Mechanism::step(const std::array<double, 2>& motor_Nm, const std::array<dou
     d->qfrc_applied[stroke_v_[side]] += spring_Nm[side];
   }
   // forces at the torso's origin in W, but torques in B
-  vector_at(d->qfrc_applied) = wrench.force_W;
+  vector_at(d->qfrc_applied) += wrench.force_W;
   Eigen::Matrix3d R_WB;
   mju_quat2Mat(R_WB.data(), d->qpos + 3);  // MuJoCo writes row by row, Eigen reads columns: this is the transpose
-  vector_at(d->qfrc_applied + 3) = R_WB * wrench.torque_W;
+  vector_at(d->qfrc_applied + 3) += R_WB * wrench.torque_W;
   mj_step2(m, d);
   if (held != nullptr) hold_torso(*held);
   if (!clamped_) return;

@@ -33,10 +33,28 @@ struct Build {
   double spar_stiffness_Nm_rad = 0;  ///< 0: rigid
   double leg_mass_kg = 0;            ///< 0: part of the torso
   double body_drag_m2 = 0;           ///< C_d A of the torso
-  double rotational_lift = 0;        ///< share of pi (0.75 - 0.25)
+  double rotational_lift = 0;        ///< share of kRotation
   double added_mass = 0;             ///< share of the virtual mass
-  double stop_softness = 1;          ///< divides the stiffness of the stops
+  double stop_softness = 0;          ///< of the stops of the rotation
 };
+
+// Constants of effects at magnitude 1.
+// Body drag: C_d A, broadside, as of a cylinder with C_d 1.4 (choice) and the torso's ellipse of 13 x 22 mm; slender and
+// angular coefficients of MuJoCo's model over the blunt one's and by themselves (choice).
+inline constexpr double kBodyDrag_m2 = 1.26e-3, kBodySlender = 0.41, kBodyAngular = 0.17;
+// Circulation of a rotating wing, pi (0.75 - x0) thetadot c^2 (Sane, Dickinson, J. Exp. Biol. 205, 1087, 2002), here of the
+// ellipses' chord, which the hinge divides at x0 from the front: (2/pi - 0.55) / (4/pi).
+inline constexpr double kRotationAxis = 0.068, kRotation = M_PI * (0.75 - kRotationAxis);
+// Damage: share of the outer ellipse's area, lost at its tip. Hawkmoths hover with 12 % less second moment of area on one side
+// without changing the timing of their muscles (Fernandez, Springthorpe, Hedrick, J. Exp. Biol. 215, 3631, 2012); choice below.
+inline constexpr double kDamage = 0.043, kDamage_m = 1.351e-3;  ///< of area, and of the nominal wing's length
+// Virtual mass along the normal, and moment about the span, of the nominal wing's inner and outer ellipsoid: what MuJoCo derives.
+inline constexpr std::array<double, 2> kVirtual_kg = {1.2857e-5, 9.6459e-6}, kVirtual_kg_m2 = {2.8785e-10, 2.2617e-10};
+// Play of the gear at the wing: choice, 80 um at a pitch radius of 5.6 mm. The teeth are a soft constraint of MuJoCo.
+inline constexpr double kBacklash_rad = 0.0143, kTeethTime_s = 2.3e-4, kTeethDamping = 0.86;
+// Softened stops, as of rubber: stiffness over 1 + 2.7 m, and an impedance that rises over an angle from a low one (MuJoCo
+// documentation, Modeling, Solver parameters). Choice.
+inline constexpr double kStopSoftness = 2.7, kStopFirst = 0.41, kStopRise_rad = 0.13;
 
 struct Wrench {
   Eigen::Vector3d force_W = Eigen::Vector3d::Zero(), torque_W = Eigen::Vector3d::Zero();
@@ -124,5 +142,11 @@ struct Strip {
   double radius, area;
 };
 std::array<Strip, Mechanism::kStrips> strips_of(const Planform& planform);
+/// Half of an ellipse's length, over the wing's.
+double half_length(const Strip& strip);
+/// The outer ellipse without a share of its area at its tip; the inner end stays.
+Strip damaged_tip(const Strip& tip, double share);
+/// Chord of all ellipses at a radius over the wing's length, over the mean chord.
+double chord_at(const std::array<Strip, Mechanism::kStrips>& strips, double radius);
 
 }  // namespace flappy::blind::c

@@ -1,5 +1,6 @@
 #include "lab/blind/c/mjcf.hpp"
 
+#include <algorithm>
 #include <cstdio>
 
 namespace flappy::blind::c {
@@ -47,10 +48,12 @@ std::string hinge(const std::string& name, const Eigen::Vector3d& axis, const st
 
 std::string stops(const Hinge& range, double softness) {
   // negative values mean stiffness and damping; a softer stop keeps its damping ratio
-  const double stiffness = 1 / (kStopTime_s * kStopTime_s * kStopDamping * kStopDamping) / softness;
+  const double stiffness =
+      1 / (kStopTime_s * kStopTime_s * kStopDamping * kStopDamping) / (1 + kStopSoftness * softness);
   const double damping = 2 * kStopDamping * std::sqrt(stiffness);
   return "limited=\"true\" range=\"" + numbers({range.lower_rad, range.upper_rad}) + "\" solreflimit=\"" +
-         numbers({-stiffness, -damping}) + "\" solimplimit=\"" + numbers({kStopImpedance, kStopImpedance, 1e-3}) +
+         numbers({-stiffness, -damping}) + "\" solimplimit=\"" +
+         numbers({kStopImpedance / (1 + kStopFirst * softness), kStopImpedance, 1e-3 + kStopRise_rad * softness}) +
          "\" ";
 }
 
@@ -61,23 +64,22 @@ std::string wing_of(const Side& side, std::size_t number, const Build& build) {
   std::array<Strip, Mechanism::kStrips> strips = strips_of(side.planform);
   RigidBody body = side.wing;
   if (build.damage > 0 && number == build.damaged) {
-    // the outer ellipse loses area at its tip: its inner end stays, and mass is lost in proportion
+    // mass is lost in proportion
     Strip& tip = strips.back();
-    const double half = tip.area * area / (M_PI * half_chord) / side.planform.length_m, lost = build.damage * tip.area;
-    tip.radius -= half * build.damage;
-    tip.area -= lost;
+    const double lost = build.damage * tip.area;
+    tip = damaged_tip(tip, build.damage);
     body.mass_kg *= 1 - lost;
     body.com_m.y() *= 1 - lost;
     body.inertia_kg_m2 *= 1 - 2 * lost;
   }
   std::string text = inertial(body);
   for (std::size_t i = 0; i < strips.size(); ++i) {
-    const Eigen::Vector3d axes(kThickness_m, strips[i].area * area / (M_PI * half_chord), half_chord);
+    const Eigen::Vector3d axes(kThickness_m, half_length(strips[i]) * side.planform.length_m, half_chord);
     const Eigen::Vector3d at(0, out * strips[i].radius * side.planform.length_m, -0.55 * side.planform.chord_m);
     FluidCoefficients fluid = side.fluid;
-    // Magnus: C rho V w x v; Sane and Dickinson (J. Exp. Biol. 205, 2002): rho pi (0.75 - x0) U thetadot c^2 per span
+    // Magnus: C rho V w x v, to be rho kRotation U thetadot c^2 per span
     const double volume = 4.0 / 3 * M_PI * axes.prod();
-    fluid[4] += build.rotational_lift * M_PI * 0.5 * side.planform.chord_m * strips[i].area * area / volume;
+    fluid[4] += build.rotational_lift * kRotation * side.planform.chord_m * strips[i].area * area / volume;
     text += ellipsoid(name + "_strip_" + std::to_string(i), at, axes, fluid);
   }
   return text;
@@ -101,7 +103,7 @@ std::string side_of(const Side& side, std::size_t number, const Build& build) {
             hinge(name + "_rotor", up, rotor) + ellipsoid(name + "_rotor", {0, 0, 0}, {1e-6, 1e-6, 1e-6}, {}) +
             "</body>\n";
   text += "<body name=\"" + name + "_edge\" pos=\"" + numbers(side.shoulder_m) + "\">\n" + inertial(side.leading_edge) +
-          hinge(name + "_stroke", up, stops(side.stroke, 1) + (one ? rotor : std::string()));
+          hinge(name + "_stroke", up, stops(side.stroke, 0) + (one ? rotor : std::string()));
   if (build.spar_stiffness_Nm_rad > 0)
     text += hinge(name + "_spar", {out, 0, 0},
                   "stiffness=\"" + numbers({build.spar_stiffness_Nm_rad}) + "\" damping=\"" +
@@ -125,6 +127,21 @@ std::array<Strip, Mechanism::kStrips> strips_of(const Planform& p) {
   return {Strip{inner, p.r00 - outer_area}, Strip{outer, outer_area}};
 }
 
+double half_length(const Strip& strip) { return strip.area / 2; }  // its half chord is 2/pi mean chords
+
+Strip damaged_tip(const Strip& tip, double share) {
+  return {tip.radius - share * half_length(tip), tip.area * (1 - share)};
+}
+
+double chord_at(const std::array<Strip, Mechanism::kStrips>& strips, double radius) {
+  double chord = 0;
+  for (const Strip& strip : strips) {
+    const double off = (radius - strip.radius) / half_length(strip);
+    if (std::abs(off) < 1) chord += 4 / M_PI * std::sqrt(1 - off * off);
+  }
+  return chord;
+}
+
 std::string mjcf_text(const RobotParameters& parameters, const Build& build, double step_s) {
   std::string text =
       "<mujoco model=\"flapper\">\n<compiler angle=\"radian\" inertiafromgeom=\"false\"/>\n<option timestep=\"" +
@@ -143,7 +160,8 @@ std::string mjcf_text(const RobotParameters& parameters, const Build& build, dou
   const Eigen::Vector3d axes(0.013, 0.013, 0.022);
   const double front = M_PI * axes.y() * axes.z();
   const double blunt = build.body_drag_m2 / (2 * front);  // MuJoCo's drag law has no factor 1/2
-  text += ellipsoid("torso", {0, 0, 0}, axes, {blunt, blunt / 2, build.body_drag_m2 > 0 ? 0.2 : 0, 0, 0});
+  text += ellipsoid("torso", {0, 0, 0}, axes,
+                    {blunt, kBodySlender * blunt, build.body_drag_m2 > 0 ? kBodyAngular : 0, 0, 0});
   for (std::size_t side = 0; side < 2; ++side) text += side_of(parameters.sides[side], side, build);
   if (build.leg_mass_kg > 0) {
     const double length = 0.012, inertia = build.leg_mass_kg * length * length, rate = 2 * M_PI * 20;
@@ -159,8 +177,9 @@ std::string mjcf_text(const RobotParameters& parameters, const Build& build, dou
     text += "<tendon>\n";
     for (const std::string name : {"left", "right"})
       text += "<fixed limited=\"true\" range=\"" + numbers({-build.backlash_rad / 2, build.backlash_rad / 2}) +
-              "\" solreflimit=\"" + numbers({4 * step_s, 1}) + "\" solimplimit=\"0.95 0.99 0.001\"><joint joint=\"" +
-              name + "_rotor\" coef=\"1\"/><joint joint=\"" + name + "_stroke\" coef=\"-1\"/></fixed>\n";
+              "\" solreflimit=\"" + numbers({std::max(kTeethTime_s, 2 * step_s), kTeethDamping}) +
+              "\" solimplimit=\"0.95 0.99 0.001\"><joint joint=\"" + name + "_rotor\" coef=\"1\"/><joint joint=\"" +
+              name + "_stroke\" coef=\"-1\"/></fixed>\n";
     text += "</tendon>\n";
   }
   return text + "</mujoco>\n";

@@ -28,7 +28,7 @@ Programme::Programme(const Assignment& a, std::size_t flight, const RobotParamet
     legs_.push_back({-1e3, 0, at, at, goal[3], goal[3]});
     return;
   }
-  Random random(a.seed, "programme", stream_of(a, flight));
+  Random random(a.seed, "programme", programme_stream_of(a, flight));
   const bool hover = a.hover || (a.calm && flight == 0);
   const double height = random.uniform(0.5, 1.0), heading = random.uniform(-0.6, 0.6);
   const double start_z = hover ? random.uniform(0.4, 1.4) : height;

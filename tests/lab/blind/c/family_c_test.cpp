@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <numeric>
 
 #include "io/parallel.hpp"
@@ -11,6 +12,8 @@
 #include "lab/blind/c/c_contrast.hpp"
 #include "lab/blind/c/c_escape.hpp"
 #include "lab/blind/c/c_flight.hpp"
+#include "lab/blind/c/c_law.hpp"
+#include "lab/blind/c/c_laws.hpp"
 #include "lab/blind/c/c_session.hpp"
 #include "lab/blind/c/mjcf.hpp"
 
@@ -238,10 +241,20 @@ TEST(FamilyC, EffectsOfNoSizeLeaveTheSameBytesAndOthersNot) {
   const std::array<flightlog::FlightLog, 3> without = {short_log(plain()), short_log(plain(), 1),
                                                        short_log(plain(), 2)};
   EXPECT_EQ(short_log(none), without[0]);
+  const ProposedFlight low = {0.1,
+                              [](double) {
+                                return std::array<double, 4>{0, 0, 0.05, 0};
+                              },
+                              [](double) { return std::array<double, 4>{}; }};  // the ground effect ends soon
+  Assignment near = plain();
+  near.proposed = &low;
+  const flightlog::FlightLog near_ground = short_log(near);
   std::vector<int> same(effects.size());
   io::parallel_for(effects.size(), 2, [&](std::size_t i) {
     const std::size_t flight = effects[i].id == "ceiling_effect" ? 1 : effects[i].id == "wall_effect" ? 2 : 0;
-    same[i] = short_log(with(effects[i].id, 1), flight) == without[flight];
+    Assignment a = with(effects[i].id, 1);
+    if (effects[i].id == "ground_effect") a.proposed = &low;
+    same[i] = short_log(a, flight) == (a.proposed ? near_ground : without[flight]);
   });
   for (std::size_t i = 0; i < effects.size(); ++i) {
     EXPECT_FALSE(same[i]) << effects[i].id;
@@ -261,14 +274,16 @@ TEST(FamilyC, DriveLosesWhatItsEffectsTake) {
   };
   const double current = driven("", 0.01).first;
   EXPECT_NEAR(current, 5 / 12.4, 1e-12);
-  EXPECT_NEAR(driven("driver_dead_zone", 0.01).first, (5 - 0.4) / 12.4, 0.002);
-  EXPECT_LT(driven("driver_bandwidth", 5e-4).first, 0.5 * current);
-  EXPECT_NEAR(driven("driver_bandwidth", 0.02).first, current, 1e-9);
-  EXPECT_EQ(driven("command_delay", 0.3 / 34 - 2e-4).first, 0);
-  EXPECT_NEAR(driven("command_delay", 0.3 / 34 + 4e-4).first, current, 1e-12);
+  const double lossy =
+      driven("driver_dead_zone", 0.01).first;  // the bridge's drop at 5 V of 18.5 V, and at its current
+  EXPECT_NEAR(12.4 * lossy + laws::bridge_loss_V(5, lossy, Drive::kBattery_V), 5, 1e-9);
+  EXPECT_LT(driven("driver_bandwidth", 5e-4).first, 0.7 * current);
+  EXPECT_NEAR(driven("driver_bandwidth", 0.03).first, current, 1e-9);
+  EXPECT_EQ(driven("command_delay", laws::kDoor_s - 2e-4).first, 0);
+  EXPECT_NEAR(driven("command_delay", laws::kDoor_s + laws::kTask_s + 2e-4).first, current, 1e-12);
   EXPECT_LT(driven("winding_heating", 3).first, 0.98 * current);
   EXPECT_LT(driven("battery_sag", 0.1).second, Drive::kBattery_V);
-  EXPECT_LT(driven("outside_shared_supply", 0.01).first, current);
+  EXPECT_NE(driven("outside_converter_hunting", 0.01).second, Drive::kBattery_V);
 }
 
 TEST(FamilyC, AirActsWhereItsEffectsAre) {
@@ -285,14 +300,15 @@ TEST(FamilyC, AirActsWhereItsEffectsAre) {
     const int strip = mj_name2id(&mechanism.model(), mjOBJ_GEOM, "left_strip_1");
     return Acted{wrench, mechanism.model().geom_fluid[mjNFLUID * strip]};
   };
-  EXPECT_GT(acted("ground_effect", {0, 0, 0.03}).factor, 1.02);
-  EXPECT_LT(acted("ground_effect", {0, 0, 0.03}).factor, 1.10);
+  const double plane_m = nominal().sides[0].shoulder_m.z();
+  EXPECT_NEAR(acted("ground_effect", {0, 0, 0.05 - plane_m}).factor, 1 + laws::ground_share(0.05), 1e-12);
+  EXPECT_LT(acted("ground_effect", {0, 0, 0.12}).factor, 0.98);
   EXPECT_NEAR(acted("ground_effect", {0, 0, 1}).factor, 1, 1e-5);
-  EXPECT_GT(acted("ceiling_effect", {0, 0, 1.95}).factor, 1.02);
-  EXPECT_LT(acted("wall_effect", {0, 0.9, 1}).factor, 0.99);
-  EXPECT_GT(acted("wall_effect", {0, 0.9, 1}).wrench.force_W.y(), 1e-3);
-  EXPECT_LT(acted("wall_effect", {0, 0, 1}).wrench.force_W.y(), 1e-5);
-  EXPECT_NEAR(acted("tether", {0, 0, 1.01}).wrench.force_W.z(), -0.2e-3 * 9.81, 1e-6);
+  EXPECT_NEAR(acted("ceiling_effect", {0, 0, 2 - 0.05 - plane_m}).factor, 1 + laws::ceiling_share(0.05), 1e-12);
+  EXPECT_LT(acted("wall_effect", {0, 0.9, 1}).factor, 0.97);
+  EXPECT_GT(acted("wall_effect", {0, 0.9, 1}).wrench.force_W.y(), 2e-3);
+  EXPECT_LT(acted("wall_effect", {0, 0, 1}).wrench.force_W.y(), 1e-4);
+  EXPECT_NEAR(acted("tether", {0, 0, 1.01}).wrench.force_W.z(), -laws::kWires_kg_m * 9.81, 1e-6);
   EXPECT_NEAR(acted("tether", {0, 0, 0.01}).wrench.force_W.z(), 0, 1e-9);
 }
 
@@ -301,18 +317,24 @@ TEST(FamilyC, SensorsErrAsTheirEffectsSay) {
   EXPECT_EQ(late.command, log.command);
   EXPECT_EQ(late.imu, log.imu);
   EXPECT_EQ(late.header, log.header);
-  // samples from before t = 0 arrive later by 5 ms: those that are in both logs are the same poses
+  // samples from before t = 0 arrive later: those that are in both logs are the same poses
   const std::size_t more = static_cast<std::size_t>(
       std::find(late.mocap.x_m.begin(), late.mocap.x_m.end(), log.mocap.x_m[0]) - late.mocap.x_m.begin());
   ASSERT_LT(more, late.mocap.x_m.size());
-  EXPECT_NEAR(late.mocap.t_s[more], log.mocap.t_s[0] + 5e-3, 1e-12);
-  const flightlog::FlightLog tilted = short_log(with("mocap_tilt", 1)), offset = short_log(with("marker_offset", 1));
+  const double late_s = late.mocap.t_s[more] - log.mocap.t_s[0];
+  EXPECT_GE(late_s, laws::kBuffer0_s - 1e-12);
+  EXPECT_LE(late_s, laws::kBuffer0_s + laws::kBufferFrame_s + 1e-12);
+  const flightlog::FlightLog bent = short_log(with("mocap_tilt", 1)), offset = short_log(with("marker_offset", 1));
   const auto place = [](const flightlog::FlightLog& of) {
     return Eigen::Vector3d(of.mocap.x_m[3], of.mocap.y_m[3], of.mocap.z_m[3]);
   };
-  EXPECT_NEAR((place(tilted) - place(log)).norm(), 0.01 * place(log).norm(), 0.01 * place(log).norm());
-  EXPECT_GT((place(tilted) - place(log)).norm(), 1e-4);
-  EXPECT_NEAR((place(offset) - place(log)).norm(), 2e-3, 1e-6);
+  const Eigen::Vector3d true_W = place(log);
+  EXPECT_LT((place(bent) - true_W - laws::bent_by(true_W, sensor_faults(Magnitudes({}), plain().seed).bend, 1)).norm(),
+            1e-6);
+  EXPECT_GT((place(bent) - true_W).norm(), 1e-4);
+  const double shifted_m = (place(offset) - true_W).norm();
+  EXPECT_GT(shifted_m, 0.5e-3);
+  EXPECT_LT(shifted_m, 3e-3);
   EXPECT_EQ(short_log(with("gyro_bias", 1)).imu.accel_x_m_s2, log.imu.accel_x_m_s2);
   EXPECT_EQ(short_log(with("vibration_rectification", 1)).imu.gyro_x_rad_s, log.imu.gyro_x_rad_s);
 }
@@ -368,14 +390,14 @@ TEST(FamilyC, ContrastIsWhatTheEffectDoes) {
       for (int channel = 0; channel < 6; ++channel) sum[channel] += beat[static_cast<std::size_t>(channel) * 5] / 6;
     return sum;
   };
-  const auto com = mean("com_offset", 1);  // 1 mm under the weight: about 31 rad/s^2
-  EXPECT_NEAR(std::hypot(com[3], com[4]), 31, 9);
+  const auto com = mean("com_offset", 1);  // 0.83 mm under the weight: about 26 rad/s^2
+  EXPECT_NEAR(std::hypot(com[3], com[4]), 26, 8);
   EXPECT_NEAR(mean("com_offset", 2).segment<2>(3).norm() / com.segment<2>(3).norm(), 2, 0.15);
   EXPECT_EQ(mean("com_offset", 0).norm(), 0);
   EXPECT_EQ(mean("gyro_bias", 1).norm(), 0);
   EXPECT_LT(mean("driver_dead_zone", 1)[2], -0.2);
   const auto damage = mean("wing_damage", 1);
-  EXPECT_NEAR(std::abs(damage[3]), 24, 8);
+  EXPECT_NEAR(std::abs(damage[3]), 20, 7);
   EXPECT_LT(damage[2], 0);
 }
 
@@ -391,7 +413,7 @@ TEST(FamilyC, WingsFollowATorsoThatIsHeld) {
 }
 
 TEST(FamilyC, PilotRemembersWhereItWasCarried) {
-  Pilot pilot(nominal(), 1, 0);
+  Pilot pilot(nominal(), plain(), 0);
   Motion still;
   still.position_W = {0.1, 0, 1};
   still.velocity_W = {0.2, 0, 0};
@@ -558,11 +580,11 @@ std::array<double, 5> sums(const flightlog::FlightLog& log) {
           sum({&log.wings->left_stroke_rad, &log.wings->right_rotation_rad})};
 }
 
-TEST(FamilyC, SessionZeroFliesAsBeforeThereWereSessions) {
-  // Recorded then. Last bits differ between processors, and may change a few of a converter's digits.
-  const std::array<std::array<double, 5>, 3> before = {{{6.84122008, 13.5307602, 470.904819, 1849.23176, 9.42088043},
-                                                        {2.24850082, 11.5664431, 510.253421, 1849.39732, 8.64324231},
-                                                        {-25.1292884, 9.66115198, 527.784637, 1848.51096, 7.4074262}}};
+TEST(FamilyC, SessionZeroFliesAsRecorded) {
+  // The robot's flights are data of benchmarks. Last bits differ between processors, and may change a few of a converter's digits.
+  const std::array<std::array<double, 5>, 3> before = {{{20.3207691, 13.5350394, 478.88548, 1849.99982, 9.33609989},
+                                                        {1.17638089, 11.5872780, 535.827841, 1849.35728, 9.72943676},
+                                                        {-7.34173911, 9.67152714, 529.782425, 1849.4885, 8.92014535}}};
   const std::array<double, 5> near = {1e-5, 1e-6, 0.02, 2e-3, 1e-6};
   for (std::size_t flight = 0; flight < 3; ++flight) {
     const std::array<double, 5> now = sums(short_log(busy(0), flight));
@@ -610,10 +632,10 @@ TEST(FamilyC, SessionChangesAreBoundedAndAsWideAsStated) {
     double bound, sd, rms = 0, largest = 0, smallest = 1;
   };
   // in the order of `values`
-  std::vector<Spread> spreads = {{0.027, 0.0109},  {0.007, 0.0040},    {0.0296, 0.0107}, {0.12, 0.04},
-                                 {0.165, 0.048},   {0.0062, 0.0035},   {3.5e-5, 2.0e-5}, {6e-4, 3.5e-4},
-                                 {4e-4, 2.3e-4},   {4e-4, 2.3e-4},     {0.0035, 0.0027}, {5e-3, 3.9e-3},
-                                 {3.5e-4, 2.7e-4}, {0.00175, 0.00135}, {1e-4, 0.58e-4},  {3e-4, 1.73e-4}};
+  std::vector<Spread> spreads = {
+      {0.0191, 0.0080},  {0.007, 0.0040},    {0.0256, 0.0094}, {0.12, 0.04},    {0.15, 0.044},      {0.0062, 0.0035},
+      {3e-5, 1.73e-5},   {4.6e-4, 2.66e-4},  {3.1e-4, 1.8e-4}, {3e-4, 1.73e-4}, {0.00227, 0.00176}, {4.2e-3, 3.25e-3},
+      {2.5e-4, 1.94e-4}, {0.00175, 0.00135}, {1e-4, 0.58e-4},  {3e-4, 1.73e-4}, {0.035, 0.0202}};
   constexpr int count = 200;
   for (std::uint64_t seed = 0; seed < count; ++seed) {
     Assignment a = plain();
@@ -635,7 +657,8 @@ TEST(FamilyC, SessionChangesAreBoundedAndAsWideAsStated) {
                                         day.markers_m.norm(),
                                         day.markers_turn_rad.norm(),
                                         day.imu_late_s,
-                                        day.mocap_late_s};
+                                        day.mocap_late_s,
+                                        day.gains[seed % kPilotGains] - 1};
     ASSERT_EQ(values.size(), spreads.size());
     for (std::size_t i = 0; i < values.size(); ++i) {
       spreads[i].rms += values[i] * values[i] / count;
@@ -1190,6 +1213,317 @@ TEST(FamilyC, BenchHasTheSameBytesOnAnyNumberOfThreads) {
   EXPECT_EQ(one[0].header.rig, one[1].header.rig);
 }
 
+TEST(FamilyC, EveryEffectHasALawASourceAndNumbers) {
+  const std::map<std::string, std::vector<double>> at = {{"ground_effect", {0.1}},
+                                                         {"ceiling_effect", {0.1}},
+                                                         {"wall_effect", {0.12}},
+                                                         {"body_drag", {1, 0.5, -0.5}},
+                                                         {"added_mass", {0.5, 200, 100, 1e4, 1e4}},
+                                                         {"rotational_lift", {0.5, 200, 100}},
+                                                         {"wake_capture", {0.003, 250}},
+                                                         {"clap_and_fling", {0.3}},
+                                                         {"wing_flexibility", {0.8, 1}},
+                                                         {"wing_damage", {0.95}},
+                                                         {"wind", {0.5, 1}},
+                                                         {"spring_hardening", {1}},
+                                                         {"gear_backlash", {0.02, 5}},
+                                                         {"coulomb_friction", {100}},
+                                                         {"winding_heating", {5, 1}},
+                                                         {"battery_sag", {5, 0.3}},
+                                                         {"driver_dead_zone", {5, 0.2}},
+                                                         {"driver_bandwidth", {1e-3}},
+                                                         {"command_delay", {3}},
+                                                         {"stop_compliance", {0.1, 20}},
+                                                         {"gyro_bias", {5}},
+                                                         {"accelerometer_misalignment", {1, 2, 3}},
+                                                         {"vibration_rectification", {20, 100}},
+                                                         {"mocap_tilt", {0.2, 0.2, 1}},
+                                                         {"marker_offset", {0.2, 0.1, 1}},
+                                                         {"mocap_delay", {1}},
+                                                         {"tether", {0.3, 0.2, 1}}};
+  const auto family = make_family_c();
+  for (const FamilyEffect& effect : family->effects()) {
+    EXPECT_FALSE(effect.law.empty() || effect.source.empty()) << effect.id;
+    EXPECT_TRUE(effect.numbers.size() >= 2 && effect.numbers.size() <= 5) << effect.id;
+    for (const double number : effect.numbers) EXPECT_GT(number, 0) << effect.id;
+    const auto arguments = at.find(effect.id);
+    if (arguments == at.end()) {
+      EXPECT_TRUE(family->law(effect.id, {}).empty()) << effect.id;
+      continue;
+    }
+    const std::vector<double> once = family->law(effect.id, arguments->second);
+    EXPECT_GT(std::ranges::count_if(once, [](double value) { return value != 0; }), 0) << effect.id;
+    for (const double value : once) EXPECT_TRUE(std::isfinite(value)) << effect.id;
+    EXPECT_EQ(family->law(effect.id, arguments->second), once) << effect.id;
+  }
+}
+
+TEST(FamilyC, LawsOfTheRoomHaveTheirLimits) {
+  const auto law = [](const char* id, double x) { return law_of(id, std::array{x}); };
+  EXPECT_GT(law("ground_effect", 0.03)[0], 0.05);
+  EXPECT_LT(law("ground_effect", 0.14)[0], -0.03);
+  EXPECT_NEAR(law("ground_effect", 0.6)[0], 0, 1e-9);
+  for (double c = 0.02; c < 0.3; c += 0.01) EXPECT_GT(law("ceiling_effect", c)[0], law("ceiling_effect", c + 0.01)[0]);
+  for (double d = 0.09; d < 0.4; d += 0.01) {
+    EXPECT_GT(law("wall_effect", d)[0], law("wall_effect", d + 0.01)[0]);
+    EXPECT_GT(law("wall_effect", d)[1], law("wall_effect", d + 0.01)[1]);
+  }
+  EXPECT_LT(law("wall_effect", 0.4)[1], 2e-3);
+  // no other force is highest where the wing has gone so far
+  EXPECT_NEAR(laws::wake_share(laws::kWakeChords), laws::kWake, 1e-12);
+  EXPECT_EQ(laws::wake_share(0), 0);
+}
+
+TEST(FamilyC, AirsEnergyClosesWithTheVirtualMass) {
+  Build build;
+  build.added_mass = 1.7;
+  Mechanism mechanism(drawn_parameters(nominal(), 3), build);
+  mjModel& m = mechanism.model();
+  mjData& d = const_cast<mjData&>(mechanism.data());
+  Random random(1, "state");
+  const int nv = static_cast<int>(m.nv);
+  Eigen::VectorXd accelerations(nv);
+  for (int trial = 0; trial < 4; ++trial) {
+    for (int i = 0; i < nv; ++i) {
+      d.qvel[i] = (i < 3 ? 1 : i < 6 ? 10 : 200) * random.uniform(-1, 1);
+      accelerations[i] = (i < 3 ? 10 : i < 6 ? 1e3 : 3e4) * random.uniform(-1, 1);
+    }
+    for (int i = 7; i < m.nq; ++i) d.qpos[i] = 0.7 * random.uniform(-1, 1);
+    mj_forward(&m, &d);
+    // the work that the robot does on the air is what its energy gains, by central differences
+    const Eigen::VectorXd q = Eigen::Map<Eigen::VectorXd>(d.qpos, m.nq), v = Eigen::Map<Eigen::VectorXd>(d.qvel, nv);
+    const double power_W = -mechanism.virtual_mass_load(accelerations).dot(v), scale = mechanism.virtual_mass_energy();
+    const double h = 1e-7;
+    std::array<double, 2> energy_J{};
+    for (const int side : {0, 1}) {
+      const double dt = side == 0 ? -h : h;
+      Eigen::Map<Eigen::VectorXd>(d.qpos, m.nq) = q;
+      const Eigen::VectorXd between = v + dt / 2 * accelerations;
+      mj_integratePos(&m, d.qpos, between.data(), dt);
+      Eigen::Map<Eigen::VectorXd>(d.qvel, nv) = v + dt * accelerations;
+      mj_forward(&m, &d);
+      energy_J[static_cast<std::size_t>(side)] = mechanism.virtual_mass_energy();
+    }
+    // truncation is of the order h^2; rounding 1e-16/h of the energy
+    EXPECT_NEAR(power_W, (energy_J[1] - energy_J[0]) / (2 * h), 1e-6 * scale / h * 1e-2 + 1e-6 * std::abs(power_W));
+    EXPECT_GT(std::abs(power_W), 1e-6);
+  }
+  // the numbers that the table states are the engine's
+  build.added_mass = 1;
+  const Mechanism whole(nominal(), build);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const int geom = mj_name2id(&whole.model(), mjOBJ_GEOM, i == 0 ? "left_strip_0" : "left_strip_1");
+    const mjtNum* fluid = whole.model().geom_fluid + mjNFLUID * geom;
+    EXPECT_NEAR(fluid[6] * whole.model().opt.density / kVirtual_kg[i], 1, 1e-3);
+    EXPECT_NEAR(fluid[10] * whole.model().opt.density / kVirtual_kg_m2[i], 1, 1e-3);
+  }
+}
+
+TEST(FamilyC, FlightsHaveTheLawOfTheVirtualMass) {
+  // what a step's coordinates lack to move as without the effect is the law's force at their accelerations
+  Build build;
+  build.added_mass = 1;
+  const RobotParameters f = drawn_parameters(nominal(), 3);
+  Mechanism with_mass(f, build), without(f, {});
+  const int nv = static_cast<int>(without.model().nv);
+  for (Mechanism* one : {&with_mass, &without}) {
+    mjData& d = const_cast<mjData&>(one->data());
+    for (int i = 0; i < nv; ++i) d.qvel[i] = (i < 3 ? 0.5 : i < 6 ? 3.0 : 150.0) * (i % 2 == 0 ? 1 : -0.7);
+    for (int i = 7; i < one->model().nq; ++i) d.qpos[i] = 0.3;
+    mj_forward(&one->model(), &d);
+  }
+  const Mechanism before(f, build);  // the same model, to evaluate the law where the step began
+  mjData& at = const_cast<mjData&>(before.data());
+  std::copy_n(with_mass.data().qpos, before.model().nq, at.qpos);
+  std::copy_n(with_mass.data().qvel, nv, at.qvel);
+  mj_forward(&before.model(), &at);
+  with_mass.step({0, 0}, {0, 0}, {});
+  without.step({0, 0}, {0, 0}, {});
+  const Eigen::VectorXd a = Eigen::Map<const Eigen::VectorXd>(with_mass.data().qacc, nv),
+                        b = Eigen::Map<const Eigen::VectorXd>(without.data().qacc, nv);
+  Eigen::VectorXd lacking(nv);
+  const Eigen::VectorXd apart = a - b;
+  mj_mulM(&without.model(), const_cast<mjData*>(&without.data()), lacking.data(), apart.data());
+  const Eigen::VectorXd constraint = Eigen::Map<const Eigen::VectorXd>(with_mass.data().qfrc_constraint, nv) -
+                                     Eigen::Map<const Eigen::VectorXd>(without.data().qfrc_constraint, nv);
+  const Eigen::VectorXd load = before.virtual_mass_load(a);
+  EXPECT_GT(load.tail(4).norm(), 1e-5);
+  EXPECT_LT((lacking - constraint - load).norm(), 0.02 * load.norm()) << lacking.transpose() << "\n"
+                                                                      << load.transpose();
+}
+
+TEST(FamilyC, EnginesLawsAreTheirClosedForms) {
+  const Side& side = nominal().sides[0];
+  const double rho = nominal().density_kg_m3;
+  const std::vector<double> drag = law_of("body_drag", std::array{2.0, 0.0, 0.0});
+  EXPECT_NEAR(drag[0], -rho / 2 * kBodyDrag_m2 * 4, 1e-3 * -drag[0]);
+  // the part that is odd in the rate of rotation: blade elements of Sane and Dickinson, whose chords are level by sin
+  const auto lift = [](double rate) { return law_of("rotational_lift", std::array{0.5, 200.0, rate})[0]; };
+  const Planform& p = side.planform;
+  const double area_radius = p.r11 * p.length_m * p.length_m * p.chord_m;
+  const double elements = -rho * kRotation * p.chord_m * area_radius * 200 * 100 * std::sin(0.5);
+  EXPECT_NEAR((lift(100) - lift(-100)) / 2, elements, 0.01 * std::abs(elements));
+  // no torque within the play, and none that pushes the wrong way beyond it
+  for (double x = -0.007; x <= 0.007; x += 0.001) EXPECT_EQ(law_of("gear_backlash", std::array{x, 3.0})[0], 0);
+  EXPECT_GT(law_of("gear_backlash", std::array{0.02, 0.0})[0], 0);
+  EXPECT_LT(law_of("gear_backlash", std::array{-0.02, 0.0})[0], 0);
+  EXPECT_GT(law_of("stop_compliance", std::array{0.2, 0.0})[0], law_of("stop_compliance", std::array{0.1, 0.0})[0]);
+  EXPECT_GE(law_of("stop_compliance", std::array{0.1, -150.0})[0], 0) << "a stop never pulls";
+}
+
+TEST(FamilyC, LawsOfTheDriveLoseEnergyAndHaveTheirLimits) {
+  for (double volts = -18; volts <= 18; volts += 3)
+    for (double amps = -1; amps <= 1; amps += 0.05) {
+      EXPECT_GE(laws::bridge_loss_V(volts, amps, Drive::kBattery_V) * amps, 0);
+      const double current = winding_A(volts, 0.7 * volts, 12.4, 1, Drive::kBattery_V);
+      EXPECT_NEAR(12.4 * current + laws::bridge_loss_V(0.7 * volts, current, Drive::kBattery_V), volts, 1e-8);
+    }
+  // two steps of a constant command are one; a small one is a lag, a large one slews
+  const double whole = laws::slewed_V(-3, 9, 1e-3, 1);
+  EXPECT_NEAR(laws::slewed_V(laws::slewed_V(-3, 9, 4e-4, 1), 9, 6e-4, 1), whole, 1e-9);
+  EXPECT_NEAR(laws::slewed_V(0, 1e-3, 1e-3, 1), 1e-3 * (1 - std::exp(-1e-3 / laws::kSlewTime_s)), 1e-8);
+  EXPECT_NEAR(laws::slewed_V(0, 1000, 1e-5, 1), laws::kSlew_V_s * 1e-5, 1e-4);
+  // at a standstill the loss all leaves; a short time heats the mass
+  EXPECT_NEAR(laws::warmed_K(0, 1, laws::kWash_m_s, 1e3), laws::kWinding_K_W + laws::kHousing_K_W / 2, 1e-9);
+  EXPECT_NEAR(laws::warmed_K(0, 1, 0, 1e-3), 1e-3 / laws::kWinding_J_K, 1e-6);
+  for (double t = 0.1; t < 30; t += 1)
+    EXPECT_GT(law_of("battery_sag", std::array{t + 1, 0.3})[0], law_of("battery_sag", std::array{t, 0.3})[0]);
+  // a spring: odd, so it has a potential, and as stiff as two far out
+  const Spring& spring = nominal().sides[0].spring;
+  EXPECT_NEAR(second_spring_Nm(spring, 0.9), -second_spring_Nm(spring, -0.9), 1e-15);
+  EXPECT_NEAR((second_spring_Nm(spring, 1.6) - second_spring_Nm(spring, 1.5)) / 0.1,
+              -laws::kSecondSpring * spring.positive_Nm_rad, 1e-3 * spring.positive_Nm_rad);
+  // a command waits at most a period, and later ones never come sooner
+  double last_s = 0;
+  for (int k = 0; k < 40; ++k) {
+    const double delay_s = law_of("command_delay", std::array{static_cast<double>(k)})[0], at_s = 1e-3 * k + delay_s;
+    EXPECT_GE(delay_s, laws::kDoor_s - 1e-12);
+    EXPECT_LT(delay_s, laws::kDoor_s + laws::kTask_s + 1e-8);
+    EXPECT_GE(at_s, last_s - 1e-12);
+    last_s = at_s;
+  }
+}
+
+TEST(FamilyC, GustsHaveTheirSpectrum) {
+  double power = 0, half = 0;  // integral, and correlation half a pulse apart, by the midpoint rule
+  const double df = 1e-3;
+  for (double f = df / 2; f < 40; f += df) {
+    power += laws::gust_spectrum(f) * df;
+    half += laws::gust_spectrum(f) * std::cos(M_PI * f * laws::kGust_s) * df;
+  }
+  EXPECT_NEAR(power, 1, 1e-3);
+  EXPECT_NEAR(half, 1.0 / 6, 1e-3) << "of two pulses that overlap by a half";
+  Mechanism mechanism(nominal(), {});
+  Air air(nominal(), Magnitudes({{"wind", 1}}), 1, 0);
+  std::vector<double> x;
+  const double step_s = laws::kGust_s / 50;
+  for (int i = 0; i < 100000; ++i) {
+    air.act(mechanism, step_s);
+    x.push_back(mechanism.model().opt.wind[0]);
+  }
+  const double mean = std::accumulate(x.begin(), x.end(), 0.0) / 1e5;
+  double square = 0, apart = 0;
+  for (std::size_t i = 0; i + 25 < x.size(); ++i) {
+    square += (x[i] - mean) * (x[i] - mean) / 1e5;
+    apart += (x[i] - mean) * (x[i + 25] - mean) / 1e5;
+  }
+  // 4000 pulses: the variance is known to 3 %
+  EXPECT_NEAR(std::sqrt(square) / laws::kGust_m_s, 1, 0.05);
+  EXPECT_NEAR(apart / square, 1.0 / 6, 0.05);
+}
+
+TEST(FamilyC, LawsOfSensorsHaveTheirLimits) {
+  EXPECT_EQ(law_of("gyro_bias", std::array{1.5})[0], 0);
+  EXPECT_NEAR(law_of("gyro_bias", std::array{1e3})[0], laws::kGyroWarm_rad_s, 1e-9);
+  // far beyond the knee the mean of |sin| is 2/pi
+  const double large = law_of("vibration_rectification", std::array{6e4, 500.0})[0];
+  EXPECT_NEAR(large / (laws::kRectified * 6e4 * 2 / M_PI), 1, 1e-3);
+  EXPECT_EQ(law_of("vibration_rectification", std::array{0.0, 100.0})[0], 0);
+  // bending is a rotation by its slope, to first order: the change of place over a small step
+  const Eigen::Vector3d way(0.6, 0.8, 0), at(0.3, -0.2, 0.9);
+  const Eigen::Vector3d axis = laws::bend_rad(at.z(), 1) * Eigen::Vector3d::UnitZ().cross(way);
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d step = 1e-6 * Eigen::Vector3d::Unit(i);
+    const Eigen::Vector3d moved = (laws::bent_by(at + step, way, 1) - laws::bent_by(at - step, way, 1)) / 2;
+    const Eigen::Vector3d strain = moved - axis.cross(step);
+    EXPECT_LT(std::abs(strain.x()) + std::abs(strain.y()), 1e-12);
+    if (i < 2) EXPECT_LT(strain.norm(), 1e-12);
+  }
+  const std::vector<double> markers = law_of("marker_offset", std::array{0.0, 0.0, 0.0});
+  EXPECT_NEAR(Eigen::Vector3d(markers.data()).norm(), laws::kStalkSet_m, 1e-12) << "gravity along the stalks";
+  // tether and its potential
+  const Eigen::Vector3d p(0.3, 0.2, 0.8);
+  const auto energy = [](const Eigen::Vector3d& q) {
+    return laws::kWires_N_m / 2 * q.head<2>().squaredNorm() + laws::kWires_kg_m * 9.81 * q.z();
+  };
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d step = 1e-6 * Eigen::Vector3d::Unit(i);
+    const double slope = (energy(p + step) - energy(p - step)) / 2e-6;
+    if (i < 2) EXPECT_NEAR(laws::tether_N(p, 9.81)[i], -slope, 1e-9);
+  }
+}
+
+TEST(FamilyC, WingInertiaIsMirroredAndKeepsItsMoments) {
+  const RobotParameters before = Robot(plain(), 0).parameters(), after = Robot(with("wing_inertia", 1), 0).parameters();
+  std::array<double, 2> farther{}, product{};
+  for (std::size_t side = 0; side < 2; ++side) {
+    const RigidBody &was = before.sides[side].wing, &is = after.sides[side].wing;
+    farther[side] = was.com_m.z() - is.com_m.z();
+    product[side] = is.inertia_kg_m2(1, 2) - was.inertia_kg_m2(1, 2);
+    EXPECT_EQ(Eigen::Vector3d(is.inertia_kg_m2.diagonal()), Eigen::Vector3d(was.inertia_kg_m2.diagonal()));
+    EXPECT_TRUE(is_physical(is.inertia_kg_m2));
+  }
+  EXPECT_NEAR(std::abs(farther[0]), kWingCom_m, 1e-12);
+  EXPECT_NEAR(farther[1], farther[0], 1e-15);
+  EXPECT_NEAR(product[1], -product[0], 1e-20);
+}
+
+TEST(FamilyC, ProductsOfInertiaActInAllAngularAccelerations) {
+  const Contrast contrast = contrast_of(plain(), 0, "inertia_products", 1, {0.3, 0.4});
+  std::array<double, 6> largest{};
+  for (const auto& beat : contrast.change)
+    for (std::size_t i = 0; i < 30; ++i) largest[i / 5] = std::max(largest[i / 5], std::abs(beat[i]));
+  for (std::size_t channel = 3; channel < 6; ++channel) EXPECT_GT(largest[channel], 5) << channel;
+  for (std::size_t channel = 0; channel < 3; ++channel) EXPECT_LT(largest[channel], 2) << channel;
+}
+
+TEST(FamilyC, AProgrammeOfAnotherSessionIsFlownAmongTheNoiseOfThisOne) {
+  Assignment own = busy(1);
+  const flightlog::FlightLog alone = short_log(own, 2);
+  own.programme_of = 1;
+  EXPECT_EQ(short_log(own, 2), alone);
+  Assignment other = busy(1);
+  other.programme_of = 0;
+  for (std::size_t flight = 0; flight < 3; ++flight) {
+    const Programme asked(other, flight, nominal()), that(busy(0), flight, nominal());
+    EXPECT_EQ(asked.start_W(), that.start_W());
+    for (double t = 0; t < 10; t += 0.37) {
+      const Inputs a = asked.excitation(t), b = that.excitation(t);
+      EXPECT_EQ(asked.target(t).position_W, that.target(t).position_W);
+      EXPECT_EQ(asked.target(t).heading_rad, that.target(t).heading_rad);
+      EXPECT_EQ((std::array{a.amplitude_V, a.difference_V, a.bias_V, a.split_cycle}),
+                (std::array{b.amplitude_V, b.difference_V, b.bias_V, b.split_cycle}));
+    }
+  }
+  // the robot and all noise are those of session 1
+  const Robot here(other, 0), there(busy(1), 0);
+  EXPECT_EQ(mjcf_text(here.parameters(), {}, 1e-4), mjcf_text(there.parameters(), {}, 1e-4));
+  EXPECT_EQ(stream_of(other, 2), stream_of(busy(1), 2));
+  EXPECT_NE(short_log(other, 2), short_log(busy(0), 2));
+  const BenchProgramme bench(other, 0, nominal()), first(busy(0), 0, nominal());
+  EXPECT_EQ(bench.inputs(1).amplitude_V, first.inputs(1).amplitude_V);
+}
+
+TEST(FamilyC, ASessionTurnsThePilotsGains) {
+  Assignment a = plain();
+  EXPECT_EQ(Pilot(nominal(), a, 0).gains().turn, Pilot::Gains().turn);
+  a.session = 3;
+  const Pilot::Gains gains = Pilot(nominal(), a, 0).gains(), same = Pilot(nominal(), a, 2).gains();
+  EXPECT_EQ(gains.place_1_s, same.place_1_s) << "once for a session";
+  EXPECT_NE(gains.place_1_s, Pilot::Gains().place_1_s);
+  EXPECT_NEAR(gains.turn_hold.z() / Pilot::Gains().turn_hold.z(), 1, 0.0351);
+}
+
 TEST(FamilyC, RefusesWhatItDoesNotKnow) {
   const auto refusal = [](const auto& call) -> std::string {
     try {
@@ -1209,6 +1543,9 @@ TEST(FamilyC, RefusesWhatItDoesNotKnow) {
   EXPECT_EQ(refusal([&] { family->contrast(plain(), 0, "wind", -1); }),
             "effect wind: magnitude -1 is out of range; accepted: a number from 0 to 4");
   EXPECT_NE(refusal([&] { family->fly(plain(), 3); }).find("flight 3"), std::string::npos);
+  EXPECT_EQ(refusal([&] { family->law("wnid", {}); }),
+            "effect wnid: family C has no such effect; did you mean \"wind\"?");
+  EXPECT_EQ(refusal([&] { family->law("wind", std::array{1.0}); }), "law of wind: 1 arguments; accepted: 2");
   EscapeAssignment rules;
   rules.observation = {"velocty"};
   EXPECT_NE(refusal([&] { escape_of(plain(), 0, rules, 0.1); }).find("did you mean \"velocity\""), std::string::npos);
