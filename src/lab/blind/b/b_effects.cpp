@@ -51,7 +51,7 @@ std::vector<FamilyEffect> table() {
        "numbers: choice",
        {kCeilingFit, kCeilingReach_m}},
       {"wall_effect",
-       "3.7 % of the weight towards the wall and 4 % less lift of a wing whose tip touches it",
+       "3.7 % of the weight towards the wall and 3.4 % less lift of a wing whose tip touches it",
        {"specific_force_y", "specific_force_z", "angular_acceleration_x"},
        {"wall"},
        "pull / weight = p (1 + (s / l)^2)^(-3/2) of the rim's clearance s; lift lost = q exp(-(s / g)^2) of the tip's",
@@ -97,7 +97,7 @@ std::vector<FamilyEffect> table() {
        "p: largest vertical force augmentation of Lehmann, Pick, J. Exp. Biol. 210, 2007; g, a: choice",
        {kClapShare, kClapReach_rad, kClapApproach}},
       {"wing_flexibility",
-       "membrane that bends back by 5.6 deg where the chord is longest, in hover",
+       "membrane that bends back by 6.4 deg where the chord is longest, in hover",
        kStroke,
        {"always", "amplitude"},
        "change of angle = a (c(r) / c_max)^3 load / mean load, which it follows within tau",
@@ -225,8 +225,8 @@ std::vector<FamilyEffect> table() {
        {"accelerometer"},
        {"always", "amplitude"},
        "x = fx + a fy + b fz, y = fy + c fz, z = fz",
-       "triangular model of axes that are not square: IEEE Std 1293; size: choice, within the 2 % of the data sheet "
-       "of InvenSense MPU-6050",
+       "form: Tedaldi, Pretto, Menegatti, A robust and easy to implement method for IMU calibration, ICRA, 2014; size: "
+       "choice, within the cross-axis sensitivity of 2 % of a data sheet, InvenSense MPU-6050",
        {kSkewLevel, kSkewUp}},
       {"vibration_rectification",
        "1.17e-3 s^2/m of the square, after the sensor's low-pass",
@@ -306,7 +306,7 @@ std::vector<FamilyEffect> table() {
        choice,
        {kSaturation, kSaturates_A}},
       {"outside_torn_flap",
-       "a tear in one wing whose flap opens as a valve in one half stroke: 17 % of the load from 0.6 to 0.9 of the "
+       "a tear in one wing whose flap opens as a valve in one half stroke: 13 % of the load from 0.6 to 0.9 of the "
        "span",
        kStroke,
        {"always", "amplitude"},

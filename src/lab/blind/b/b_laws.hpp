@@ -53,6 +53,7 @@
 #include <array>
 #include <cmath>
 #include <deque>
+#include <numbers>
 #include <span>
 #include <string>
 #include <utility>
@@ -75,7 +76,7 @@ inline double ceiling_share(double clearance_m) {
   return 1 / (1 - r * r / kCeilingFit) - 1;
 }
 
-inline constexpr double kWallPull = 0.0365, kWallRing_m = 0.104, kWallLoss = 0.041, kWallFades_m = 0.074;
+inline constexpr double kWallPull = 0.0365, kWallRing_m = 0.104, kWallLoss = 0.034, kWallFades_m = 0.121;
 inline double wall_pull(double clearance_m) {
   const double s = std::max(clearance_m, 0.0) / kWallRing_m;
   return kWallPull * std::pow(1 + s * s, -1.5);
@@ -119,7 +120,7 @@ inline constexpr double kTurningCoefficient = 2.29, kTurningFalls = 0.43;  ///< 
 /// Circulation's coefficient of a turning wing; `reduced`: rotation rate x chord / speed.
 inline double turning_coefficient(double reduced) { return kTurningCoefficient / (1 + reduced / kTurningFalls); }
 
-inline constexpr double kBendHover_rad = 0.097, kBendFollows_s = 0.7e-3, kBendMost = 3;
+inline constexpr double kBendHover_rad = 0.112, kBendFollows_s = 0.7e-3, kBendMost = 3;
 /// Angle where the chord is longest, of the normal load over its mean in hover.
 inline double bend_angle(double load) { return kBendHover_rad * std::clamp(load, -kBendMost, kBendMost); }
 
@@ -252,7 +253,7 @@ inline Eigen::Vector3d rectified(const Eigen::Vector3d& filtered, double m) {
 /// First-order low-pass of the means over steps.
 inline Eigen::Vector3d low_pass(const Eigen::Vector3d& before, const Eigen::Vector3d& now, double bandwidth_hz,
                                 double h) {
-  const double keep = std::exp(-h * 2 * 3.14159265358979323846 * bandwidth_hz);
+  const double keep = std::exp(-h * 2 * std::numbers::pi * bandwidth_hz);
   return keep * before + (1 - keep) * now;
 }
 
@@ -308,10 +309,10 @@ inline constexpr double kWingCom_m = 1.13e-3, kWingProduct_kg_m2 = 5.6e-10;
 inline constexpr double kScrewMass_kg = 0.3e-3, kScrewGap_m = 0.6e-3;
 inline constexpr double kEdgeBend_rad = 0.044, kEdgeFollows_s = 1e-3;  ///< of the tip in hover
 inline constexpr double kCogging_Nm = 7.6e-5, kCoggingSteps = 6;
-inline constexpr double kCreep_rad = 2 * 3.14159265358979323846 / 180, kCreeps_s = 8;
+inline constexpr double kCreep_rad = 2 * std::numbers::pi / 180, kCreeps_s = 8;
 inline constexpr double kSaturation = 0.05, kSaturates_A = 0.5;
 inline constexpr double kAgeing = 0.04, kAges_s = 6, kAgedDamping = 0.03;
-inline constexpr double kFlapShare = 0.17, kFlapFrom = 0.6, kFlapTo = 0.9, kFlapOpens_m_s = 1.1;
+inline constexpr double kFlapShare = 0.13, kFlapFrom = 0.6, kFlapTo = 0.9, kFlapOpens_m_s = 1.1;
 /// A tear lets a flap of the membrane open as a valve where air pushes it from one side: share of the load that is lost.
 inline double flap_share(double normal_m_s) { return kFlapShare * 0.5 * (1 + std::tanh(normal_m_s / kFlapOpens_m_s)); }
 

@@ -129,7 +129,8 @@ void Robot::set_voltages(double h) {
     if (history_.empty() || history_.back().second != wanted_) history_.emplace_back(clock_s_, wanted_);
     const long beat = std::lround(std::floor(clock_s_ * f.flapping_Hz));
     const double then = clock_s_ - command_delay_s(beat, a[kCommandDelay]) + 1e-9;
-    const auto later = std::find_if(history_.rbegin(), history_.rend(), [&](const auto& from) { return from.first <= then; });
+    const auto later =
+        std::find_if(history_.rbegin(), history_.rend(), [&](const auto& from) { return from.first <= then; });
     volts = later == history_.rend() ? std::array<double, 2>{} : later->second;
   }
   for (std::size_t j = 0; j < 2; ++j) {

@@ -14,10 +14,10 @@ SessionChange draw_session(std::uint64_t seed, std::size_t session) {
   Random random(seed, session, Stream::kSession);
   const auto within = [&](double bound) { return random.uniform(-bound, bound); };
   c.warmer_K = within(3);
-  c.pressure = within(0.012);
+  c.pressure = within(0.009);
   c.mass = within(0.004);
-  const double reach = 0.18e-3 * std::sqrt(random.uniform()), way = within(kPi);
-  c.com_m = {reach * std::cos(way), reach * std::sin(way), within(0.15e-3)};
+  const double reach = 0.16e-3 * std::sqrt(random.uniform()), way = within(kPi);
+  c.com_m = {reach * std::cos(way), reach * std::sin(way), within(0.06e-3)};
   c.full_supply = within(0.0035);
   for (std::size_t j = 0; j < 2; ++j) {
     c.brush[j] = within(0.0035);
@@ -25,9 +25,9 @@ SessionChange draw_session(std::uint64_t seed, std::size_t session) {
     c.grease[j] = within(0.05);
     c.rest_angle_rad[j] = within(0.2 * kDegree);
   }
-  c.imu_turn_rad = any_way(random, 0.2 * kDegree);
+  c.imu_turn_rad = any_way(random, 0.15 * kDegree);
   c.marker_turn_rad = any_way(random, 0.1 * kDegree);
-  c.marker_m = any_way(random, 0.35e-3);
+  c.marker_m = any_way(random, 0.18e-3);
   c.mocap_late_s = within(0.4e-3);
   c.imu_late_s = within(0.1e-3);
   c.clamp_turn_rad = any_way(random, 0.1 * kDegree);

@@ -10,16 +10,16 @@ namespace flappy::blind::b {
 /// Changes against session 0; pairs are left and right, shares are relative.
 struct SessionChange {
   double warmer_K = 0;             ///< the heating keeps the room and its motors within 3 K
-  double pressure = 0;             ///< weather: a share of up to 1.2 %
+  double pressure = 0;             ///< weather: a share of up to 0.9 %
   double mass = 0;                 ///< new tape and another cable about the torso: a share of up to 0.4 %
-  Vector3d com_m{0, 0, 0};         ///< play of the battery in its slot: a disc of 0.18 mm, and 0.15 mm up or down
+  Vector3d com_m{0, 0, 0};         ///< play of the battery in its slot: a disc of 0.16 mm, and 0.06 mm up or down
   double full_supply = 0;          ///< where the charger stops: a share of up to 0.35 %
   std::array<double, 2> brush{};   ///< contact of the brushes, a share of up to 0.35 % of the resistance
   std::array<double, 2> wear{};    ///< of bearings and brushes: a share of up to 9 % of the motor's friction
   std::array<double, 2> grease{};  ///< spread anew: a share of up to 5 % of the motor's damping
   std::array<double, 2> rest_angle_rad{};  ///< screws of the hinge tightened again: up to 0.2 deg
-  Vector3d imu_turn_rad{0, 0, 0};          ///< board pressed on its foam again: up to 0.2 deg, any way
-  Vector3d marker_turn_rad{0, 0, 0};       ///< markers glued anew: up to 0.1 deg and 0.35 mm, any way
+  Vector3d imu_turn_rad{0, 0, 0};          ///< board pressed on its foam again: up to 0.15 deg, any way
+  Vector3d marker_turn_rad{0, 0, 0};       ///< markers glued anew: up to 0.1 deg and 0.18 mm, any way
   Vector3d marker_m{0, 0, 0};
   double mocap_late_s = 0;           ///< load of the network: up to 0.4 ms
   double imu_late_s = 0;             ///< where the bus's poll falls after the start of the board: up to 0.1 ms

@@ -106,8 +106,6 @@ class Plant {
   /// Moments (stroke axis, rotation axis) of the added mass of air on a wing of a torso that rests.
   std::array<double, 2> added_moments(std::size_t side, const State& x, double stroke_rad_s2,
                                       double rotation_rad_s2) const;
-  /// Factor on the forces of a wing by nearby surfaces.
-  double near_gain(const Vector3d& shoulder_W, const Vector3d& tip_W, const Surroundings& room) const;
   /// Kinetic energy plus potential energy of springs and weight.
   double energy_J(const State& x, const Surroundings& room) const;
   /// Linear and angular momentum about the origin of W, in W.
@@ -128,6 +126,7 @@ class Plant {
   double stroke_torque(const State& x, std::size_t side, double current_A, const Slow& slow, State& rate) const;
   double spring_torque(std::size_t side, const State& x, double stiffness) const;
   double spring_energy(std::size_t side, const State& x) const;
+  double near_gain(const Vector3d& shoulder_W, const Vector3d& tip_W, const Surroundings& room) const;
   Wrench on_torso(const State& x, const Matrix3d& R, const Slow& slow, const Surroundings& room) const;
 
   RobotParameters f_;
