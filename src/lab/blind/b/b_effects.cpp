@@ -35,7 +35,7 @@ std::vector<FamilyEffect> table() {
   const Eigen::Matrix3d& added = nominal.wing(0).added();
   return {
       {"ground_effect",
-       "10 % more force of the wings at the ground, 5 % at 0.09 m",
+       "14 % more force of the wings at the ground, 6 % at 0.09 m",
        kLift,
        {"height"},
        "share added = (1 + s (2R)^2 / (h^2 + h0^2))^(2/3) - 1 at constant power",

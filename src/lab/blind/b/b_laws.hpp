@@ -64,7 +64,7 @@ namespace flappy::blind::b {
 inline double smooth_sign(double x, double over) { return std::tanh(x / over); }
 
 // Surfaces and air
-inline constexpr double kSpan_m = 0.168, kGroundShare = 0.0374, kGroundReach_m = 0.081;
+inline constexpr double kSpan_m = 0.168, kGroundShare = 0.0374, kGroundReach_m = 0.067;
 inline double ground_share(double height_m) {
   const double h = std::max(height_m, 0.0);
   return std::pow(1 + kGroundShare * kSpan_m * kSpan_m / (h * h + kGroundReach_m * kGroundReach_m), 2.0 / 3) - 1;

@@ -48,8 +48,8 @@ void change(const SessionChange& by, RobotParameters& robot, SensorTruth& sensor
   robot.full_supply *= 1 + by.full_supply;
   for (std::size_t j = 0; j < 2; ++j) {
     Motor& motor = robot.side[j].motor;
-    motor.resistance_ohm *= (1 + 0.00393 * by.warmer_K) * (1 + by.brush[j]);
-    motor.torque_constant_Nm_A *= 1 - 0.002 * by.warmer_K;
+    motor.resistance_ohm *= (1 + kCopper_K * by.warmer_K) * (1 + by.brush[j]);
+    motor.torque_constant_Nm_A *= 1 - kMagnet_K * by.warmer_K;
     motor.friction_Nm *= 1 + by.wear[j];
     motor.damping_Nm_s *= (1 - 0.02 * by.warmer_K) * (1 + by.grease[j]);
     robot.side[j].rest_angle_rad += by.rest_angle_rad[j];

@@ -1,6 +1,6 @@
 // Another session is another day: weather, heating, and what hands did to the robot in between. Each change is bounded
 // below the effect like it at magnitude 0.2, and the header declares none. One temperature drives density (as an ideal
-// gas), windings (copper, 0.393 %/K), magnets (-0.2 %/K) and grease (-2 %/K).
+// gas), windings (copper, 0.393 %/K), magnets (-0.117 %/K) and grease (-2 %/K). Somebody also tunes the pilot's gains.
 #pragma once
 
 #include "lab/blind/b/b_sensors.hpp"
