@@ -31,59 +31,8 @@ void refute(const Evidence& evidence, const Flights& flights, double min_share, 
   }
 }
 
-}  // namespace
-
-void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule) {
-  const VectorXd mean = fit.mean();
-  Eigen::MatrixXd& covariance = fit.posterior.covariance;
-  for (Eigen::Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
-    covariance.row(i) *= rule.interval.sd_factor;
-    covariance.col(i) *= rule.interval.sd_factor;
-    if (hypothesis.unknowns()[static_cast<std::size_t>(i)].magnitude)
-      covariance(i, i) += std::pow(rule.interval.magnitude_error * mean[i], 2);
-  }
-}
-
-double beyond_chance(const ScoredHypothesis& a, const std::vector<ScoredHypothesis>& all, const VerdictRule& rule) {
-  const auto parameters = std::ranges::find(all, HypothesisKind::parameters, &ScoredHypothesis::kind);
-  const double baseline = parameters == all.end() ? 0 : parameters->explained();
-  /// Largest gain of fewer effects, or of the same without a remainder.
-  const auto gain_of_part = [&](std::size_t effects) {
-    double most = 0;
-    for (const ScoredHypothesis& b : all)
-      if (b.kind == HypothesisKind::effect && !b.has_remainder() && b.effects.size() == effects &&
-          std::ranges::all_of(b.effects, [&](const std::string& e) { return std::ranges::count(a.effects, e) > 0; }))
-        most = std::max(most, b.explained() - baseline);
-    return most;
-  };
-  const double gain = a.explained() - baseline;
-  const bool unknown = a.kind == HypothesisKind::unknown || a.has_remainder();
-  double chance = unknown ? rule.gain.by_chance_nats : 0;
-  for (const std::string& e : a.effects) chance += rule.gain.chance_of(e);
-  for (std::size_t n = 1; n < a.effects.size(); ++n) chance += rule.gain.further_share * gain_of_part(n);
-  if (!a.effects.empty() && a.has_remainder()) chance += rule.gain.remainder_share * gain_of_part(a.effects.size());
-  return a.log_prior + baseline + std::max(gain - chance, std::min(gain, 0.0));
-}
-
-double tempered(double nats, const VerdictRule& rule) {
-  return std::exp(-rule.tempering.freedom / 2 * std::log1p(2 * nats / (rule.tempering.nats * rule.tempering.freedom)));
-}
-
-void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictRule& rule) {
-  std::vector<double> explained;
-  for (const ScoredHypothesis& a : hypotheses) explained.push_back(beyond_chance(a, hypotheses, rule) - a.log_prior);
-  const double most = explained.empty() ? 0 : *std::ranges::max_element(explained);
-  double sum = 0;
-  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
-    ScoredHypothesis& a = hypotheses[i];
-    a.probability = std::exp(a.log_prior) * tempered(most - explained[i], rule);
-    sum += a.probability;
-  }
-  for (ScoredHypothesis& a : hypotheses) a.probability /= sum;
-  std::ranges::stable_sort(hypotheses, std::greater{}, &ScoredHypothesis::probability);
-}
-
-void conclude(const VerdictRule& rule, const PoolOf& pool_of_each, Inference& d) {
+/// With the probability by evidence and priors.
+void conclude_by_evidence(const VerdictRule& rule, const PoolOf& pool_of_each, Inference& d) {
   struct Pool {
     double probability = 0;
     std::size_t best = 0;
@@ -138,6 +87,63 @@ void conclude(const VerdictRule& rule, const PoolOf& pool_of_each, Inference& d)
     for (const std::string& e : a.effects)
       if (!std::ranges::count(d.verdict.effects, e)) d.verdict.effects.push_back(e);
   }
+}
+
+}  // namespace
+
+void widen(Fit& fit, const Hypothesis& hypothesis, const VerdictRule& rule) {
+  const VectorXd mean = fit.mean();
+  Eigen::MatrixXd& covariance = fit.posterior.covariance;
+  for (Eigen::Index i = hypothesis.shared(); i < hypothesis.size(); ++i) {
+    covariance.row(i) *= rule.interval.sd_factor;
+    covariance.col(i) *= rule.interval.sd_factor;
+    if (hypothesis.unknowns()[static_cast<std::size_t>(i)].magnitude)
+      covariance(i, i) += std::pow(rule.interval.magnitude_error * mean[i], 2);
+  }
+}
+
+double beyond_chance(const ScoredHypothesis& a, const std::vector<ScoredHypothesis>& all, const VerdictRule& rule) {
+  const auto parameters = std::ranges::find(all, HypothesisKind::parameters, &ScoredHypothesis::kind);
+  const double baseline = parameters == all.end() ? 0 : parameters->explained();
+  /// Largest gain of fewer effects, or of the same without a remainder.
+  const auto gain_of_part = [&](std::size_t effects) {
+    double most = 0;
+    for (const ScoredHypothesis& b : all)
+      if (b.kind == HypothesisKind::effect && !b.has_remainder() && b.effects.size() == effects &&
+          std::ranges::all_of(b.effects, [&](const std::string& e) { return std::ranges::count(a.effects, e) > 0; }))
+        most = std::max(most, b.explained() - baseline);
+    return most;
+  };
+  const double gain = a.explained() - baseline;
+  const bool unknown = a.kind == HypothesisKind::unknown || a.has_remainder();
+  double chance = unknown ? rule.gain.by_chance_nats : 0;
+  for (const std::string& e : a.effects) chance += rule.gain.chance_of(e);
+  for (std::size_t n = 1; n < a.effects.size(); ++n) chance += rule.gain.further_share * gain_of_part(n);
+  if (!a.effects.empty() && a.has_remainder()) chance += rule.gain.remainder_share * gain_of_part(a.effects.size());
+  return a.log_prior + baseline + std::max(gain - chance, std::min(gain, 0.0));
+}
+
+double tempered(double nats, const VerdictRule& rule) {
+  return std::exp(-rule.tempering.freedom / 2 * std::log1p(2 * nats / (rule.tempering.nats * rule.tempering.freedom)));
+}
+
+void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictRule& rule) {
+  std::vector<double> explained;
+  for (const ScoredHypothesis& a : hypotheses) explained.push_back(beyond_chance(a, hypotheses, rule) - a.log_prior);
+  const double most = explained.empty() ? 0 : *std::ranges::max_element(explained);
+  double sum = 0;
+  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+    ScoredHypothesis& a = hypotheses[i];
+    a.probability = std::exp(a.log_prior) * tempered(most - explained[i], rule);
+    sum += a.probability;
+  }
+  for (ScoredHypothesis& a : hypotheses) a.probability /= sum;
+  std::ranges::stable_sort(hypotheses, std::greater{}, &ScoredHypothesis::probability);
+}
+
+void conclude(const VerdictRule& rule, const PoolOf& pool, Inference& d) {
+  conclude_by_evidence(rule, pool, d);
+  d.verdict.probability = rule.said(d.verdict.probability);
 }
 
 void decide(const Question& question, const RobotFit& robot, const Fitter& fitter, const Flights& flights,

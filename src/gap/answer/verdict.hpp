@@ -30,7 +30,7 @@ void set_probabilities(std::vector<ScoredHypothesis>& hypotheses, const VerdictR
 /// Name of the pool of a hypothesis; that of a hypothesis without effects begins with "/".
 using PoolOf = std::function<std::string(const ScoredHypothesis&)>;
 
-/// Sets d.verdict and d.concluded. Hypotheses with effects of the same groups (EffectInfo::group) form a pool, as short
+/// Sets d.verdict, whose probability is what the rule says of it (VerdictRule::Said), and d.concluded. Hypotheses with effects of the same groups (EffectInfo::group) form a pool, as short
 /// flights often cannot tell them apart. The verdict names the most probable hypothesis of the most probable pool if
 /// that hypothesis' share of the whole probability, or of the pool's, is large enough (`naming` of the rule); else the
 /// verdict is `group`. `pool`: Question::pool.

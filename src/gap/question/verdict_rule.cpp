@@ -10,7 +10,7 @@ namespace flappy::gap {
 namespace {
 
 VerdictRule rule_of(const io::Config& config) {
-  constexpr io::Range kPositive = io::positive(), kNats = io::non_negative(), kShare{0, 1};
+  constexpr io::Range kPositive = io::positive(), kNats = io::non_negative(), kShare{0, 1}, kOffset{-10, 10};
   const io::Table root = config.root();
   root.schema(1);
   VerdictRule r{};
@@ -51,11 +51,18 @@ VerdictRule rule_of(const io::Config& config) {
   const io::Table naming = root.table("naming");
   r.naming = {naming.number("of_all", kShare), naming.number("of_pool", kShare),
               naming.number("member_of_pool", kShare), naming.number_or("least", 0, kShare)};
+  if (const auto said = root.optional_table("said"))
+    r.said = {said->number("slope", kPositive), said->number("offset", kOffset)};
   root.finish();
   return r;
 }
 
 }  // namespace
+
+double VerdictRule::Said::operator()(double probability) const {
+  if (probability <= 0 || probability >= 1) return probability;
+  return 1 / (1 + std::exp(-slope * std::log(probability / (1 - probability)) - offset));
+}
 
 VerdictRule read_verdict_rule(const std::filesystem::path& path) { return rule_of(io::Config::load(path)); }
 

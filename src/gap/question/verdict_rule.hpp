@@ -46,6 +46,12 @@ struct VerdictRule {
     /// Effects are named if the probabilities of all hypotheses that contain their groups add up to at least this.
     double least;
   } naming{};
+  /// What a verdict of probability p says: 1 / (1 + exp(-(slope logit(p) + offset))). Learnt from robots with known
+  /// faults, so that of verdicts that say it this share is right (Platt 1999).
+  struct Said {
+    double slope = 1, offset = 0;
+    double operator()(double probability) const;
+  } said{};
 };
 
 /// io::InputError with file and line.

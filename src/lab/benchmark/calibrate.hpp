@@ -7,7 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "gap/question/verdict_rule.hpp"
 #include "io/installation.hpp"
+#include "lab/benchmark/score_statistics.hpp"
 
 namespace flappy::benchmark {
 
@@ -19,5 +21,8 @@ struct CalibrateCommand {
 
 /// Writes the verdict file to `out`, and prints new and old values. InputError if a folder was not scored.
 nlohmann::ordered_json calibrate(const CalibrateCommand& command);
+
+/// By logistic regression of whether claims are right (Platt 1999), with Newton's method; without claims, what the evidence says.
+gap::VerdictRule::Said learn_said(const std::vector<Claim>& claims, const std::vector<double>& weights);
 
 }  // namespace flappy::benchmark

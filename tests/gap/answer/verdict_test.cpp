@@ -136,6 +136,21 @@ TEST(Verdict, PoolsWhatIsHarmlessInAContrast) {
   EXPECT_DOUBLE_EQ(d.verdict.probability, 0.45);
 }
 
+TEST(Verdict, SaysAProbabilityThatRobotsWithKnownFaultsTaught) {
+  VerdictRule rule = read_verdict_rule();
+  rule.said = {0.5, 0};
+  Inference d;
+  d.hypotheses = {hypothesis(0.9, {"wind"}), hypothesis(0.1, HypothesisKind::parameters)};
+  gap::conclude(rule, pool_in_contrast, d);
+  EXPECT_NEAR(d.verdict.probability, 0.75, 1e-12) << "the odds of 9 become 3";
+  rule.said = {1, std::log(2.0)};
+  gap::conclude(rule, pool_in_contrast, d);
+  EXPECT_NEAR(d.verdict.probability, 18.0 / 19, 1e-12) << "odds are doubled";
+  EXPECT_DOUBLE_EQ(d.hypotheses[0].probability, 0.9) << "evidence stays";
+  EXPECT_EQ(rule.said(0), 0);
+  EXPECT_EQ(rule.said(1), 1);
+}
+
 TEST(Verdict, NamesOfAContrastWhatIsMoreProbableThanNot) {
   VerdictRule rule = read_verdict_rule();
   rule.naming.least = 0.5;

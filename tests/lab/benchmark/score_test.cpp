@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "lab/benchmark/calibrate.hpp"
 #include "lab/benchmark/change_over_sessions.hpp"
 #include "lab/benchmark/predict/rivals.hpp"
 
@@ -394,6 +395,28 @@ TEST(Rivals, HotellingsStrengthIsUniformWhereNothingChanged) {
   EXPECT_NEAR(beyond / 2000.0, 0.1, 0.025);
   EXPECT_GT(hotelling_strength(draw(0), draw(100)), 0.9);
   EXPECT_EQ(hotelling_strength(draw(0), draw(100).topRows(2)), 0) << "five flights say nothing of four inputs";
+}
+
+TEST(Calibrate, LearnsWhatAVerdictShouldSay) {
+  // 4,000 verdicts that are right as often as half of the logit, less 0.3, says: standard errors of 0.03 and 0.06
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform;
+  const gap::VerdictRule::Said truth{0.5, -0.3};
+  std::vector<Claim> claims;
+  for (int i = 0; i < 4000; ++i) {
+    const double p = 0.3 + 0.69 * uniform(random);
+    claims.push_back({p, uniform(random) < truth(p)});
+  }
+  const auto found = learn_said(claims, std::vector<double>(claims.size(), 1));
+  EXPECT_NEAR(found.slope, truth.slope, 0.12);
+  EXPECT_NEAR(found.offset, truth.offset, 0.2);
+  const auto nothing = learn_said({}, {});
+  EXPECT_DOUBLE_EQ(nothing.slope, 1);
+  EXPECT_DOUBLE_EQ(nothing.offset, 0);
+  // confident verdicts that are all wrong are believed less, but more evidence never says less
+  const auto wrong = learn_said(std::vector<Claim>(50, {0.99, false}), std::vector<double>(50, 1));
+  EXPECT_LT(wrong(0.99), 0.5);
+  EXPECT_GT(wrong.slope, 0);
 }
 
 TEST(Score, ARivalIsComparedAtTheSameShareOfFalseAlarms) {
