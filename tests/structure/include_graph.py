@@ -64,7 +64,7 @@ ROOMS = {
 # with what they are a test of, only plain data, the log, and family a what flies.
 ONLY = {
     "lab/blind": {"flightlog/flight_log.hpp"},
-    "lab/blind/a": {"lab/blind/family.hpp", "flightlog/flight_log.hpp", "flight/pid.hpp", "flight/episode.hpp", "flight/excitation.hpp", "model/wing_beat.hpp", "sim/randomise.hpp",
+    "lab/blind/a": {"lab/blind/family.hpp", "flightlog/flight_log.hpp", "flight/episode.hpp", "sim/randomise.hpp",
               "flappy/vehicle.hpp", "flappy/vehicle_file.hpp"},
     "lab/blind/b": {"lab/blind/family.hpp", "flightlog/flight_log.hpp"},
     "lab/blind/c": {"lab/blind/family.hpp", "flightlog/flight_log.hpp"},

@@ -9,6 +9,15 @@ constexpr double kHeight_m = 1;  ///< added to the task's heights, to be far fro
 
 model::Vec3<double> vec3(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
+flight::Estimate<double> estimate(const Torso& t) {
+  flight::Estimate<double> e{};
+  e.position_m = vec3(t.position_m);
+  e.attitude = {t.attitude.w(), t.attitude.x(), t.attitude.y(), t.attitude.z()};
+  e.velocity_m_s = vec3(t.velocity_m_s);
+  e.body_rate_rad_s = vec3(t.rate_rad_s);
+  return e;
+}
+
 flight::Setpoint<double> hold(const Vector3d& position_m, double heading_rad) {
   const SinCos heading = sin_cos(heading_rad);
   flight::Setpoint<double> s{};
@@ -18,7 +27,7 @@ flight::Setpoint<double> hold(const Vector3d& position_m, double heading_rad) {
 }
 
 Waypoint start_of(const flight::StartRange& range, std::uint64_t seed, std::uint64_t number) {
-  Random random(seed, 100 * number + 171);
+  Random random(seed, Purpose::escape_start, number);
   const auto draw = [&](const flight::Spread& s) { return s.centre + s.half * (2 * random.uniform() - 1); };
   Waypoint w;
   for (int i = 0; i < 3; ++i) w.position_m[i] = draw(range.position_m[i]);
@@ -42,7 +51,7 @@ class Escaper {
   }
 
   Inputs steer(double t_s, double beat, const Torso& torso) {
-    const flight::Estimate<double> seen = view_.see(torso);
+    const flight::Estimate<double> seen = estimate(view_.see(torso));
     const bool begun = t_s > -kControl_s / 2;
     if (begun && tick_ > 0) note_outcome(torso, seen, t_s);
     const flight::Pid<double> before = pid_;
@@ -85,11 +94,7 @@ class Escaper {
   /// Judges on the true state, except the hand-back, which the task may base on the estimate.
   void note_outcome(const Torso& torso, const flight::Estimate<double>& seen, double t_s) {
     const flight::TaskConstants<double>& k = rules_.constants;
-    flight::Estimate<double> truth{};
-    truth.position_m = vec3(torso.position_m);
-    truth.attitude = {torso.attitude.w(), torso.attitude.x(), torso.attitude.y(), torso.attitude.z()};
-    truth.velocity_m_s = vec3(torso.velocity_m_s);
-    truth.body_rate_rad_s = vec3(torso.rate_rad_s);
+    const flight::Estimate<double> truth = estimate(torso);
     const auto score = flight::score_of(truth, goal_);
     const auto& by = k.hand_back.on_estimate > 0 ? seen : truth;
     const bool done = flight::arrived(k.hand_back, flight::score_of(by, goal_), by.body_rate_rad_s, t_s) != 0;

@@ -28,9 +28,9 @@ Robot::Robot(const model::Vehicle& v, const Room& room, const Magnitudes& magnit
       step_s_(step_s),
       density_kg_m3_(v.air_density_kg_m3),
       slow_steps_(std::max(1, static_cast<int>(std::lround(1e-3 / step_s)))),
-      gust_random_(seed, 100 * flight + 101),
-      delay_random_(seed, 100 * flight + 102),
-      brush_random_(seed, 100 * flight + 103) {
+      gust_random_(seed, Purpose::gusts, flight),
+      delay_random_(seed, Purpose::delays, flight),
+      brush_random_(seed, Purpose::brushes, flight) {
   const auto body = [](const model::RigidBody& b) {
     Body to{b.mass_kg, vector(b.com_m), Matrix3d::Zero()};
     const auto& i = b.inertia_kg_m2;
@@ -39,24 +39,23 @@ Robot::Robot(const model::Vehicle& v, const Room& room, const Magnitudes& magnit
   };
   torso_ = body(v.torso);
   if (const double magnitude = magnitudes[Effect::com_offset]; magnitude > 0) {
-    // a battery of 2 g is displaced so far that the torso's centre of mass moves by 1 mm
-    Random random(seed, 10);
-    constexpr double kPart_kg = 2e-3;
-    const Vector3d moved = random.level() * (1e-3 * magnitude * torso_.mass_kg / kPart_kg);
-    const Vector3d shift = kPart_kg / torso_.mass_kg * moved;
-    torso_.inertia_kg_m2 += kPart_kg * point_inertia(moved) - torso_.mass_kg * point_inertia(shift);
+    // the battery lies beside its place
+    Random random(seed, Purpose::com_offset);
+    const Vector3d moved = magnitude * laws::kBatteryMoved_m * random.level();
+    const Vector3d shift = laws::kBattery_kg / torso_.mass_kg * moved;
+    torso_.inertia_kg_m2 += laws::kBattery_kg * point_inertia(moved) - torso_.mass_kg * point_inertia(shift);
     torso_.com_m += shift;
   }
   if (const double magnitude = magnitudes[Effect::inertia_products]; magnitude > 0) {
-    Random random(seed, 11);
+    Random random(seed, Purpose::inertia_products);
     Matrix3d& i = torso_.inertia_kg_m2;
     for (int a = 0; a < 3; ++a)
       for (int b = a + 1; b < 3; ++b) {
-        const double product = 0.05 * magnitude * random.sign() * std::sqrt(i(a, a) * i(b, b));
+        const double product = laws::kProducts[a + b - 1] * magnitude * random.sign() * std::sqrt(i(a, a) * i(b, b));
         i(a, b) += product, i(b, a) += product;
       }
   }
-  const bool left_damaged = (Random(seed, 13).uniform() < 0.5) != swapped_wings;
+  const bool left_damaged = (Random(seed, Purpose::damaged_side).uniform() < 0.5) != swapped_wings;
   for (const std::size_t s : {0u, 1u}) {
     const model::Side& from = s == 0 ? v.left : v.right;
     side_[s].leading_edge = body(from.leading_edge);
@@ -66,13 +65,13 @@ Robot::Robot(const model::Vehicle& v, const Room& room, const Magnitudes& magnit
   mass_kg_ = torso_.mass_kg;
   for (const Side& s : side_) mass_kg_ += s.leading_edge.mass_kg + s.wing.mass_kg;
 
-  Random random(seed, 12);
+  Random random(seed, Purpose::directions);
   wind_direction_ = random.level();
   magnet_ = random.level();
   front_ = random.level();
   shedding_axis_ = random.level();
-  shedding_Hz_ = random.between(3, 6);
-  field_ = (random.level() + Vector3d(0, 0, -1.5)).normalized();
+  shedding_Hz_ = random.between(laws::kSheddingLow_Hz, laws::kSheddingHigh_Hz);
+  field_ = (random.level() + Vector3d(0, 0, -laws::kDip)).normalized();
 }
 
 void Robot::build_side(const model::Side& from, std::size_t s, bool damaged) {
@@ -85,51 +84,44 @@ void Robot::build_side(const model::Side& from, std::size_t s, bool damaged) {
   to.stroke = from.stroke;
   to.rotation = from.rotation;
   to.strips = cut_into_strips(from.planform);
-  to.kept.fill(1);
   if (damaged) damage(to);
   if (const double magnitude = magnitudes_[Effect::wing_inertia]; magnitude > 0) {
     Matrix3d& i = to.wing.inertia_kg_m2;
-    i(0, 0) *= 1 + 0.1 * magnitude;
-    i(2, 2) *= 1 + 0.1 * magnitude;
-    const double product = 0.08 * magnitude * to.sign * std::sqrt(i(1, 1) * i(2, 2));
+    i(0, 0) *= 1 + laws::kWingMoments * magnitude;
+    i(2, 2) *= 1 + laws::kWingMoments * magnitude;
+    const double product = laws::kWingProduct * magnitude * to.sign * std::sqrt(i(1, 1) * i(2, 2));
     i(1, 2) += product, i(2, 1) += product;
-    to.wing.com_m.z() *= 1 + 0.1 * magnitude;
+    to.wing.com_m.z() *= 1 + laws::kWingCentre * magnitude;
   }
-  to.fourth_m5 = 0;
-  for (std::size_t i = 0; i < kStrips; ++i) {
-    const double c2 = to.strips.chord_m[i] * to.strips.chord_m[i];
-    to.fourth_m5 += to.kept[i] * c2 * c2 * to.strips.width_m;
-  }
+  to.twist = laws::twist_shape(to.strips);
   const auto about = [](const Body& b, int axis) {
     return b.inertia_kg_m2(axis, axis) + b.mass_kg * (b.com_m.squaredNorm() - b.com_m(axis) * b.com_m(axis));
   };
-  const auto stop = [](const model::Joint& joint, double inertia, double softness_rad_Nm, double ratio) {
-    const double hard = inertia * kStopFrequency_rad_s * kStopFrequency_rad_s;
-    const double stiffness = 1 / (1 / hard + softness_rad_Nm);
-    return Stop{joint.lower_rad, joint.upper_rad, stiffness, 2 * ratio * std::sqrt(stiffness * inertia),
-                softness_rad_Nm > 0 ? 6.0 : 0.0};
+  const auto stop = [](const model::Joint& joint, double inertia, double softness) {
+    const double stiffness = inertia * kStopFrequency_rad_s * kStopFrequency_rad_s;
+    return Stop{joint.lower_rad, joint.upper_rad, softness, {stiffness, 2 * std::sqrt(stiffness * inertia)}};
   };
-  const double magnitude = magnitudes_[Effect::stop_compliance];
-  to.rotation_stop = stop(to.rotation, about(to.wing, 1), magnitude / 0.12, 1 / (1 + 2 * magnitude));
-  to.stroke_stop = stop(to.stroke, about(to.wing, 2) + about(to.leading_edge, 2), 0, 1);
+  to.rotation_stop = stop(to.rotation, about(to.wing, 1), magnitudes_[Effect::stop_compliance]);
+  to.stroke_stop = stop(to.stroke, about(to.wing, 2) + about(to.leading_edge, 2), 0);
 }
 
-/// At magnitude 1: 5 % of its area at the tip, and two thirds of this share of its mass.
+Stop Robot::rotation_stop(std::size_t side) const { return side_[side].rotation_stop; }
+
+/// The trailing edge wears; its membrane's mass goes with it.
 void Robot::damage(Side& s) {
   const double magnitude = magnitudes_[Effect::wing_damage];
   if (!(magnitude > 0)) return;
-  double area = 0;
-  for (const double c : s.strips.chord_m) area += c;
-  double to_lose = 0.05 * magnitude * area, lever = 0;
-  const double lost_kg = s.wing.mass_kg * 0.67 * 0.05 * magnitude;
-  for (std::size_t i = kStrips; i-- > 0 && to_lose > 0;) {
-    const double lost = std::min(to_lose, s.strips.chord_m[i]);
-    s.kept[i] = 1 - lost / s.strips.chord_m[i];
-    lever += lost * s.strips.r_m[i] / (0.05 * magnitude * area);
-    to_lose -= lost;
+  double area_m2 = 0, lost_m2 = 0;
+  Vector3d at = Vector3d::Zero();
+  for (std::size_t i = 0; i < kStrips; ++i) {
+    double& c = s.strips.chord_m[i];
+    const double lost = c * laws::wear(magnitude, s.strips.r_m[i] / s.planform.wing_length_m);
+    area_m2 += c, lost_m2 += lost;
+    at += lost * Vector3d(0, s.sign * s.strips.r_m[i], -(c - lost / 2));
+    c -= lost;
   }
-  const Vector3d at(0, s.sign * lever, -0.4 * s.strips.chord_m[kStrips - 1]);
-  const double rest_kg = s.wing.mass_kg - lost_kg;
+  at /= lost_m2;
+  const double lost_kg = s.wing.mass_kg * laws::kMembrane * lost_m2 / area_m2, rest_kg = s.wing.mass_kg - lost_kg;
   const Vector3d com = (s.wing.mass_kg * s.wing.com_m - lost_kg * at) / rest_kg;
   s.wing.inertia_kg_m2 -= lost_kg * point_inertia(at - s.wing.com_m) + rest_kg * point_inertia(com - s.wing.com_m);
   s.wing.mass_kg = rest_kg;
@@ -214,11 +206,11 @@ void Robot::add_stop(int joint, const Stop& stop, double angle, double rate) {
                         : angle < stop.lower_rad ? angle - stop.lower_rad
                                                  : 0;
   if (beyond == 0) return;
-  const double k = stop.stiffness_Nm_rad * (1 + stop.hardening_1_rad * std::abs(beyond));
-  const double torque = k * (beyond + step_s_ * rate) + stop.damping_Nm_s * rate;
+  const laws::StopForce f = laws::stop(stop.softness, beyond, stop.hard);
+  const double torque = f.stiffness_Nm_rad * (beyond + step_s_ * rate) + f.damping_Nm_s * rate;
   if (torque * beyond <= 0) return;
   rhs_(joint) -= torque;
-  mass_matrix_(joint, joint) += step_s_ * (stop.damping_Nm_s + step_s_ * k);
+  mass_matrix_(joint, joint) += step_s_ * (f.damping_Nm_s + step_s_ * f.stiffness_Nm_rad);
 }
 
 void Robot::add_joints() {
@@ -233,12 +225,9 @@ void Robot::add_joints() {
         s.rotation.damping_Nm_s * q.rotation_rad_s + s.rotation.friction_Nm * hyperbolic_tangent(q.rotation_rad_s);
     const double stretch = q.stroke_rad - s.spring.rest_angle_rad;
     const double stiffness = stretch > 0 ? s.spring.stiffness_positive_Nm_rad : s.spring.stiffness_negative_Nm_rad;
-    double hardened = 1;
-    if (const double magnitude = magnitudes_[Effect::spring_hardening]; magnitude > 0) {
-      const double a = std::abs(stretch);  // 4 % over a beat; the powers differ from those of a cubic spring
-      hardened += magnitude * (0.045 * a + 0.05 * a * a * a);
-    }
-    rhs_(stroke) -= stiffness * stretch * hardened;
+    rhs_(stroke) -= stiffness * stretch;
+    if (const double magnitude = magnitudes_[Effect::spring_hardening]; magnitude > 0)
+      rhs_(stroke) -= magnitude * laws::leaf_added(stiffness, stretch);
     add_stop(stroke, s.stroke_stop, q.stroke_rad, q.stroke_rad_s);
     add_stop(rotation, s.rotation_stop, q.rotation_rad, q.rotation_rad_s);
   }

@@ -1,7 +1,6 @@
 // The blind robot: a second simulator of the vehicle that replaces the real robot in tests of a diagnosis: five rigid
-// bodies (torso; on each side leading edge and wing), ten degrees of freedom. Written from published parameters. The
-// simulator under test has the same force law of the wing (air.cpp). Unknowns x of a step, in B: accelerations of torso
-// and joints:
+// bodies (torso; on each side leading edge and wing), ten degrees of freedom. Written from published parameters, with a
+// force law of the wing of its own (a_air.cpp). Unknowns x of a step, in B: accelerations of torso and joints:
 //   sum of J^T (m, I) J  x = forces - J^T (forces that the bodies need at x = 0)      J: Jacobian of a body's motion
 // Wings are strips (planform.hpp). Semi-implicit Euler, 20 us; only the wings' stops are stiff at this step, and
 // implicit.
@@ -11,14 +10,17 @@
 #include <deque>
 #include <vector>
 
+#include "flappy/vehicle.hpp"
 #include "lab/blind/a/a_effects.hpp"
+#include "lab/blind/a/a_laws.hpp"
 #include "lab/blind/a/maths.hpp"
 #include "lab/blind/a/planform.hpp"
 
 namespace flappy::blind {
 
 inline constexpr double kRobotStep_s = 2e-5;
-inline constexpr double kBattery_V = 18;  ///< nominal: at this voltage the motor gets the commanded voltage
+inline constexpr double kLiftStation = 0.6;  ///< share of the span at which surfaces are felt
+inline constexpr double kBattery_V = 18;     ///< nominal: at this voltage the motor gets the commanded voltage
 
 struct Wall {
   double x_m = 0, y_m = 0, normal_x = 1, normal_y = 0;
@@ -42,28 +44,50 @@ struct Wing {
 
 struct RobotSideState {
   Wing wing;
-  double rotor_rad = 0, rotor_rad_s = 0;         ///< of a motor with gear backlash, divided by the gear ratio
-  double driver_V = 0, driver_V_s = 0;           ///< output of a driver with finite bandwidth, and its rate
-  double motor_V = 0, current_A = 0;             ///< in the last step
-  double winding_K = 0, case_K = 0, heat_J = 0;  ///< temperatures above the air; heat since the last slow update
-  double wake_rad_s = 0;                         ///< low-passed stroke rate, for wake capture
-  double twist_rad = 0;                          ///< at the tip
-  double envelope_V = 0, play_V = 0;             ///< low-passed amplitude of the command; state of its hysteresis
-  double resistance_gain = 1, air_gain = 1, drive_gain = 1;  ///< of the last slow update
+  double rotor_rad = 0, rotor_rad_s = 0;  ///< of a motor with gear backlash, divided by the gear ratio
+  laws::Filter driver;                    ///< output of a driver with finite bandwidth
+  double motor_V = 0, current_A = 0;      ///< in the last step
+  laws::Heat heat;                        ///< temperatures of the motor
+  double heat_J = 0;                      ///< since the last slow update
+  laws::Wake wake;                        ///< low-passed stroke rate, for wake capture
+  double twist_rad = 0;                   ///< at the tip
+  double envelope_V = 0, play_V = 0;      ///< low-passed amplitude of the command; state of its hysteresis
+  double resistance_gain = 1, flux_gain = 1, air_gain = 1, drive_gain = 1;  ///< of the last slow update
 };
 
 struct RobotState {
   double t_s = 0;
   Torso torso;
   std::array<RobotSideState, 2> side;  ///< left first
-  double battery_V = kBattery_V, battery_rc_V = 0, charge_C = 0, drawn_C = 0;
-  Vector3d wind_m_s = Vector3d::Zero(), gust_m_s = Vector3d::Zero(), gust_lag_m_s = Vector3d::Zero();
+  double battery_V = kBattery_V, drawn_C = 0;
+  laws::Battery battery;
+  Vector3d wind_m_s = Vector3d::Zero();
+  laws::Gust gust;
   Vector3d slosh_m = Vector3d::Zero(), slosh_m_s = Vector3d::Zero();
   double yaw_rate_rad_s = 0, sink_m_s = 0;  ///< low-passed
   double shedding_turns = 0, brush_left_s = 0;
   double density_gain = 1, fling = 0;
+  double gap_rad = kPi, closest_gap_rad = kPi;    ///< between the wings; the smallest of this meeting
   Vector3d acceleration_m_s2 = Vector3d::Zero();  ///< of the torso origin in W, components in B; last step
   Vector3d turning_rad_s2 = Vector3d::Zero();
+};
+
+/// Of a strip: coefficients of the force along the wing's normal and of friction along the flow, both on the speed through
+/// the air, and the centre of pressure in chords behind the leading edge. sin and cos of the angle of attack; a negative
+/// sin: the air comes from behind.
+struct WingSection {
+  double normal, friction, centre;
+};
+WingSection wing_section(double sin_alpha, double cos_alpha);
+
+/// Moment about the leading edge by rotation, over half the density, the width and the vehicle's rotational damping
+/// coefficient. `across_m_s`: speed of the leading edge along the wing's x.
+double rotation_drag(double chord_m, double across_m_s, double rotation_rad_s);
+
+/// A joint's stop. `softness`: magnitude of what softens it.
+struct Stop {
+  double lower_rad, upper_rad, softness;
+  laws::StopForce hard;
 };
 
 class Robot {
@@ -92,6 +116,7 @@ class Robot {
   double step_s() const { return step_s_; }
   const Room& room() const { return room_; }
   double mass_kg() const { return mass_kg_; }
+  Stop rotation_stop(std::size_t side) const;
 
   /// Specific force (m/s^2) at a point of B in the last step, in B.
   Vector3d specific_force(const Vector3d& point_m) const;
@@ -101,6 +126,8 @@ class Robot {
   };
   /// Wrench of the air on both wings in the last step, without added mass.
   const Wrench& air() const { return air_; }
+  /// Moments about stroke and rotation axis of the added mass of one wing, at rest of the torso.
+  std::array<double, 2> added_mass_moments(std::size_t side, double stroke_rad_s2, double rotation_rad_s2);
 
   struct Momentum {
     Vector3d linear_kg_m_s, angular_kg_m2_s;  ///< in W, about its origin
@@ -117,9 +144,6 @@ class Robot {
     Vector3d com_m = Vector3d::Zero();
     Matrix3d inertia_kg_m2 = Matrix3d::Zero();
   };
-  struct Stop {
-    double lower_rad, upper_rad, stiffness_Nm_rad, damping_Nm_s, hardening_1_rad;
-  };
   struct Side {
     double sign;
     Body leading_edge, wing;
@@ -130,8 +154,7 @@ class Robot {
     model::Joint stroke, rotation;
     Stop stroke_stop, rotation_stop;
     Strips strips;
-    std::array<double, kStrips> kept;  ///< share of each strip's area that wing damage leaves
-    double fourth_m5;                  ///< sum of chord^4 times width
+    std::array<double, kStrips> twist;  ///< shape of the twist along the span
   };
   /// Attitude and rates of a side's links, in B.
   struct Pose {
@@ -156,14 +179,17 @@ class Robot {
   void add_force(const Vector3d& point_m, const Vector3d& force_N);
   void integrate();
 
-  void drive(double left_V, double right_V);  // drive.cpp
+  void drive(double left_V, double right_V);  // a_drive.cpp
   double motor_torque(std::size_t k);         //
   void update_drive(double dt_s);             //
-  void blow();                                // air.cpp
-  void add_added_mass(std::size_t k);         //
-  void update_surroundings(double dt_s);      // surroundings.cpp
-  double place_gain(std::size_t k) const;     //
-  void push();                                //
+  void blow();                                // a_air.cpp
+  /// Calls use(mass, row, known) for each strip and for the plates' inertia: the air's inertia resists row . x + known.
+  template <class Use>
+  void for_added_masses(std::size_t k, const Use& use) const;  //
+  void add_added_mass(std::size_t k);                          //
+  void update_surroundings(double dt_s);                       // surroundings.cpp
+  double place_gain(std::size_t k) const;                      //
+  void push();                                                 //
 
   Room room_;
   Magnitudes magnitudes_;

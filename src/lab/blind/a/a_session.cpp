@@ -5,7 +5,7 @@ namespace flappy::blind {
 SessionChange session_change(std::uint64_t seed, std::size_t session) {
   SessionChange s;
   if (session == 0) return s;
-  Random random(seed, 100 * flight_number(session, 0) + 31);
+  Random random(seed, Purpose::session, flight_number(session, 0));
   const auto within = [&](double most) { return random.between(-most, most); };
   const auto vector_within = [&](double most) {
     const double x = within(most), y = within(most);
@@ -27,6 +27,7 @@ SessionChange session_change(std::uint64_t seed, std::size_t session) {
   s.marker_rad = vector_within(0.06 * kDegree);
   s.imu_rad = vector_within(0.12 * kDegree);
   s.mocap_late_s = within(0.3e-3);
+  for (double& gain : s.gains) gain = within(0.04);
   return s;
 }
 
@@ -56,6 +57,8 @@ void begin_session(Case& c, std::size_t session) {
   c.sensors->marker_turned = turned_by(s.marker_rad);
   c.sensors->imu_turned = turned_by(s.imu_rad).toRotationMatrix() * c.sensors->imu_turned;
   c.sensors->mocap_late_s = s.mocap_late_s;
+  const double* share = s.gains.data();
+  c.gains.each([&](double& gain) { gain *= 1 + *share++; });
 }
 
 void change_on_purpose(Case& c, const model::Changes& changes) {

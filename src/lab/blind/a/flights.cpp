@@ -132,8 +132,9 @@ Aim aim_of(const ProposedFlight& flight, double t_s) {
 
 RobotFlight fly(const Case& c, std::size_t flight, const Watch& watch) {
   const std::uint64_t number = flight_number(c.session, flight);
-  const Plan plan(c.programme, flight, flight_room(), c.seed, number);
-  RobotController pilot(c.vehicle.driver, c.seed, number);
+  const Plan plan(c.programme, flight, flight_room(), c.seed,
+                  flight_number(c.programme_of.value_or(c.session), flight));
+  RobotController pilot(c.vehicle.driver, c.seed, number, c.gains);
 
   // It trims at 1 m in the first two fifths of kTrim_s, then moves to where the log begins.
   const auto asked = [&](double t_s) { return c.proposed ? aim_of(*c.proposed, t_s) : plan.at(t_s); };
@@ -195,7 +196,7 @@ RobotFlight flown(const Case& c, std::size_t flight, const Torso& start, double 
   Robot robot = robot_of(c, flight);
   RobotImu imu(sensors, c.magnitudes, c.seed, number, kRobotStep_s);
   RobotMocap mocap(sensors, c.magnitudes, c.seed, number);
-  Random power_random(c.seed, 100 * number + 161), wings_random(c.seed, 100 * number + 162);
+  Random power_random(c.seed, Purpose::power_noise, number), wings_random(c.seed, Purpose::wings_noise, number);
   RobotFlight f;
   f.log.header = header_of(c, sensors, room);
   if (!firmware) f.log.command.inputs.emplace(), f.log.command.phase_rad.emplace();

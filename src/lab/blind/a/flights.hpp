@@ -18,6 +18,8 @@ struct Case {
   Magnitudes magnitudes;
   std::uint64_t seed = 0;
   std::size_t session = 0;
+  std::optional<std::size_t> programme_of;  ///< session whose programme is flown; none: `session`
+  PilotGains gains;
   Programme programme = Programme::rich;
   bool power = false, wings = false;
   double battery_V = kBattery_V;             ///< when full
@@ -26,7 +28,7 @@ struct Case {
   model::Changes changes;                    ///< made by change_on_purpose(); declared in the log
 };
 
-/// Number of a flight in random streams: other numbers in each session. `flight` is below a million.
+/// Number of a flight in random streams (stream_of()): other numbers in each session. `flight` is below a million.
 inline std::uint64_t flight_number(std::size_t session, std::size_t flight) { return 1'000'000 * session + flight; }
 
 struct RobotFlight {

@@ -83,6 +83,18 @@ inline double hyperbolic_tangent(double x) {
   return 1 - 2 / (exponential(2 * x) + 1);
 }
 
+/// Angle in [0, pi] of a point at (cos, sin) with sin >= 0; the two need no common scale.
+inline double angle_of(double sin, double cos) {
+  // halved twice, tan(a / 2) = sin / (1 + cos), then the series of the arc tangent up to tan(pi / 8)
+  const double length = std::sqrt(sin * sin + cos * cos) + 1e-300;
+  const double c = std::abs(cos) / length, s = sin / length;
+  const double half = s / (1 + c), t = half / (1 + std::sqrt(1 + half * half)), y = t * t;
+  double sum = 0;
+  for (int k = 33; k > 0; k -= 2) sum = 1.0 / k - y * sum;
+  const double angle = 4 * t * sum;
+  return cos < 0 ? kPi - angle : angle;
+}
+
 inline Quaterniond turned_by(const Vector3d& angle_rad) {
   const double a = std::sqrt(angle_rad.squaredNorm());
   if (a < 1e-9) return Quaterniond(1, angle_rad.x() / 2, angle_rad.y() / 2, angle_rad.z() / 2).normalized();
@@ -91,10 +103,52 @@ inline Quaterniond turned_by(const Vector3d& angle_rad) {
   return {half.cos, v.x(), v.y(), v.z()};
 }
 
+/// What random numbers are drawn for.
+enum class Purpose : std::uint64_t {
+  // once for a robot
+  com_offset,
+  inertia_products,
+  directions,
+  damaged_side,
+  sensors,
+  warm_up,
+  accelerometer,
+  level,
+  markers,
+  parameters,
+  other_sensors,
+  declarations,
+  // once for a session
+  session,
+  // once for a flight
+  gusts,
+  delays,
+  brushes,
+  imu_noise,
+  gyro_walk,
+  mocap_noise,
+  programme,
+  view,
+  power_noise,
+  wings_noise,
+  escape_start,
+  count
+};
+inline constexpr std::uint64_t kPurposes = 64;
+static_assert(static_cast<std::uint64_t>(Purpose::count) <= kPurposes);
+
+/// Number of a robot's stream of random numbers.
+inline std::uint64_t stream_of(Purpose p) { return static_cast<std::uint64_t>(p); }
+/// `number`: of the flight, or of the first flight of the session (flight_number()).
+inline std::uint64_t stream_of(Purpose p, std::uint64_t number) {
+  return kPurposes * (number + 1) + static_cast<std::uint64_t>(p);
+}
+
 /// Stream of random numbers for one purpose; its draws do not shift those of other purposes.
 class Random {
  public:
-  Random(std::uint64_t seed, std::uint64_t purpose) : engine_(seed * 0x9e3779b97f4a7c15ULL + purpose) {}
+  Random(std::uint64_t seed, Purpose p) : Random(seed, stream_of(p)) {}
+  Random(std::uint64_t seed, Purpose p, std::uint64_t number) : Random(seed, stream_of(p, number)) {}
 
   /// Uniform in (0, 1).
   double uniform() { return (static_cast<double>(engine_() >> 12) + 0.5) * 0x1p-52; }
@@ -116,6 +170,7 @@ class Random {
   double sign() { return uniform() < 0.5 ? -1 : 1; }
 
  private:
+  Random(std::uint64_t seed, std::uint64_t stream) : engine_(seed * 0x9e3779b97f4a7c15ULL + stream) {}
   std::mt19937_64 engine_;
 };
 

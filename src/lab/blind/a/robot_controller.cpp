@@ -10,25 +10,17 @@ constexpr double kMultisine_s = 10;  // period of the multisines
 /// Rms of a flight's multisines, in the order of Inputs (configs/fly/identify_multisine.toml).
 constexpr std::array<double, 4> kRms = {0.4, 0.15, 0.2, 0.01};
 
-/// Gains of configs/controllers/pid.toml, except for steps and turns of the set-point: yaw as published, height slower.
-flight::PidConstants<double> gains() {
-  flight::PidConstants<double> k{};
-  k.position_xy_1_s = 8.08, k.position_z_1_s = 10, k.speed_limit_m_s = 1.5, k.climb_limit_m_s = 1.5;
-  k.forward = {4.93, 3.71, 0.0142, 10};
-  k.left = {7.04, 2.33, 0.0101, 10};
-  k.up = {4.1, 12.7, 0.04, 5};
-  k.acceleration_limit_m_s2 = 10;
-  k.roll_limit_rad = kPi / 4, k.pitch_limit_rad = kPi / 6, k.yaw_error_limit_rad = kPi / 18;
-  k.roll = {16.7, 29.1, 0.708, 2};
-  k.pitch = {14.9, 8.19, 0.319, 2};
-  k.yaw = {0.2, 0.33, 0.003, 0.1};
-  k.hover_V = 9.8, k.lower_V = -4, k.upper_V = 8.2;
-  k.difference_limit_V = 3, k.bias_limit_V = 3.5, k.split_cycle_limit = 0.15;
-  const auto share = [](double hz) { return 1 - exponential(-2 * kPi * hz * kControl_s); };
-  k.velocity_share = share(20.1), k.rate_share = share(368);
-  k.period_s = kControl_s, k.per_period_Hz = 1 / kControl_s, k.gravity_m_s2 = 9.81;
-  return k;
-}
+/// Mass, moments of inertia with the wings at mid-stroke, and slopes of thrust and moments over the inputs.
+constexpr double kMass_kg = 12.45e-3, kGravity_m_s2 = 9.81, kHover_V = 9.7, kThrust_N_V = 0.0196;
+constexpr std::array<double, 3> kInertia_kg_m2 = {5.35e-6, 4.35e-6, 3.25e-6},
+                                kMoment_Nm = {9.72e-4, 5.41e-4, 3.67e-3};  // a V, a V, a unit of split cycle
+constexpr double kLowest_V = -4.1, kHighest_V = 8.3;                       // beside hover
+constexpr std::array<double, 3> kMostSum_m_s2 = {4.3, 4.3, 7.4}, kMostTurn_rad_s2 = {490, 310, 161};  // of integrals
+constexpr double kMostLevel_m_s2 = 7.7, kMostHeading = 0.19;                                          // sine
+constexpr double kMostPlace_m = 0.22;     // errors beyond count as this
+constexpr std::size_t kBeatPeriods = 15;  // control periods in a beat of 29.4 ms
+
+Vector3d triple(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
 
 double& input(Inputs& u, int k) {
   return k == 0 ? u.amplitude_V : k == 1 ? u.difference_V : k == 2 ? u.bias_V : u.split_cycle;
@@ -37,7 +29,7 @@ double& input(Inputs& u, int k) {
 }  // namespace
 
 Plan::Plan(Programme programme, std::size_t flight, const Room& room, std::uint64_t seed, std::uint64_t number) {
-  Random random(seed, 100 * number + 141);
+  Random random(seed, Purpose::programme, number);
   const double low = room.ground_z_m + 0.08, high = room.ceiling_z_m - 0.09;
   const auto add = [&](double t_s, double x, double y, double z, double heading = 0) {
     waypoints_.push_back({t_s, {x, y, z}, heading});
@@ -120,31 +112,84 @@ Inputs Plan::excitation(double t_s) const {
 }
 
 struct RobotController::Memory {
-  flight::PidConstants<double> constants = gains();
-  flight::Pid<double> pid{};
   model::Driver driver;
   View view;
+  PilotGains gains;
+  std::array<Vector3d, kBeatPeriods> velocities{};
+  std::array<Vector3d, kBeatPeriods> rates{};
+  std::size_t seen = 0;
+  Vector3d place_sum_m_s2 = Vector3d::Zero(), turn_sum_rad_s2 = Vector3d::Zero();
 };
 
-RobotController::RobotController(const model::Driver& driver, std::uint64_t seed, std::uint64_t flight)
-    : memory_(new Memory{.driver = driver, .view = View(seed, flight)}) {}
+RobotController::RobotController(const model::Driver& driver, std::uint64_t seed, std::uint64_t flight,
+                                 const PilotGains& gains)
+    : memory_(new Memory{.driver = driver, .view = View(seed, flight), .gains = gains}) {}
 RobotController::~RobotController() = default;
 
 Inputs RobotController::steer(const Torso& torso, const Aim& aim, const Inputs& excitation) {
   Memory& m = *memory_;
-  const flight::Estimate<double> seen = m.view.see(torso);
-  const auto vec3 = [](const Vector3d& v) { return model::Vec3<double>{v.x(), v.y(), v.z()}; };
-  const SinCos heading = sin_cos(aim.heading_rad);
-  flight::Setpoint<double> wanted{};
-  wanted.position_m = vec3(aim.position_m);
-  wanted.velocity_m_s = vec3(aim.velocity_m_s);
-  wanted.acceleration_m_s2 = vec3(aim.acceleration_m_s2);
-  wanted.heading = {heading.sin, heading.cos};
-  wanted.heading_rate_rad_s = aim.heading_rad_s;
-  const auto u = flight::PidController::update(m.constants, m.pid, seen, wanted);
-  return clipped({u.amplitude_V + excitation.amplitude_V, u.difference_V + excitation.difference_V,
-                  u.bias_V + excitation.bias_V, u.split_cycle + excitation.split_cycle},
-                 m.driver);
+  const Torso seen = m.view.see(torso);
+  m.velocities[m.seen % kBeatPeriods] = seen.velocity_m_s;
+  m.rates[m.seen % kBeatPeriods] = seen.rate_rad_s;
+  const std::size_t known = std::min(m.seen + 1, kBeatPeriods), ago = std::min(m.seen, kBeatPeriods / 2);
+  Vector3d velocity = Vector3d::Zero();
+  double yaw_rate_rad_s = 0;
+  for (std::size_t k = 0; k < known; ++k) {
+    velocity += m.velocities[k] / static_cast<double>(known);
+    yaw_rate_rad_s += m.rates[k].z() / static_cast<double>(known);
+  }
+  Vector3d body_rate = 0.5 * (seen.rate_rad_s + m.rates[(m.seen - ago) % kBeatPeriods]);
+  body_rate.z() = yaw_rate_rad_s;
+  ++m.seen;
+
+  const auto within = [](const Vector3d& v, const Vector3d& most) {
+    return Vector3d(v.cwiseMax(-most).cwiseMin(most));
+  };
+  const Vector3d place = triple(m.gains.place_1_s2), speed = triple(m.gains.speed_1_s);
+  const Vector3d off = within(seen.position_m - aim.position_m, Vector3d::Constant(kMostPlace_m)),
+                 fast = velocity - aim.velocity_m_s;
+  m.place_sum_m_s2 = within(
+      m.place_sum_m_s2 +
+          kControl_s * triple(m.gains.place_sum_1_s).cwiseProduct(place.cwiseProduct(off) + speed.cwiseProduct(fast)),
+      triple(kMostSum_m_s2));
+  Vector3d wanted = aim.acceleration_m_s2 - place.cwiseProduct(off) - speed.cwiseProduct(fast) - m.place_sum_m_s2;
+  const double level = std::sqrt(wanted.head<2>().squaredNorm());
+  if (level > kMostLevel_m_s2) wanted.head<2>() *= kMostLevel_m_s2 / level;
+  wanted.z() = std::max(wanted.z() + kGravity_m_s2, 0.4 * kGravity_m_s2);
+
+  const Matrix3d R = seen.attitude.toRotationMatrix();
+  // A target turned by more than the pilot can follow is led in by its sine.
+  const SinCos asked = sin_cos(aim.heading_rad);
+  const double length = std::sqrt(R(0, 0) * R(0, 0) + R(1, 0) * R(1, 0)) + 1e-9, c = R(0, 0) / length,
+               s = R(1, 0) / length;
+  double sine = c * asked.sin - s * asked.cos;
+  const double cosine = c * asked.cos + s * asked.sin;
+  if (cosine < 0) sine = std::copysign(1.0, sine);
+  sine = std::clamp(sine, -kMostHeading, kMostHeading);
+  const double rest = std::sqrt(1 - sine * sine);
+  const Vector3d ahead(c * rest - s * sine, s * rest + c * sine, 0);
+  Matrix3d Rd;
+  Rd.col(2) = wanted / std::sqrt(wanted.squaredNorm());
+  const Vector3d side = Rd.col(2).cross(ahead);
+  Rd.col(1) = side / std::sqrt(side.squaredNorm());
+  Rd.col(0) = Rd.col(1).cross(Rd.col(2));
+
+  const Matrix3d apart = Rd.transpose() * R - R.transpose() * Rd;
+  const Vector3d turned = 0.5 * Vector3d(apart(2, 1), apart(0, 2), apart(1, 0));
+  const Vector3d rate = body_rate - R.transpose() * Vector3d(0, 0, aim.heading_rad_s);
+  const Vector3d turn = triple(m.gains.turn_1_s2), slow = triple(m.gains.rate_1_s);
+  m.turn_sum_rad_s2 = within(
+      m.turn_sum_rad_s2 +
+          kControl_s * triple(m.gains.turn_sum_1_s).cwiseProduct(turn.cwiseProduct(turned) + slow.cwiseProduct(rate)),
+      triple(kMostTurn_rad_s2));
+  const Vector3d moment_Nm =
+      triple(kInertia_kg_m2).cwiseProduct(-turn.cwiseProduct(turned) - slow.cwiseProduct(rate) - m.turn_sum_rad_s2);
+  const double more_V = kMass_kg * (wanted.dot(R.col(2)) - kGravity_m_s2) / kThrust_N_V;
+  return clipped(
+      {kHover_V + std::clamp(more_V, kLowest_V, kHighest_V) + excitation.amplitude_V,
+       moment_Nm.x() / kMoment_Nm[0] + excitation.difference_V, moment_Nm.y() / kMoment_Nm[1] + excitation.bias_V,
+       moment_Nm.z() / kMoment_Nm[2] + excitation.split_cycle},
+      m.driver);
 }
 
 Inputs clipped(const Inputs& u, const model::Driver& d) {
@@ -153,11 +198,12 @@ Inputs clipped(const Inputs& u, const model::Driver& d) {
           within(u.bias_V, d.bias_limit_V), within(u.split_cycle, d.split_cycle_limit)};
 }
 
-double RobotController::voltage(const Inputs& inputs, std::size_t side, double beat, double limit_V) {
-  const model::WingBeat<double> u{inputs.amplitude_V, inputs.difference_V, inputs.bias_V, inputs.split_cycle};
-  const double fraction = beat < 0.5 ? beat : beat - 1;
-  return side == 0 ? model::wing_beat_voltage<+1>(u, fraction, limit_V)
-                   : model::wing_beat_voltage<-1>(u, fraction, limit_V);
+/// Two half cosines: the first, from crest to trough, takes the share 1/2 -+ split_cycle of the beat (left: -).
+double RobotController::voltage(const Inputs& u, std::size_t side, double beat, double limit_V) {
+  const double sign = side == 0 ? 1 : -1, falling = 0.5 - sign * u.split_cycle;
+  const double half_turn = beat < falling ? beat / falling : (1 - beat) / (1 - falling);
+  const double volts = (u.amplitude_V + sign * u.difference_V) * sin_cos(kPi * half_turn).cos + u.bias_V;
+  return std::clamp(volts, -limit_V, limit_V);
 }
 
 }  // namespace flappy::blind

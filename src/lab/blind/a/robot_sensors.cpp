@@ -23,7 +23,7 @@ void declare_imu(SensorSet& s) {
 }
 
 SensorSet sensors_of(std::uint64_t seed, bool power, bool wings) {
-  Random random(seed, 20);
+  Random random(seed, Purpose::sensors);
   SensorSet s;
   s.mocap = {random.uniform() < 0.5 ? 150.0 : 200.0, 0.02, 1e-4, 0.005};
   s.imu.rate_hz = random.uniform() < 0.5 ? 500 : 1000;
@@ -46,30 +46,28 @@ RobotImu::RobotImu(const SensorSet& set, const Magnitudes& magnitudes, std::uint
       step_s_(step_s),
       share_(1 - exponential(-2 * kPi * set.imu_low_pass_hz * step_s)),
       steps_(static_cast<int>(std::lround(1 / (set.imu.rate_hz * step_s)))),
-      random_(seed, 100 * flight + 121),
-      drift_random_(seed, 100 * flight + 122) {
+      random_(seed, Purpose::imu_noise, flight),
+      drift_random_(seed, Purpose::gyro_walk, flight) {
   // the true sd is half the declared one, as in a cautious datasheet
   for (int k = 0; k < 3; ++k)
     bias_(k) = 0.5 * set.imu.gyro_bias_sd_rad_s[static_cast<std::size_t>(k)] * std::clamp(random_.normal(), -2.0, 2.0);
-  Random fixed(seed, 21);
+  Random fixed(seed, Purpose::warm_up);
   const Vector3d normals = fixed.normals();
   warm_up_ = normals / std::sqrt(normals.squaredNorm());
-  for (int k = 0; k < 3; ++k) rectifies_(k) = 1e-3 * fixed.between(0.6, 1.4);
-  if (const double magnitude = magnitudes[Effect::accelerometer_misalignment]; magnitude > 0)
-    for (int i = 0; i < 3; ++i)  // each coefficient independently: rotation, skew and scale errors
-      for (int j = 0; j < 3; ++j) misaligned_(i, j) += magnitude * (i == j ? 0.005 : 0.02) * fixed.normal();
+  for (int k = 0; k < 3; ++k) rectifies_(k) = fixed.between(0.63, 1.37);
+  if (const double magnitude = magnitudes[Effect::accelerometer_misalignment]; magnitude > 0) {
+    Random axes(seed, Purpose::accelerometer);
+    misaligned_ = laws::misalignment(axes, magnitude);
+  }
 }
 
 std::optional<RobotImu::Sample> RobotImu::after_step(const Robot& robot, double t_s) {
   const auto& at = set_.imu.position_m;
   Vector3d rate = robot.torso().rate_rad_s, force = robot.specific_force({at[0], at[1], at[2]});
   if (!set_.imu_turned.isIdentity(0)) rate = set_.imu_turned * rate, force = set_.imu_turned * force;
-  if (!begun_) gyro_ = rate, accel_ = slow_accel_ = force, begun_ = true;
-  if (const double magnitude = magnitudes_[Effect::vibration_rectification]; magnitude > 0) {
-    slow_accel_ += 2 * kPi * 8 * step_s_ * (force - slow_accel_);
-    const Vector3d shaking = force - slow_accel_;
-    force += magnitude * rectifies_.cwiseProduct(shaking).cwiseProduct(shaking);
-  }
+  if (!begun_) gyro_ = rate, accel_ = element_.steady = force, begun_ = true;
+  if (const double magnitude = magnitudes_[Effect::vibration_rectification]; magnitude > 0)
+    force += magnitude * laws::rectified(element_, force, rectifies_, step_s_);
   gyro_ += share_ * (rate - gyro_);
   accel_ += share_ * (force - accel_);
   gyro_sum_ += gyro_;
@@ -83,9 +81,8 @@ std::optional<RobotImu::Sample> RobotImu::after_step(const Robot& robot, double 
   s.gyro_rad_s = gyro_sum_ / count_ + bias_ + gyro_drift_ + set_.imu.gyro_noise_rad_s * random_.normals();
   s.accel_m_s2 = misaligned_ * (accel_sum_ / count_) + accel_drift_ + set_.imu.accel_noise_m_s2 * random_.normals();
   if (const double magnitude = magnitudes_[Effect::gyro_bias]; magnitude > 0) {
-    // warm-up with the board, plus a random walk
-    walk_ += 0.006 * std::sqrt(interval_s) * drift_random_.normals();
-    s.gyro_rad_s += magnitude * (0.05 * (1 - exponential(-robot.state().t_s / 12)) * warm_up_ + walk_);
+    walk_ += laws::kGyroWalk_rad_s15 * std::sqrt(interval_s) * drift_random_.normals();
+    s.gyro_rad_s += magnitude * (laws::gyro_warm(robot.state().t_s) * warm_up_ + walk_);
   }
   s.arrival_s = t_s + set_.imu_transport_s + 2e-5 * std::clamp(random_.normal(), -4.0, 4.0);
   count_ = 0;
@@ -95,12 +92,10 @@ std::optional<RobotImu::Sample> RobotImu::after_step(const Robot& robot, double 
 }
 
 RobotMocap::RobotMocap(const SensorSet& set, const Magnitudes& magnitudes, std::uint64_t seed, std::uint64_t flight)
-    : set_(set), magnitudes_(magnitudes), random_(seed, 100 * flight + 131), delay_random_(seed, 100 * flight + 132) {
-  Random fixed(seed, 22);
-  if (const double magnitude = magnitudes[Effect::mocap_tilt]; magnitude > 0)
-    tilt_ = turned_by(0.01 * magnitude * fixed.level());
-  const Vector3d normals = fixed.normals();
-  marker_m_ = set.marker_m + 2e-3 * magnitudes[Effect::marker_offset] * normals / std::sqrt(normals.squaredNorm());
+    : set_(set), magnitudes_(magnitudes), random_(seed, Purpose::mocap_noise, flight) {
+  Random level(seed, Purpose::level), markers(seed, Purpose::markers);
+  frame_ = laws::levelled(level, magnitudes[Effect::mocap_tilt]);
+  marker_ = laws::marker(markers, magnitudes[Effect::marker_offset]);
 }
 
 std::optional<RobotMocap::Sample> RobotMocap::look(const Torso& torso, double t_s) {
@@ -117,15 +112,16 @@ std::optional<RobotMocap::Sample> RobotMocap::look(const Torso& torso, double t_
     return std::nullopt;
   }
   Sample s;
-  s.position_m = torso.position_m + torso.attitude * marker_m_;
+  s.position_m = torso.position_m + torso.attitude * (set_.marker_m + marker_.at_m);
   if (const double magnitude = magnitudes_[Effect::outside_mocap_lens]; magnitude > 0)
     // the calibration is worse towards the edges of the volume
-    s.position_m += 0.05 * magnitude * s.position_m * s.position_m.head<2>().squaredNorm();
-  s.position_m = tilt_ * s.position_m + noise_m;
-  s.attitude = (tilt_ * torso.attitude * set_.marker_turned * turned_by(noise_rad)).normalized();
+    s.position_m += laws::kLens_1_m2 * magnitude * s.position_m * s.position_m.head<2>().squaredNorm();
+  s.position_m = frame_.place(s.position_m) + noise_m;
+  s.attitude =
+      (frame_.turned * torso.attitude * set_.marker_turned * marker_.turned * turned_by(noise_rad)).normalized();
   s.arrival_s = t_s + set_.mocap.latency_s + set_.mocap_late_s + jitter_s;
   if (const double magnitude = magnitudes_[Effect::mocap_delay]; magnitude > 0)
-    s.arrival_s += magnitude * (5e-3 + 2e-4 * std::clamp(delay_random_.normal(), -3.0, 3.0));
+    s.arrival_s += magnitude * laws::mocap_delay(t_s);
   s.arrival_s = std::max(s.arrival_s, last_s_ + 1e-5);
   last_s_ = s.arrival_s;
   return s;

@@ -46,8 +46,9 @@ class RobotImu {
   bool begun_ = false;
   Random random_, drift_random_;
   Vector3d bias_, warm_up_, rectifies_;
+  laws::Element element_;
   Matrix3d misaligned_ = Matrix3d::Identity();
-  Vector3d gyro_ = Vector3d::Zero(), accel_ = Vector3d::Zero(), slow_accel_ = Vector3d::Zero();
+  Vector3d gyro_ = Vector3d::Zero(), accel_ = Vector3d::Zero();
   Vector3d gyro_sum_ = Vector3d::Zero(), accel_sum_ = Vector3d::Zero();
   Vector3d gyro_drift_ = Vector3d::Zero(), accel_drift_ = Vector3d::Zero(), walk_ = Vector3d::Zero();
 };
@@ -66,9 +67,9 @@ class RobotMocap {
  private:
   const SensorSet set_;
   const Magnitudes magnitudes_;
-  Random random_, delay_random_;
-  Quaterniond tilt_ = Quaterniond::Identity();
-  Vector3d marker_m_ = Vector3d::Zero();
+  Random random_;
+  laws::Frame frame_;
+  laws::Moved marker_;
   int to_lose_ = 0, seen_ = 0, lost_ = 0;
   double last_s_ = -1;
 };

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "full.hpp"
 #include "io/sha256.hpp"
 #include "lab/blind/a/a_session.hpp"
@@ -106,17 +108,17 @@ TEST(FamilyA, SaysWhatAnEffectChanges) {
   EXPECT_NEAR(std::hypot(torque.change[50][15], torque.change[50][20]), turning, 0.2 * turning);
 }
 
-// Hashes from before there were sessions.
+// Session 0 flies the same on every processor and in every version.
 TEST(FamilyASessions, LeaveSessionZeroAsItWas) {
   Assignment a = assignment();
   a.power = a.wings = true;
-  EXPECT_EQ(hash_of(short_flight(a, 0)), "2020131a4e9f5132530fb60572207f6c270b9dc0583604fbb8c1b57eff68b396");
+  EXPECT_EQ(hash_of(short_flight(a, 0)), "9856dc4c28af8dd1ec3ca9bf1280dd1228bc748f7afb1f3102f5d300c787b9dc");
   a.own_parameters = true;  // not conventions: compilers differ in the order of their draws
   a.effects = {{"wind", 1}, {"battery_sag", 1}, {"marker_offset", 1}, {"mocap_delay", 1}};
-  EXPECT_EQ(hash_of(short_flight(a, 0)), "e44cb56a46dd259e1f215aa12fd634605f4bd100cb015b60d37236af00a39bba");
+  EXPECT_EQ(hash_of(short_flight(a, 0)), "58e19c49843ab3ea235a5ab252d11228e61387d6bd91c2e0ee4d109eb59b5f7a");
   a = assignment();
   a.hover = false;
-  EXPECT_EQ(hash_of(make_family_a()->fly(a, 2)), "dc257e95379d90c1f18b723327342d43f22d5d868b35b28126583d7e8e1ded0c");
+  EXPECT_EQ(hash_of(make_family_a()->fly(a, 2)), "b849b5fbd2cce956139730d433ee90fc116e48137687adcb973bf392fa1e069b");
 }
 
 TEST(FamilyASessions, FlyOnAnotherDay) {
@@ -156,7 +158,70 @@ TEST(FamilyASessions, HaveNoiseAndProgrammesOfTheirOwn) {
   }
 }
 
-// The marker is glued on 2 mm off, in the same direction on all days; the mean of 500 samples has an sd of 5 um.
+// The programme of another session, bit for bit, under this session's noise and changes.
+TEST(FamilyASessions, FlyTheProgrammeOfAnother) {
+  Assignment a = assignment();
+  a.hover = false;
+  const auto plan_of = [&](const Assignment& which) {
+    std::vector<double> all;
+    const Case c = case_of(which);
+    const Plan plan(c.programme, 2, flight_room(), c.seed, flight_number(c.programme_of.value_or(c.session), 2));
+    for (int n = 0; n < 300; ++n) {
+      const Inputs u = plan.excitation(n / 30.0);
+      const Aim aim = plan.at(n / 30.0);
+      all.insert(all.end(), {u.amplitude_V, u.difference_V, u.bias_V, u.split_cycle, aim.position_m.x(),
+                             aim.position_m.y(), aim.position_m.z(), aim.heading_rad});
+    }
+    return all;
+  };
+  Assignment other = a;
+  other.session = 2;
+  const std::vector<double> own = plan_of(other);
+  other.programme_of = 2;
+  EXPECT_EQ(plan_of(other), own);
+  other.programme_of = 0;
+  EXPECT_EQ(plan_of(other), plan_of(a));
+  EXPECT_NE(plan_of(other), own);
+  // what is not of the programme stays that of the session: of equal programmes, all bytes
+  a.session = 1;
+  a.conventions = a.power = a.wings = true;
+  Assignment same = a;
+  same.programme_of = a.session;
+  EXPECT_EQ(hash_of(short_flight(same, 1)), hash_of(short_flight(a, 1)));
+  same.programme_of = 0;  // a proposed flight is its own programme
+  EXPECT_EQ(hash_of(short_flight(same, 1)), hash_of(short_flight(a, 1)));
+}
+
+TEST(FamilyASessions, TuneTheGains) {
+  Assignment a = assignment();
+  PilotGains plain = case_of(a).gains;
+  a.session = 1;
+  PilotGains tuned = case_of(a).gains;
+  std::vector<double> before, after;
+  plain.each([&](double& g) { before.push_back(g); });
+  tuned.each([&](double& g) { after.push_back(g); });
+  ASSERT_EQ(before.size(), session_change(a.seed, 1).gains.size());
+  for (std::size_t k = 0; k < before.size(); ++k)
+    EXPECT_NEAR(after[k] / before[k] - 1, session_change(a.seed, 1).gains[k], 1e-12) << k;
+}
+
+// No two streams of a robot are one, over all flights, sessions and purposes.
+TEST(FamilyASessions, HaveStreamsOfTheirOwn) {
+  std::set<std::uint64_t> streams;
+  std::size_t count = 0;
+  const auto purposes = static_cast<std::uint64_t>(Purpose::count);
+  for (std::uint64_t p = 0; p < purposes; ++p) {
+    streams.insert(stream_of(static_cast<Purpose>(p))), ++count;
+    for (std::size_t session = 0; session < 6; ++session)
+      for (std::size_t flight = 0; flight < 40; ++flight)
+        streams.insert(stream_of(static_cast<Purpose>(p), flight_number(session, flight))), ++count;
+  }
+  EXPECT_EQ(streams.size(), count);
+  EXPECT_NE(Random(1, Purpose::gusts, 0).uniform(), Random(1, Purpose::gusts, 1).uniform());
+  EXPECT_NE(Random(1, Purpose::gusts, 0).uniform(), Random(1, Purpose::gusts).uniform());
+}
+
+// The marker is glued on 1.6 mm off, in the same direction on all days; the mean of 500 samples has an sd of 5 um.
 TEST(FamilyASessions, KeepTheDirectionsOfEffects) {
   const SensorSet set = sensors_of(41, false, false);
   const auto seen = [&](std::size_t session) {
@@ -169,7 +234,7 @@ TEST(FamilyASessions, KeepTheDirectionsOfEffects) {
       if (const auto s = mocap.look(torso, n * 5e-3)) sum += s->position_m, ++count;
     return Vector3d(sum / count);
   };
-  EXPECT_GT((seen(0) - Vector3d(0, 0, 1)).norm(), 2e-3);
+  EXPECT_GT((seen(0) - Vector3d(0, 0, 1)).norm(), 1e-3);
   EXPECT_NE(seen(1), seen(0));
   EXPECT_LT((seen(1) - seen(0)).norm(), 5e-5);
   Case c = declared_case(assignment().vehicle_file);
@@ -179,8 +244,8 @@ TEST(FamilyASessions, KeepTheDirectionsOfEffects) {
     Robot robot = robot_of(c, 0);
     robot.step(0, 0);
     const RobotState& x = robot.state();
-    const Vector3d gust = 1.2 * x.gust_m_s - 0.6 * x.gust_lag_m_s;
-    return std::pair(gust, Vector3d(x.wind_m_s - 0.1 * gust.cwiseProduct(Vector3d(1, 1, 0.5))));
+    const Vector3d gust = x.gust.slow + 0.25 * laws::kGustTime_s * x.gust.rate;
+    return std::pair(gust, Vector3d(x.wind_m_s - laws::kGust_m_s * gust.cwiseProduct(Vector3d(1, 1, 0.53))));
   };
   EXPECT_NE(blown(1).first, blown(0).first) << "gusts";
   EXPECT_LT((blown(1).second - blown(0).second).norm(), 1e-12) << "level and direction";
@@ -213,6 +278,7 @@ std::vector<Drawn> drawn(const SessionChange& s) {
   uniforms("marker's attitude", s.marker_rad, Vector3d::Constant(0.06 * degree));
   uniforms("IMU", s.imu_rad, Vector3d::Constant(0.12 * degree));
   uniform("clock", s.mocap_late_s, 0.3e-3);
+  for (const double gain : s.gains) uniform("gain", gain, 0.04);
   return all;
 }
 
