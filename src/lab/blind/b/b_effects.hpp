@@ -84,7 +84,7 @@ struct EffectMagnitudes {
   double wing_product_kg_m2 =
       0;  ///< added to the left wing's product of inertia yz; the right one's is its mirror image
   Eigen::Vector2d tether_foot_m = Eigen::Vector2d::Zero();  ///< x, y of the anchor in W
-  double delay_sign = 1;                                    ///< +1: motion capture gets later; -1: earlier
+  double delay_sign = 1;                                    ///< +1: frames are stamped later and later; -1: earlier
   Eigen::Vector3d screw_m = Eigen::Vector3d::Zero();        ///< place of the loose screw in B
   std::array<double, 2> cogging_phase_rad{};                ///< on each side
   int torn_side = 0;                                        ///< of the torn flap; 0: left, 1: right

@@ -126,41 +126,6 @@ std::size_t arguments(std::size_t effect) {
 
 }  // namespace
 
-// The shipped vehicle; a test compares it with its file.
-RobotParameters nominal_parameters() {
-  RobotParameters f;
-  f.density_kg_m3 = 1.18009482370369;
-  f.flapping_Hz = 34;
-  f.hold_s = 1e-3;
-  f.amplitude_limit_V = 18, f.difference_limit_V = 3, f.bias_limit_V = 3.5, f.split_cycle_limit = 0.15;
-  f.below_m = 0, f.above_m = 18.9913e-3, f.around_m = 0.084;
-  const auto inertia = [](double xx, double yy, double zz, double xy, double yz, double xz) {
-    Matrix3d m;
-    m << xx, xy, xz, xy, yy, yz, xz, yz, zz;
-    return Matrix3d(1e-9 * m);
-  };
-  f.torso = {10.9067e-3,
-             {0.1797e-3, 0.0008e-3, -1.3998e-3},
-             inertia(4238.1285, 3970.1646, 2440.9505, -76.8896, 0.3011, 16.55)};
-  for (std::size_t j = 0; j < 2; ++j) {
-    Side& s = f.side[j];
-    const double sign = j == 0 ? 1 : -1;
-    s.edge = {0.7081e-3,
-              {-0.2837e-3, sign * 3.3023e-3, -6.3984e-3},
-              inertia(132.8411, 47.7258, 90.6904, -sign * 0.0416, sign * 12.5149, -0.4990)};
-    s.wing = {0.0626e-3,
-              {sign * 0.0024e-3, sign * 37.3242e-3, -9.8917e-3},
-              inertia(21.4402, 2.2204, 19.2209, 0, sign * 0.1968, -sign * 0.0001)};
-    s.shoulder_m = {0, sign * 13.95e-3, 18.9913e-3};
-    s.stroke = {-1.63, 1.63, 8e-9, 1e-9};
-    s.rotation = {-0.7854, 0.7854, 1e-9, 1e-8};
-    s.motor = {12.4, 1.75e-3, 10, 0.9, 2e-5, 9.74e-9, 7.03e-10, 18};
-    s.stiffness_positive_Nm_rad = s.stiffness_negative_Nm_rad = 0.013384289;
-    s.wing_length_m = 0.07, s.mean_chord_m = 0.021212121212121;
-  }
-  return f;
-}
-
 std::vector<double> law_of(const std::string& id, std::span<const double> at) {
   const std::size_t effect = effect_number(id);
   if (arguments(effect) == 0 || at.size() < arguments(effect)) return {};

@@ -30,7 +30,8 @@
 //             not to y (triangular matrix); its output after the low-pass has a quadratic term, so what rectifies of a
 //             vibration falls with frequency. Motion capture: a wand whose length is wrong scales the room and a level
 //             that is off turns it; one of four markers moved, so the fitted body shifts by a quarter and turns by
-//             J^-1 (r x d); its clock runs fast or slow.
+//             J^-1 (r x d); the clock that stamps its
+//             frames runs fast or slow, which reads as a delay that grows, and changes nothing on board.
 //   tether    a cable from below the torso to an anchor: weight of what hangs, and of a shallow catenary
 //             w d^2 / (8 sag), horizontal
 //
@@ -234,7 +235,7 @@ inline constexpr double kDelay_s = 7.3e-3, kDelayTurns_s = 0.86e-3;
 inline double command_delay_s(long beat, double m) { return m * (kDelay_s + (beat % 2 == 0 ? 1 : -1) * kDelayTurns_s); }
 
 // Sensors
-inline constexpr double kGyroWarm_rad_s = 0.0262, kGyroWarms_s = 7.3, kGyroWanders_rad_s = 9.4e-3, kGyroForgets_s = 4.6;
+inline constexpr double kGyroWarm_rad_s = 0.0257, kGyroWarms_s = 7.3, kGyroWanders_rad_s = 9.4e-3, kGyroForgets_s = 4.6;
 inline double gyro_warm_up(double on_s) { return kGyroWarm_rad_s * (1 - std::exp(-on_s / kGyroWarms_s)); }
 /// The next value of a first-order Gauss-Markov process of sd 1 after h; its mean square grows as 1 - exp(-2 t / tau).
 inline double gyro_keeps(double h) { return std::exp(-h / kGyroForgets_s); }
@@ -286,6 +287,7 @@ inline Misfit misfit(std::size_t marker, const Eigen::Vector3d& moved_m) {
 }
 
 inline constexpr double kClockRuns = 8.7e-4, kClockSet_s = 1.6;  ///< set so long before the log
+/// By how much a frame is stamped too late, or too early.
 inline double clock_late_s(double log_time_s, double m) {
   return m * kClockRuns * std::max(0.0, log_time_s + kClockSet_s);
 }

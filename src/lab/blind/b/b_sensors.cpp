@@ -236,11 +236,10 @@ void Sensors::mocap_step(const Robot& robot, double time) {
   if (attitude.dot(last_attitude_) < 0) attitude.coeffs() *= -1;
   last_attitude_ = attitude;
   // Waiting for the network: exponential jitter, less its mean, so that the declared mean latency holds.
-  const double late_s = std::max(
-      2e-4, truth_.mocap_late_s + effect_magnitudes_.delay_sign * clock_late_s(time, effect_magnitudes_[kMocapDelay]));
   const double jitter = 0.5 * std::min(1e-3 * -std::log(1 - late) - 1e-3, 5e-3);
-  MocapSample s{time + late_s + jitter, position + noise, attitude};
+  MocapSample s{time + truth_.mocap_late_s + jitter, 0, position + noise, attitude};
   if (!mocap_samples_.empty()) s.arrival_s = std::max(s.arrival_s, mocap_samples_.back().arrival_s + 1e-5);
+  s.stamp_s = s.arrival_s + effect_magnitudes_.delay_sign * clock_late_s(time, effect_magnitudes_[kMocapDelay]);
   mocap_samples_.push_back(s);
 }
 
@@ -307,7 +306,7 @@ void Sensors::write(double end, flightlog::FlightLog& log) const {
     log.imu.accel_z_m_s2.push_back(s.accel_m_s2.z());
   }
   for (const MocapSample& s : mocap_samples_) {
-    const double t = s.arrival_s * truth_.mocap_clock;
+    const double t = s.stamp_s * truth_.mocap_clock;
     if (!within(t)) continue;
     log.mocap.t_s.push_back(t);
     log.mocap.x_m.push_back(s.position_m.x());

@@ -59,7 +59,7 @@ struct ImuSample {
   Vector3d gyro_rad_s = Vector3d::Zero(), accel_m_s2 = Vector3d::Zero();
 };
 struct MocapSample {
-  double arrival_s = 0;
+  double arrival_s = 0, stamp_s = 0;  ///< true, and by the clock of motion capture
   Vector3d position_m = Vector3d::Zero();
   Eigen::Quaterniond attitude = Eigen::Quaterniond::Identity();
 };

@@ -441,6 +441,20 @@ TEST(FamilyBChanges, SwapTheWingsWithTheirFaults) {
   EXPECT_EQ(swapped[0].motor.resistance_ohm, own[0].motor.resistance_ohm) << "motors stay";
 }
 
+TEST(FamilyBEffects, OfTheClockOfMotionCaptureStampFramesAlone) {
+  const Times brief{0.1, 0.15};
+  const flightlog::MocapStream exact = fly_programme(assignment(), 0, brief).log.mocap;
+  const flightlog::FlightLog with = fly_programme(assignment({{"mocap_delay", 1}}), 0, brief).log;
+  const double sign = effect_magnitudes_of({}, 3).delay_sign;
+  // frames come in the same order; those near both ends may be stamped out of the log
+  const auto from = static_cast<std::size_t>(std::ranges::find(exact.x_m, with.mocap.x_m.at(5)) - exact.x_m.begin());
+  ASSERT_LT(from, exact.x_m.size());
+  EXPECT_NEAR(with.mocap.t_s[5] - exact.t_s[from], sign * clock_late_s(exact.t_s[from], 1), 5e-5)
+      << "to latency times rate";
+  EXPECT_EQ(with.imu.accel_z_m_s2, fly_programme(assignment(), 0, brief).log.imu.accel_z_m_s2)
+      << "the flight is the same";
+}
+
 TEST(FamilyBEffects, OfWingInertiaAreTheSameOnBothWings) {
   const RobotParameters none = nominal(), with = plant({{"wing_inertia", 1}}).parameters();
   for (std::size_t j = 0; j < 2; ++j) {
