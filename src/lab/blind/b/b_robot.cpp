@@ -145,7 +145,7 @@ void Robot::set_voltages(double h) {
 }
 
 std::array<double, 2> Robot::back(const State& x) const {
-  const std::size_t at = plant_.effect_magnitudes().any(kGearBacklash) ? kRotorRate : kStrokeRate;
+  const std::size_t at = plant_.rotor_rate();
   return {plant_.parameters().side[0].motor.gear_ratio * x[at],
           plant_.parameters().side[1].motor.gear_ratio * x[at + 1]};
 }

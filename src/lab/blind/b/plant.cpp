@@ -247,7 +247,7 @@ void Plant::rates(const State& x, const std::array<double, 2>& current, const Sl
                                   slow.stop_shift_rad[j], a_[kStopCompliance]);
 
     // Angular momentum of the rotor along the stroke axis; it turns against the wing.
-    const double turning = play ? x[kRotorRate + j] : psi_rate;
+    const double turning = x[rotor_rate() + j];
     const Vector3d rotor(0, 0, -sign * m.rotor_inertia_kg_m2 * n);
     side_load.n -= w.cross(rotor) * turning;
     if (play) side_load.n -= rotor * rate[kRotorRate + j];
@@ -332,7 +332,7 @@ double Plant::energy_J(const State& x, const Surroundings& room) const {
     const Twist v1 = torso + now.s1 * x[kStrokeRate + j], v2 = v1 + now.s2 * x[kRotationRate + j];
     energy += 0.5 * dot(v1, now.edge_inertia * v1) + 0.5 * dot(v2, now.wing_inertia * v2);
     const Motor& m = f_.side[j].motor;
-    const double sign = j == 0 ? 1 : -1, relative = m.gear_ratio * x[kStrokeRate + j];
+    const double sign = j == 0 ? 1 : -1, relative = m.gear_ratio * x[rotor_rate() + j];
     energy += 0.5 * m.rotor_inertia_kg_m2 * relative * relative - m.rotor_inertia_kg_m2 * relative * sign * torso.w.z();
     energy += spring_energy(j, x);
     whole = whole + now.edge_inertia + now.wing_inertia;
@@ -351,7 +351,7 @@ Wrench Plant::momentum_W(const State& x) const {
     const Twist v1 = torso + now.s1 * x[kStrokeRate + j], v2 = v1 + now.s2 * x[kRotationRate + j];
     sum = sum + now.edge_inertia * v1 + now.wing_inertia * v2;
     const Motor& m = f_.side[j].motor;
-    sum.n.z() -= (j == 0 ? 1 : -1) * m.rotor_inertia_kg_m2 * m.gear_ratio * x[kStrokeRate + j];
+    sum.n.z() -= (j == 0 ? 1 : -1) * m.rotor_inertia_kg_m2 * m.gear_ratio * x[rotor_rate() + j];
   }
   const Matrix3d R = rotation_matrix(x);
   const Vector3d f = R * sum.f;

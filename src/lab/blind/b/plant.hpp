@@ -113,6 +113,9 @@ class Plant {
 
   Slow fresh() const;
 
+  /// Where a state has the rotors' rates over the gear ratio: with play, they are not the wings'.
+  std::size_t rotor_rate() const { return a_.any(kGearBacklash) ? kRotorRate : kStrokeRate; }
+
   const RobotParameters& parameters() const { return f_; }
   const EffectMagnitudes& effect_magnitudes() const { return a_; }
   const WingAir& wing(std::size_t side) const { return wing_[side]; }

@@ -13,12 +13,12 @@ namespace flappy::blind::b {
 namespace {
 
 /// A robot without motors, friction and air, thrown with everything moving.
-Robot thrown(double gravity) {
+Robot thrown(double gravity, const Effects& effects = {}) {
   RobotParameters f = nominal();
   for (Side& s : f.side) s.motor.torque_constant_Nm_A = 0;
   Surroundings room = open_air();
   room.gravity_m_s2 = gravity;
-  Robot robot(f, {}, room, 1, 0);
+  Robot robot(f, effect_magnitudes_of(effects, 3), room, 1, 0);
   robot.plant().has_air = robot.plant().has_friction = false;
   robot.put({0, 0, 0}, 0.7);  // at the origin, where the torso's turning is much of the moment of momentum
   State& x = robot.state();
@@ -50,6 +50,23 @@ TEST(FamilyBBodies, KeepMomentumWithoutWeight) {
   const Wrench after = robot.plant().momentum_W(robot.state());
   EXPECT_LT((after.f - before.f).norm(), 1e-5 * before.f.norm());
   EXPECT_LT((after.n - before.n).norm(), 1e-4 * before.n.norm());
+}
+
+TEST(FamilyBBodies, KeepMomentumWithEffectsWithinTheRobot) {
+  for (const char* effect : {"gear_backlash", "coulomb_friction", "spring_hardening", "stop_compliance",
+                             "outside_spring_slip", "wing_inertia", "com_offset", "inertia_products"}) {
+    Robot robot = thrown(0, {{effect, 2}});
+    State& x = robot.state();
+    for (std::size_t j = 0; j < 2; ++j) x[kRotor + j] = x[kStroke + j], x[kRotorRate + j] = x[kStrokeRate + j];
+    const Wrench before = robot.plant().momentum_W(x);
+    const double energy = robot.plant().energy_J(x, robot.room());
+    robot.drive({0, 0});
+    for (int step = 0; step < 1000; ++step) robot.step();
+    const Wrench after = robot.plant().momentum_W(x);
+    EXPECT_LT((after.f - before.f).norm(), 1e-5 * before.f.norm()) << effect;
+    EXPECT_LT((after.n - before.n).norm(), 1e-4 * before.n.norm()) << effect;
+    EXPECT_LT(robot.plant().energy_J(x, robot.room()), energy) << effect << ": stops take some";
+  }
 }
 
 TEST(FamilyBBodies, FallFreely) {
