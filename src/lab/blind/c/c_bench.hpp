@@ -1,6 +1,6 @@
 // Family C's bench: the torso stands clamped in mid-room, 1 m above the ground and as far below the ceiling and from the
-// wall. The plate of the stand is 0.3 m below the torso: over four wing lengths, where what the catalogue's ground effect
-// leaves is below 0.3 % of the air's force, and is neglected. In the log W is B, so the room is told from the torso.
+// wall. The plate of the stand is 0.3 m below the torso: over four wing lengths, where the ground effect has ended.
+// In the log W is B, so the room is told from the torso.
 #pragma once
 
 #include "lab/blind/c/c_bench_programme.hpp"

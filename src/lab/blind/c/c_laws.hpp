@@ -183,7 +183,7 @@ inline double rectified_m_s2(double swing_m_s2) {
 // Calibrated volume that bends: verticals lean by k (z - z0) in a level direction e. A place p is reported at
 //   p + k/2 (z - z0)^2 e - k (z - z0) (e.p) ez
 // to first order, and what is there turned with the verticals. Choice.
-inline constexpr double kBend_rad_m = 0.0213, kBendFrom_m = 0.17;
+inline constexpr double kBend_rad_m = 0.0237, kBendFrom_m = 0.083;
 inline double bend_rad(double height_m, double magnitude) { return magnitude * kBend_rad_m * (height_m - kBendFrom_m); }
 inline Eigen::Vector3d bent_by(const Eigen::Vector3d& place, const Eigen::Vector3d& way, double magnitude) {
   const double lean = bend_rad(place.z(), magnitude), up = place.z() - kBendFrom_m;

@@ -47,7 +47,7 @@ SessionChange session_change(const Assignment& a) {
   day.imu_turn_rad = in_ball(random, 0.13 * kDegree);
   // A gyro's bias differs each time it is switched on: 0.0019 rad/s. Gyro bias 0.2: 0.0047 rad/s.
   day.gyro_bias_rad_s = in_ball(random, 4.2e-3);
-  // The markers are glued on anew: 0.11 mm, 0.045 deg. Marker offset 0.2: 0.27 mm; mocap tilt 0.2: 0.15 deg at 1 m.
+  // The markers are glued on anew: 0.11 mm, 0.045 deg. Marker offset 0.2: 0.27 mm; mocap tilt 0.2: 0.25 deg at 1 m.
   day.markers_m = in_ball(random, 0.25e-3);
   day.markers_turn_rad = in_ball(random, 0.1 * kDegree);
   // Clocks are matched anew at each start: 0.06 and 0.17 ms. Mocap delay 0.2: 0.5 ms and more.

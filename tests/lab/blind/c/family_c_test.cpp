@@ -50,8 +50,11 @@ const RobotParameters& nominal() {
 
 /// Motors and springs as those of a robot without effects.
 struct Bench {
-  explicit Bench(const RobotParameters& f, double every_s = Mechanism::kStep_s)
-      : parameters(f), mechanism(parameters, {}, every_s), drive(parameters, Magnitudes({}), 1, 0), step_s(every_s) {}
+  explicit Bench(const RobotParameters& f, double every_s = Mechanism::kStep_s, const Build& build = {})
+      : parameters(f),
+        mechanism(parameters, build, every_s),
+        drive(parameters, Magnitudes({}), 1, 0),
+        step_s(every_s) {}
 
   /// Calls `each` after every step.
   template <class Each>
@@ -157,8 +160,8 @@ TEST(FamilyC, FallsFreelyWithoutAir) {
 }
 
 TEST(FamilyC, KeepsMomentumWithoutAirAndWeight) {
-  const auto lost = [](double step_s) {
-    Bench bench(nominal(), step_s);
+  const auto lost = [](double step_s, const Build& build) {
+    Bench bench(nominal(), step_s, build);
     mjOption& option = bench.mechanism.model().opt;
     option.density = option.viscosity = option.gravity[2] = 0;
     double wings = 0, all = 0;
@@ -170,9 +173,16 @@ TEST(FamilyC, KeepsMomentumWithoutAirAndWeight) {
     EXPECT_GT(wings, 1e-4);  // kg m/s
     return all / wings;
   };
-  const double coarse = lost(Mechanism::kStep_s), fine = lost(Mechanism::kStep_s / 5);
-  EXPECT_LT(fine, 0.02);
-  EXPECT_LT(fine, 0.25 * coarse);
+  // with every effect on the bodies, whose forces are between them
+  std::array<Build, 4> builds;
+  builds[1].backlash_rad = kBacklash_rad;
+  builds[2].stop_softness = 1;
+  builds[3].damage = kDamage;
+  for (const Build& build : builds) {
+    const double coarse = lost(Mechanism::kStep_s, build), fine = lost(Mechanism::kStep_s / 5, build);
+    EXPECT_LT(fine, 0.02) << &build - builds.data();
+    EXPECT_LT(fine, 0.25 * coarse) << &build - builds.data();
+  }
 }
 
 TEST(FamilyC, TenVoltsCarryTheWeightInSteps) {
