@@ -17,15 +17,15 @@ const std::vector<FamilyEffect>& effect_table() {
        "dF/F = G exp(-(h/a)^2) - D exp(-((h - b)/w)^2), h the height of the stroke plane",
        "regimes: Gao, Lu, Phys. Fluids 20, 087101, 2008; Lu et al., Ground effect on 3D hovering wings, Bioinspir. "
        "Biomim. 2016; size: Kolomenskiy et al., PLoS ONE 11, e0152072, 2016 (up to 6 % of either sign); form and "
-       "numbers: choice within these",
+       "numbers: choice of that order",
        {laws::kGround, laws::kGroundNear_m, laws::kGroundDip, laws::kGroundDip_m, laws::kGroundDipWidth_m}},
       {"ceiling_effect",
        "19 % more air force at no clearance, half of it at 31 mm, 2 % at 0.11 m",
        {"specific_force_z", "current"},
        {"ceiling", "place"},
        "dF/F = C / (1 + (c/c0)^p), c the clearance of the stroke plane",
-       "sign and trend: Meng, Ceiling effects on a hovering wing, Phys. Fluids 31, 2019; range: Hsiao, "
-       "Chirarattananon, Ceiling effects for small rotorcraft, IEEE/ASME Trans. Mechatronics 2019; numbers: choice",
+       "sign and trend: Meng, Ceiling effects on a hovering wing, Phys. Fluids 31, 2019; Hsiao, Chirarattananon, "
+       "Ceiling effects for small rotorcraft, IEEE/ASME Trans. Mechatronics 2019; numbers: choice",
        {laws::kCeiling, laws::kCeiling_m, laws::kCeilingPower}},
       {"wall_effect",
        "a wing whose tip touches the wall loses 6.5 % of its force and pulls by 3.1 % of the weight; half of it 45 mm "
@@ -33,8 +33,8 @@ const std::vector<FamilyEffect>& effect_table() {
        {"specific_force_y", "angular_acceleration_x"},
        {"wall", "place"},
        "n = 1 / (1 + (g/g0)^2), g the clearance of the tip at its stroke angle; dF/F = -L n; pull P n W",
-       "L within Thrust variations in small rotors due to corner and vertex effects, Aeronaut. J. 2025 (7 % lost in a "
-       "corner of two walls); form: mirror image of the tip vortex; P, g0: choice",
+       "L within Thrust variations in small rotors due to corner and vertex effects, Aeronaut. J. 2025 (7 % lost 1.5 "
+       "radii from two walls and 2.5 above the ground); form: mirror image of the tip vortex; P, g0: choice",
        {laws::kWallLoss, laws::kWallPull, laws::kWall_m}},
       {"body_drag",
        "an ellipsoid of C_d A 1.26e-3 m^2 broadside as the torso",
@@ -61,13 +61,13 @@ const std::vector<FamilyEffect>& effect_table() {
        "divides the chord of the ellipses",
        {kRotation, kRotationAxis}},
       {"wake_capture",
-       "22 % more air force 0.44 chords after a reversal, none at it",
+       "29 % more air force 0.47 chords after a reversal, none at it; 1 % less after 2.9 chords",
        {"specific_force_z", "current"},
        {"stroke", "always"},
-       "dF/F = W (s/s1) exp(1 - s/s1), s the chords travelled since the reversal",
-       "after the trend of Birch, Dickinson, The influence of wing-wake interactions, J. Exp. Biol. 206, 2257, 2003; "
-       "numbers: choice",
-       {laws::kWake, laws::kWakeChords}},
+       "dF/F = W b(s/s1) - D b(s/s2), b(x) = x exp(1 - x), s the chords travelled since the reversal",
+       "an early gain, then a small loss: Birch, Dickinson, The influence of wing-wake interactions, J. Exp. Biol. "
+       "206, 2257, 2003; numbers: choice",
+       {laws::kWake, laws::kWakeChords, laws::kWakeWash, laws::kWashChords}},
       {"clap_and_fling",
        "31 % more air force on wings that have met: e times less for 26 deg between them, for an opening by 48 deg, "
        "and for 2.6 chords travelled",
@@ -91,8 +91,8 @@ const std::vector<FamilyEffect>& effect_table() {
        {"angular_acceleration_x", "angular_acceleration_z", "current"},
        {"always", "amplitude"},
        "the outer ellipse keeps its inner end and chord and is shorter by a share of its length",
-       "below the 12 % of second moment above which hawkmoths react: Fernandez, Springthorpe, Hedrick, J. Exp. Biol. "
-       "215, 3631, 2012; numbers: choice",
+       "below the 12 % of second moment up to which hawkmoths may need no active compensation: Fernandez, "
+       "Springthorpe, Hedrick, J. Exp. Biol. 215, 3631, 2012; numbers: choice",
        {kDamage, kDamage_m}},
       {"wind",
        "0.27 m/s level, with gusts of 0.10 m/s",
@@ -218,7 +218,8 @@ const std::vector<FamilyEffect>& effect_table() {
        {"accelerometer"},
        {"amplitude", "acceleration"},
        "r = f + k (sqrt(h^2 + h0^2) - h0), h the part of f above f0",
-       "asymmetry as a cause: Analog Devices, Vibration rectification in MEMS accelerometers; numbers: choice",
+       "an asymmetric range as a cause: Analog Devices, Vibration rectification in MEMS accelerometers; form and "
+       "numbers: choice",
        {laws::kRectified, laws::kRectifiedFrom_m_s2, laws::kRectifiedFrom_Hz}},
       {"mocap_tilt",
        "verticals that lean by 0.0237 rad more for each metre above 0.08 m",

@@ -17,7 +17,7 @@ inline double soft_sign(double x, double width) { return x / std::sqrt(x * x + w
 //   G exp(-(h/a)^2) - D exp(-((h - b)/w)^2)
 // Wings in hover have three regimes with the clearance: more force, less, recovery (Gao, Lu, Phys. Fluids 20, 087101, 2008,
 // in 2D; Lu, Lua, Lee, Lim, Yeo, Bioinspir. Biomim., 2016, weaker in 3D). The wing-wake interaction adds or takes up to 6 %
-// (Kolomenskiy et al., PLoS ONE 11, e0152072, 2016). The form is ours; so are the numbers, within these. Valid above 10 mm.
+// (Kolomenskiy et al., PLoS ONE 11, e0152072, 2016). The form and the numbers are ours, of that order. Valid above 10 mm.
 inline constexpr double kGround = 0.113, kGroundNear_m = 0.071, kGroundDip = 0.043, kGroundDip_m = 0.137,
                         kGroundDipWidth_m = 0.045;
 inline double ground_share(double height_m) {
@@ -26,8 +26,8 @@ inline double ground_share(double height_m) {
 }
 
 // Ceiling: share of lift added at a clearance c of the stroke plane, C / (1 + (c/c0)^p). A ceiling only adds force, and more
-// the closer it is (Meng, Phys. Fluids 31, 2019, doi 10.1063/1.5094661: a mirrored leading-edge vortex); a small rotor's
-// thrust rises within about a radius (Hsiao, Chirarattananon, IEEE/ASME Trans. Mechatronics, 2019). Numbers: choice.
+// the closer it is (Meng, Phys. Fluids 31, 2019, doi 10.1063/1.5094661: a mirrored leading-edge vortex); small rotors
+// have markedly more thrust near one, too (Hsiao, Chirarattananon, IEEE/ASME Trans. Mechatronics, 2019). Numbers: choice.
 inline constexpr double kCeiling = 0.187, kCeiling_m = 0.031, kCeilingPower = 1.71;
 inline double ceiling_share(double clearance_m) {
   return kCeiling / (1 + std::pow(std::max(0.0, clearance_m) / kCeiling_m, kCeilingPower));
@@ -35,7 +35,7 @@ inline double ceiling_share(double clearance_m) {
 
 // Wall: through the clearance g of a wing's tip at its stroke angle, n = 1 / (1 + (g/g0)^2), as the flow of a tip vortex and
 // its mirror image, 2 g away. The wing loses the share L n of its lift and pulls the torso to the wall by P n of the weight.
-// A rotor in the corner of two walls lost 7 % ("Thrust variations in small rotors due to corner and vertex effects on the
+// A rotor 1.5 radii from two walls and 2.5 above the ground lost 7 % ("Thrust variations in small rotors due to corner and vertex effects on the
 // ground side", Aeronaut. J., 2025). L within this; P and g0: choice.
 inline constexpr double kWallLoss = 0.065, kWallPull = 0.031, kWall_m = 0.045;
 inline double wall_nearness(double clearance_m) {
@@ -44,12 +44,12 @@ inline double wall_nearness(double clearance_m) {
 }
 
 // --- The wings' own wake ------------------------------------------------------------------------------------------
-// Wake capture: share of force added after s chords from the reversal, W (s/s1) exp(1 - s/s1). The wing meets its wake after
-// the reversal, not at it, and leaves it within some chords (Birch, Dickinson, J. Exp. Biol. 206, 2257, 2003). Choice.
-inline constexpr double kWake = 0.216, kWakeChords = 0.44;
+// Wake capture: share of force added after s chords from the reversal, with b(x) = x exp(1 - x), W b(s/s1) - D b(s/s2): the wake
+// first adds force, then takes a little by its downwash (Birch, Dickinson, J. Exp. Biol. 206, 2257, 2003). Numbers: choice.
+inline constexpr double kWake = 0.294, kWakeChords = 0.47, kWakeWash = 0.0107, kWashChords = 2.9;
 inline double wake_share(double chords) {
-  const double of = chords / kWakeChords;
-  return kWake * of * std::exp(1 - of);
+  const auto bump = [](double x) { return x * std::exp(1 - x); };
+  return kWake * bump(chords / kWakeChords) - kWakeWash * bump(chords / kWashChords);
 }
 
 // Clap and fling: share of force added, K exp(-g/g0) exp(-(o/o0)^2) exp(-s/s0), with g the angle between the wings where they
@@ -173,8 +173,8 @@ inline double gyro_warmth_rad_s(double since_s) {
 // the second within it.
 inline constexpr double kDieTurn_rad = 0.0137, kCrossAxis = 0.0129;
 
-// Vibration: up-swings h about the mean read more than down-swings, k (sqrt(h^2 + h0^2) - h0); h: above f0. Asymmetry is the
-// first cause of rectification in Analog Devices, "Vibration rectification in MEMS accelerometers". Numbers: choice.
+// Vibration: up-swings h about the mean read more than down-swings, k (sqrt(h^2 + h0^2) - h0); h: above f0. Analog Devices,
+// "Vibration rectification in MEMS accelerometers", begins with a range that is asymmetric about gravity. Form, numbers: choice.
 inline constexpr double kRectified = 0.041, kRectifiedFrom_m_s2 = 4.2, kRectifiedFrom_Hz = 4.3;
 inline double rectified_m_s2(double swing_m_s2) {
   return kRectified * (std::hypot(swing_m_s2, kRectifiedFrom_m_s2) - kRectifiedFrom_m_s2);

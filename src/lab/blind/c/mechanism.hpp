@@ -45,8 +45,8 @@ inline constexpr double kBodyDrag_m2 = 1.26e-3, kBodySlender = 0.41, kBodyAngula
 // Circulation of a rotating wing, pi (0.75 - x0) thetadot c^2 (Sane, Dickinson, J. Exp. Biol. 205, 1087, 2002), here of the
 // ellipses' chord, which the hinge divides at x0 from the front: (2/pi - 0.55) / (4/pi).
 inline constexpr double kRotationAxis = 0.068, kRotation = M_PI * (0.75 - kRotationAxis);
-// Damage: share of the outer ellipse's area, lost at its tip. Hawkmoths hover with 12 % less second moment of area on one side
-// without changing the timing of their muscles (Fernandez, Springthorpe, Hedrick, J. Exp. Biol. 215, 3631, 2012); choice below.
+// Damage: share of the outer ellipse's area, lost at its tip. Hawkmoths may need no active compensation up to 12 % of
+// asymmetry in the second moment of area (Fernandez, Springthorpe, Hedrick, J. Exp. Biol. 215, 3631, 2012); choice below.
 inline constexpr double kDamage = 0.043, kDamage_m = 1.351e-3;  ///< of area, and of the nominal wing's length
 // Virtual mass along the normal, and moment about the span, of the nominal wing's inner and outer ellipsoid: what MuJoCo derives.
 inline constexpr std::array<double, 2> kVirtual_kg = {1.2857e-5, 9.6459e-6}, kVirtual_kg_m2 = {2.8785e-10, 2.2617e-10};

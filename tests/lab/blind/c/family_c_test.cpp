@@ -1279,8 +1279,8 @@ TEST(FamilyC, LawsOfTheRoomHaveTheirLimits) {
     EXPECT_GT(law("wall_effect", d)[1], law("wall_effect", d + 0.01)[1]);
   }
   EXPECT_LT(law("wall_effect", 0.4)[1], 2e-3);
-  // no other force is highest where the wing has gone so far
-  EXPECT_NEAR(laws::wake_share(laws::kWakeChords), laws::kWake, 1e-12);
+  EXPECT_GT(laws::wake_share(laws::kWakeChords), 0.9 * laws::kWake);
+  EXPECT_LT(laws::wake_share(4), 0) << "the wake's downwash";
   EXPECT_EQ(laws::wake_share(0), 0);
 }
 
