@@ -406,7 +406,15 @@ std::vector<LawPair> compare_laws(const std::vector<const blind::Family*>& famil
 }
 
 std::string laws_page(const std::vector<const blind::Family*>& families) {
-  std::string page;
+  std::string page =
+      "# Laws of the blind robots' effects\n\n"
+      "This page has the law, the source and the strength of each effect of the [blind "
+      "robots](diagnosis.md#11-how-blind-benchmarks-judge-it), by\n"
+      "family. `flappy-blind laws --page FILE` writes it, and checks that no two families, and no family and the "
+      "catalogue, share a law or a\n"
+      "number: on a grid, after the best scale factor, two laws of one effect differ by at least 3 % of their change. "
+      "Angles are in rad, all else\n"
+      "in SI units.\n";
   for (const std::string& id : ids_of(families)) {
     page += "\n## " + id + "\n\n| family | magnitude 1 | law | source |\n|---|---|---|---|\n";
     for (const Party& p : parties(families, id))
