@@ -186,7 +186,7 @@ const std::vector<FamilyEffect>& effect_table() {
        {kProductXz, kProductYz}},
       {"wing_inertia",
        "centre of mass of both wings 1.27 mm farther from the leading edge, or nearer; product of inertia of span and "
-       "chord 1.28e-9 kg m^2",
+       "chord 1.13e-9 kg m^2",
        {"specific_force_x", "specific_force_z", "angular_acceleration_y"},
        {"always", "acceleration"},
        "geometry",

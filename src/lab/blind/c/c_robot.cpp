@@ -56,6 +56,8 @@ RobotParameters faulty(RobotParameters f, const Magnitudes& magnitudes, std::uin
     const double product = magnitude * wing * (i == 0 ? kWingProduct_kg_m2 : -kWingProduct_kg_m2);
     side.wing.inertia_kg_m2(1, 2) += product;
     side.wing.inertia_kg_m2(2, 1) += product;
+    // a film is all but flat, so other products of a drawn one may now ask for more than any body has
+    if (product != 0) side.wing.inertia_kg_m2 = made_physical(side.wing.inertia_kg_m2);
     side.rotation.friction_Nm += 6e-5 * magnitudes[Effect::kHingeStiction];
   }
   return f;

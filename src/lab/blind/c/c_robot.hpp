@@ -49,7 +49,7 @@ class Robot {
 inline constexpr double kComLevel_m = 0.83e-3, kComUp_m = 0.46e-3;  ///< of the whole robot
 inline constexpr double kProductXz = 0.0737, kProductYz = 0.0551;   ///< over sqrt(Ixx Izz), sqrt(Iyy Izz) of the torso
 inline constexpr double kWingCom_m = 1.27e-3,
-                        kWingProduct_kg_m2 = 1.28e-9;  ///< of each wing, along and across the span
+                        kWingProduct_kg_m2 = 1.13e-9;  ///< of each wing, along and across the span
 
 /// Of motor and stroke hinge, before the wing.
 double dry_friction_Nm(const Side& side);

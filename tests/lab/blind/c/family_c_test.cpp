@@ -1480,12 +1480,18 @@ TEST(FamilyC, WingInertiaIsMirroredAndKeepsItsMoments) {
     const RigidBody &was = before.sides[side].wing, &is = after.sides[side].wing;
     farther[side] = was.com_m.z() - is.com_m.z();
     product[side] = is.inertia_kg_m2(1, 2) - was.inertia_kg_m2(1, 2);
-    EXPECT_EQ(Eigen::Vector3d(is.inertia_kg_m2.diagonal()), Eigen::Vector3d(was.inertia_kg_m2.diagonal()));
-    EXPECT_TRUE(is_physical(is.inertia_kg_m2));
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(is.inertia_kg_m2(i, i) / was.inertia_kg_m2(i, i), 1, 1e-3);
   }
   EXPECT_NEAR(std::abs(farther[0]), kWingCom_m, 1e-12);
   EXPECT_NEAR(farther[1], farther[0], 1e-15);
-  EXPECT_NEAR(product[1], -product[0], 1e-20);
+  EXPECT_NEAR(product[1], -product[0], 1e-3 * kWingProduct_kg_m2);
+  EXPECT_NEAR(std::abs(product[0]), kWingProduct_kg_m2, 1e-3 * kWingProduct_kg_m2);
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {  // at the largest magnitude there is a body for each robot
+    Assignment a = with("wing_inertia", 4);
+    a.seed = seed;
+    a.own_parameters = true;
+    EXPECT_NO_THROW(Robot(a, 0)) << seed;
+  }
 }
 
 TEST(FamilyC, ProductsOfInertiaActInAllAngularAccelerations) {
