@@ -47,6 +47,7 @@ struct RobotSideState {
   double rotor_rad = 0, rotor_rad_s = 0;  ///< of a motor with gear backlash, divided by the gear ratio
   laws::Filter driver;                    ///< output of a driver with finite bandwidth
   double motor_V = 0, current_A = 0;      ///< in the last step
+  double winding_A = 0;                   ///< current that the bridge sees in its dead time
   laws::Heat heat;                        ///< temperatures of the motor
   double heat_J = 0;                      ///< since the last slow update
   laws::Wake wake;                        ///< low-passed stroke rate, for wake capture

@@ -15,9 +15,9 @@ constexpr double kMass_kg = 12.45e-3, kGravity_m_s2 = 9.81, kHover_V = 9.7, kThr
 constexpr std::array<double, 3> kInertia_kg_m2 = {5.35e-6, 4.35e-6, 3.25e-6},
                                 kMoment_Nm = {9.72e-4, 5.41e-4, 3.67e-3};  // a V, a V, a unit of split cycle
 constexpr double kLowest_V = -4.1, kHighest_V = 8.3;                       // beside hover
-constexpr std::array<double, 3> kMostSum_m_s2 = {4.3, 4.3, 7.4}, kMostTurn_rad_s2 = {490, 310, 161};  // of integrals
-constexpr double kMostLevel_m_s2 = 7.7, kMostHeading = 0.19;                                          // sine
-constexpr double kMostPlace_m = 0.22;     // errors beyond count as this
+constexpr std::array<double, 3> kMaxSum_m_s2 = {4.3, 4.3, 7.4}, kMaxTurn_rad_s2 = {490, 310, 161};  // of integrals
+constexpr double kMaxLevel_m_s2 = 7.7, kMaxHeading = 0.19;                                          // sine
+constexpr double kMaxPlace_m = 0.22;      // errors beyond count as this
 constexpr std::size_t kBeatPeriods = 15;  // control periods in a beat of 29.4 ms
 
 Vector3d triple(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
@@ -146,15 +146,15 @@ Inputs RobotController::steer(const Torso& torso, const Aim& aim, const Inputs& 
     return Vector3d(v.cwiseMax(-most).cwiseMin(most));
   };
   const Vector3d place = triple(m.gains.place_1_s2), speed = triple(m.gains.speed_1_s);
-  const Vector3d off = within(seen.position_m - aim.position_m, Vector3d::Constant(kMostPlace_m)),
+  const Vector3d off = within(seen.position_m - aim.position_m, Vector3d::Constant(kMaxPlace_m)),
                  fast = velocity - aim.velocity_m_s;
   m.place_sum_m_s2 = within(
       m.place_sum_m_s2 +
           kControl_s * triple(m.gains.place_sum_1_s).cwiseProduct(place.cwiseProduct(off) + speed.cwiseProduct(fast)),
-      triple(kMostSum_m_s2));
+      triple(kMaxSum_m_s2));
   Vector3d wanted = aim.acceleration_m_s2 - place.cwiseProduct(off) - speed.cwiseProduct(fast) - m.place_sum_m_s2;
   const double level = std::sqrt(wanted.head<2>().squaredNorm());
-  if (level > kMostLevel_m_s2) wanted.head<2>() *= kMostLevel_m_s2 / level;
+  if (level > kMaxLevel_m_s2) wanted.head<2>() *= kMaxLevel_m_s2 / level;
   wanted.z() = std::max(wanted.z() + kGravity_m_s2, 0.4 * kGravity_m_s2);
 
   const Matrix3d R = seen.attitude.toRotationMatrix();
@@ -165,7 +165,7 @@ Inputs RobotController::steer(const Torso& torso, const Aim& aim, const Inputs& 
   double sine = c * asked.sin - s * asked.cos;
   const double cosine = c * asked.cos + s * asked.sin;
   if (cosine < 0) sine = std::copysign(1.0, sine);
-  sine = std::clamp(sine, -kMostHeading, kMostHeading);
+  sine = std::clamp(sine, -kMaxHeading, kMaxHeading);
   const double rest = std::sqrt(1 - sine * sine);
   const Vector3d ahead(c * rest - s * sine, s * rest + c * sine, 0);
   Matrix3d Rd;
@@ -181,7 +181,7 @@ Inputs RobotController::steer(const Torso& torso, const Aim& aim, const Inputs& 
   m.turn_sum_rad_s2 = within(
       m.turn_sum_rad_s2 +
           kControl_s * triple(m.gains.turn_sum_1_s).cwiseProduct(turn.cwiseProduct(turned) + slow.cwiseProduct(rate)),
-      triple(kMostTurn_rad_s2));
+      triple(kMaxTurn_rad_s2));
   const Vector3d moment_Nm =
       triple(kInertia_kg_m2).cwiseProduct(-turn.cwiseProduct(turned) - slow.cwiseProduct(rate) - m.turn_sum_rad_s2);
   const double more_V = kMass_kg * (wanted.dot(R.col(2)) - kGravity_m_s2) / kThrust_N_V;
