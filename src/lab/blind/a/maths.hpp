@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -83,6 +84,13 @@ inline double hyperbolic_tangent(double x) {
   return 1 - 2 / (exponential(2 * x) + 1);
 }
 
+/// 1, 1/3, 1/5, ...
+inline constexpr std::array<double, 17> kOdd = [] {
+  std::array<double, 17> one_over{};
+  for (std::size_t k = 0; k < one_over.size(); ++k) one_over[k] = 1.0 / static_cast<double>(2 * k + 1);
+  return one_over;
+}();
+
 /// Angle in [0, pi] of a point at (cos, sin) with sin >= 0; the two need no common scale.
 inline double angle_of(double sin, double cos) {
   // halved twice, tan(a / 2) = sin / (1 + cos), then the series of the arc tangent up to tan(pi / 8)
@@ -90,7 +98,7 @@ inline double angle_of(double sin, double cos) {
   const double c = std::abs(cos) / length, s = sin / length;
   const double half = s / (1 + c), t = half / (1 + std::sqrt(1 + half * half)), y = t * t;
   double sum = 0;
-  for (int k = 33; k > 0; k -= 2) sum = 1.0 / k - y * sum;
+  for (std::size_t k = kOdd.size(); k-- > 0;) sum = kOdd[k] - y * sum;
   const double angle = 4 * t * sum;
   return cos < 0 ? kPi - angle : angle;
 }
