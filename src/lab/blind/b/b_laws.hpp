@@ -125,7 +125,7 @@ inline constexpr double kBendHover_rad = 0.112, kBendFollows_s = 0.7e-3, kBendMo
 /// Angle where the chord is longest, of the normal load over its mean in hover.
 inline double bend_angle(double load) { return kBendHover_rad * std::clamp(load, -kBendMost, kBendMost); }
 
-inline constexpr double kWornFrom = 0.58;
+inline constexpr double kWornFrom = 0.662;
 /// Share of the chord that is lost at a station; 0 to 1.
 inline double worn_share(double station) {
   const double x = std::clamp((station - kWornFrom) / (1 - kWornFrom), 0.0, 1.0);
@@ -246,7 +246,7 @@ inline Eigen::Vector3d skewed(const Eigen::Vector3d& f, const Eigen::Vector3d& s
   return {f.x() + skew[0] * f.y() + skew[1] * f.z(), f.y() + skew[2] * f.z(), f.z()};
 }
 
-inline constexpr double kSquare_s2_m = 1.17e-3;
+inline constexpr double kSquare_s2_m = 8.3e-4;
 /// What a quadratic term adds to the filtered specific force.
 inline Eigen::Vector3d rectified(const Eigen::Vector3d& filtered, double m) {
   return m * kSquare_s2_m * filtered.cwiseProduct(filtered);
