@@ -321,7 +321,7 @@ inline Matrix3d misalignment(Random& random, double magnitude) {
 /// Vibration: what shakes passes the resonance of element and foam, and its square is rectified; the square levels off
 /// where the element meets its rails (rectification by asymmetric rails: Analog Devices, "Vibration Rectification in MEMS
 /// Accelerometers").
-inline constexpr double kRectifies_s2_m = 8.3e-4, kRails_m_s2 = 97, kElement_rad_s = 4310, kElementDamping = 0.31,
+inline constexpr double kRectifies_s2_m = 7.6e-4, kRails_m_s2 = 97, kElement_rad_s = 4310, kElementDamping = 0.31,
                         kSteady_rad_s = 44;
 struct Element {
   Vector3d steady = Vector3d::Zero(), seen = Vector3d::Zero(), rate = Vector3d::Zero();

@@ -207,7 +207,7 @@ const std::vector<FamilyEffect>& table() {
        "MPU-6050 data sheet: 3 % of scale and 2 % across axes at most; numbers: choice within it",
        {laws::kTurn_rad, laws::kSkew_rad, laws::kScale}},
       {"vibration_rectification",
-       "8.3e-4 s^2/m of what shakes at 34 Hz, twice at 450 Hz",
+       "7.6e-4 s^2/m of what shakes at 34 Hz, twice at 450 Hz",
        {"accelerometer"},
        {"amplitude", "always"},
        "k y^2 / (1 + (y / a)^2), y: what shakes behind the resonance of the element",
