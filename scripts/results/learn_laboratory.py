@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Learns anew, from robots of the families, all files that say what models get wrong and what differs between sessions.
 
-    scripts/results/learn_laboratory.py OUT [--robots 4] [--pairs 12] [--cases 12] [--steps detectable discrepancy sessions verdict]
+    scripts/results/learn_laboratory.py OUT [--robots 4] [--pairs 12] [--cases 12] [--steps discrepancy sessions verdict]
 
 Robots are flown with seeds that no benchmark uses, and kept in OUT; after any stop, the same command goes on. In the end configs/lab and
 configs/gap hold what was learnt: for each family from the other two, and for users from all three. A build that is not of a commit is refused.
@@ -26,8 +26,8 @@ def main():
     parser.add_argument("--robots", type=int, default=4, help="of each family, as their file, for what models get wrong (4)")
     parser.add_argument("--pairs", type=int, default=12, help="of sessions of each family, half of them with an effect (12)")
     parser.add_argument("--cases", type=int, default=12, help="of each part and family, for the verdict (12)")
-    parser.add_argument("--steps", nargs="+", default=["detectable", "discrepancy", "sessions", "verdict"],
-                        choices=["detectable", "discrepancy", "sessions", "verdict"])
+    parser.add_argument("--steps", nargs="+", default=["discrepancy", "sessions", "verdict"],
+                        choices=["discrepancy", "sessions", "verdict"])
     parser.add_argument("--programs", type=Path, default=ROOT / "build" / "release" / "bin", help="of a build with -DFLAPPY_FAMILIES=ON")
     o = parser.parse_args()
     blind, gap = o.programs / "flappy-blind", o.programs / "flappy-gap"
@@ -73,11 +73,6 @@ def main():
         text = subprocess.run([blind, "effects", "--family", family], capture_output=True, text=True, check=True).stdout
         return [line.split()[0] for line in text.splitlines() if line and not line.startswith(" ")]
 
-    if "detectable" in o.steps:
-        for family in FAMILIES:
-            output = o.out / f"detectable_{family}.toml"
-            run(output, blind, "detectability", "--family", family, "--vehicles", 2, "--seed", 2001, "--out", output)
-            shutil.copyfile(output, CONFIGS / "lab" / "detectable" / f"{family}.toml")
     if "discrepancy" in o.steps:
         base = CONFIGS / "gap" / "model_discrepancy.toml"
 

@@ -8,7 +8,6 @@
 #include "io/installation.hpp"
 #include "io/sha256.hpp"
 #include "lab/benchmark/calibrate.hpp"
-#include "lab/benchmark/detectability.hpp"
 #include "lab/benchmark/families.hpp"
 #include "lab/benchmark/foresee_bench.hpp"
 #include "lab/benchmark/laws.hpp"
@@ -252,16 +251,6 @@ int main(int argc, char** argv) {
   std::filesystem::path laws_file;
   laws.option("--family", compared, "these families").one_of({"a", "b", "c"}).shows_default();
   laws.option("--page", laws_file, "file for a table of laws and sources");
-  io::Command detectability = program.app().command("detectability", "finds how large effects have to be to be found");
-  benchmark::DetectabilityCommand command;
-  detectability.option("--family", command.family, "a, b or c").required();
-  detectability.option("--vehicle", command.vehicle, "the vehicle as declared").shows_default();
-  detectability.option("--vehicles", command.vehicles, "how many").range(1, 1000).shows_default();
-  detectability.option("--seed", command.seed, "of the first")
-      .range(std::uint64_t{0}, std::uint64_t{1} << 53)
-      .shows_default();
-  detectability.option("--out", command.out, "file for what is found").required();
-  detectability.option("--threads", command.threads, "0: one for each processor").range(0, 1024);
   io::Command make = program.app().command("make", "flies the cases of a benchmark and seals what they are");
   benchmark::MakeCommand made;
   std::string set;
@@ -282,12 +271,11 @@ int main(int argc, char** argv) {
       .range(std::size_t{1}, blind::Family::kFlights)
       .needs(contrast)
       .shows_default();
-  make.option("--effects", made.plan.effects, "of robots that changed, with --contrast: these alone").needs(contrast);
+  make.option("--effects", made.plan.effects, "of robots that have one: these alone");
   make.flag("--bench", made.plan.bench, "robots are clamped to a force sensor and filmed, with --contrast")
       .needs(contrast);
   make.option("--vehicle", made.vehicle, "the robot as declared").shows_default();
   make.option("--randomise", made.randomise, "what robots of the part parameters are drawn from").shows_default();
-  make.option("--detectable", made.detectable, "what is detectable of every effect; none: the family's own table");
   make.option("--threads", made.threads, "0: one for each processor").range(0, 1024);
   io::Command score = program.app().command("score", "diagnoses every case, then opens the labels and compares");
   benchmark::ScoreCommand scored;
@@ -351,7 +339,6 @@ int main(int argc, char** argv) {
           all[e.id] = e.typical, std::printf("%-30s %s\n", e.id.c_str(), e.typical.c_str());
       program.write_json(all);
     } else if (escape.given()) program.write_json(blind::fly_escapes(escapes));
-    else if (detectability.given()) program.write_json(benchmark::run_detectability(command));
     else {
       of.hover = of.hover || programme == "hover";
       if (!of.reference.empty() && of.reference == robot.out)

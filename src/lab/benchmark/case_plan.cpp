@@ -4,14 +4,14 @@
 #include <cmath>
 #include <random>
 
-#include "io/config.hpp"
+#include "io/files.hpp"
 #include "lab/benchmark/families.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::benchmark {
 namespace {
 
-/// Below kSeedsOfAFamily: robots flown by hand or for tables of detectable magnitudes. Already used: 700001 to 799999
+/// Below kSeedsOfAFamily: robots flown by hand. Already used: 700001 to 799999
 /// and, from each family's first seed, the 120,000 from each of 5,000,000, 5,500,000, ..., 8,500,000 on.
 constexpr std::uint64_t kSeedsOfAFamily = 10'000'000, kReported = 9'000'000, kSeedsOfAPart = 10'000,
                         kSeedsOfSessions = 300'000;
@@ -19,12 +19,15 @@ constexpr std::uint64_t kSeedsOfAFamily = 10'000'000, kReported = 9'000'000, kSe
 constexpr std::size_t kAtLeast = 100;
 /// Least numbers of cases in parts of a contrast.
 constexpr std::size_t kSingles = 60, kHarmless = 30, kStrange = 15, kPairs = 20;
-constexpr double kLargest = 4;
-/// For effects outside the catalogue that the table does not list.
+/// Effects outside the catalogue are strong, so that what is asked is whether they are called unknown.
 constexpr double kOutsideMagnitude = 2;
-/// Robots differ in how much they have of a cause: magnitudes of contrasts are this many times what its source
-/// measured, uniform in the logarithm.
+/// Robots differ in how much they have of a cause: magnitudes are this many times what its source measured, uniform in
+/// the logarithm.
 constexpr double kMinTypical = 0.7, kMaxTypical = 2;
+
+/// Regimes that rich flights alone have.
+constexpr const char* kOfFlight[] = {"height", "ceiling",      "wall",    "place",      "velocity",
+                                     "rate",   "acceleration", "heading", "difference", "bias"};
 
 using Ids = std::vector<std::string>;
 
@@ -34,34 +37,25 @@ std::uint64_t number_of(const blind::Family& family) {
 
 class Planner {
  public:
-  Planner(const blind::Family& family, const std::map<std::string, Detectability>& detectability,
-          const PlanOptions& options)
-      : of_(detectability),
-        options_(options),
+  Planner(const blind::Family& family, const PlanOptions& options)
+      : options_(options),
         first_seed_(number_of(family) * kSeedsOfAFamily + (options.reported ? kReported : 0) +
-                    (options.reference_sessions - 1) * kSeedsOfSessions),
+                    (options.contrast ? (options.reference_sessions - 1) * kSeedsOfSessions : 0)),
         random_(first_seed_) {
+    Ids known;
+    for (const blind::FamilyEffect& e : family.effects()) (in_catalogue(e) ? known : outside_).push_back(e.id);
+    for (const std::string& id : options.effects)
+      if (!std::ranges::count(known, id))
+        throw io::InputError("--effects " + id + ": no effect of the catalogue; accepted: " + io::joined(known));
     for (const blind::FamilyEffect& e : family.effects()) {
-      const auto known = of_.find(e.id);
-      if (known == of_.end()) {
-        outside_.push_back(e.id);
-        continue;
-      }
-      const Detectability& d = known->second;
-      if (in_catalogue(e) && d.hidden) hidden_.push_back(e.id);
-      if (d.undetectable) continue;
-      (in_catalogue(e) ? detectable_ : outside_).push_back(e.id);
-      if (in_catalogue(e) && d.detectable <= 1) typical_.push_back(e.id);
+      if (!in_catalogue(e) || (!options.effects.empty() && !std::ranges::count(options.effects, e.id))) continue;
+      catalogue_.push_back(e.id);
+      if (std::ranges::all_of(e.regimes, [](const std::string& r) { return std::ranges::count(kOfFlight, r) > 0; }))
+        hidden_.push_back(e.id);
     }
     if (options.bench) require_bench(family);
-    if (outside_.empty())
-      throw io::InputError(
-          "--detectable: nothing outside the catalogue is detectable; accepted: a table of flappy-blind detectability");
-    if (detectable_.size() < 2)
-      throw io::InputError(
-          "--detectable: fewer than two effects are detectable; accepted: a table of flappy-blind detectability");
     // the first cases of a part (PlanOptions::at_most) are a fair draw
-    for (Ids* ids : {&detectable_, &typical_, &outside_, &hidden_}) shuffle(*ids);
+    for (Ids* ids : {&catalogue_, &outside_, &hidden_}) shuffle(*ids);
     random_.seed(first_seed_);
   }
 
@@ -73,21 +67,17 @@ class Planner {
         throw io::InputError("--part " + part + ": not " + (options_.contrast ? "with" : "without") +
                              " --contrast; accepted: " + io::joined(known));
     if (options_.contrast) return contrasts();
-    const std::size_t singles = rounds(detectable_, kAtLeast);
+    const std::size_t singles = rounds(catalogue_, kAtLeast);
     part("singles", singles, [&](std::size_t k, PlannedCase& c) { single(k, c); });
     part("singles_current", singles, [&](std::size_t k, PlannedCase& c) {
-      single(k, c);
       c.power = true;
       c.seed = seed_of("singles", k);  // the robots of part "singles"
+      single(k, c);
     });
     part("redeclared", kAtLeast, [&](std::size_t k, PlannedCase& c) {
-      single(k, c);
       c.seed = seed_of("singles", k);
+      single(k, c);
       c.conventions = false;
-    });
-    part("typical", rounds(typical_, kAtLeast), [&](std::size_t k, PlannedCase& c) {
-      const std::string& id = typical_[k % typical_.size()];
-      c.effects = {{id, 1}};
     });
     const auto harmless = [&](const char* name, bool published, bool own_parameters, bool conventions) {
       part(name, kAtLeast, [&](std::size_t, PlannedCase& c) {
@@ -98,18 +88,16 @@ class Planner {
     harmless("parameters", true, false, false);
     harmless("own_parameters", false, true, false);
     harmless("conventions", false, false, true);
-    part("withheld", rounds(detectable_, kAtLeast / 2), [&](std::size_t k, PlannedCase& c) {
+    part("withheld", rounds(catalogue_, kAtLeast / 2), [&](std::size_t k, PlannedCase& c) {
       single(k, c);
       c.withheld = model::whole_group(model::effects(), c.effects.front().id);
     });
-    part("outside", rounds(outside_, kAtLeast / 2),
-         [&](std::size_t k, PlannedCase& c) { c.effects = {at_twice(outside_[k % outside_.size()])}; });
-    part("pairs", kAtLeast, [&](std::size_t, PlannedCase& c) {
-      pair(
-          detectable_, [&](const std::string& id) { return at_twice(id).magnitude; }, c);
+    part("outside", rounds(outside_, kAtLeast / 2), [&](std::size_t k, PlannedCase& c) {
+      c.effects = {{outside_[k % outside_.size()], kOutsideMagnitude}};
     });
+    part("pairs", catalogue_.size() > 1 ? kAtLeast : 0, [&](std::size_t, PlannedCase& c) { pair(c); });
     part("hover", rounds(hidden_, kAtLeast), [&](std::size_t k, PlannedCase& c) {
-      c.effects = {at_twice(hidden_[k % hidden_.size()])};
+      c.effects = {{hidden_[k % hidden_.size()], typical(c.seed)}};
       c.hover = true;
     });
     number();
@@ -145,27 +133,19 @@ class Planner {
     }
   }
 
-  blind::BlindEffect at_twice(const std::string& id) const {
-    const auto d = of_.find(id);
-    if (d == of_.end()) return {id, kOutsideMagnitude};
-    return {id, kOverDetectable * d->second.detectable};
-  }
-
   void single(std::size_t k, PlannedCase& c) const {
-    const std::string& id = detectable_[k % detectable_.size()];
-    c.effects = {at_twice(id)};
+    c.effects = {{catalogue_[k % catalogue_.size()], typical(c.seed)}};
   }
 
-  template <class Magnitude>
-  void pair(const Ids& ids, const Magnitude& magnitude, PlannedCase& c) {
-    const std::string& first = ids[below(ids.size())];
+  /// Two effects of different groups.
+  void pair(PlannedCase& c) {
+    const std::string& first = catalogue_[below(catalogue_.size())];
     const Ids group = model::whole_group(model::effects(), first);
-    Ids others = ids;
+    Ids others = catalogue_;
     std::erase_if(others, [&](const std::string& id) { return std::ranges::count(group, id) > 0; });
-    if (others.empty())
-      throw io::InputError("--detectable: all are of one group; accepted: a table of flappy-blind detectability");
+    if (others.empty()) throw io::InputError("--effects: all are of one group; accepted: of two groups for pairs");
     const std::string& second = others[below(others.size())];
-    c.effects = {{first, magnitude(first)}, {second, magnitude(second)}};
+    c.effects = {{first, typical(c.seed)}, {second, typical(c.seed + 1)}};
   }
 
   /// Typical magnitude of one robot.
@@ -181,9 +161,7 @@ class Planner {
     for (std::size_t i = list.size(); i > 1; --i) std::swap(list[i - 1], list[below(i)]);
   }
 
-  /// Every effect of the catalogue is asked for, whatever the table says; the score leaves out changes within noise.
   std::vector<PlannedCase> contrasts() {
-    const Ids all = shuffled_catalogue();
     const auto part = [&](const char* name, std::size_t count, const auto& fill) {
       this->part(name, count, [&](std::size_t k, PlannedCase& c) {
         c.references = blind::Family::kFlights;
@@ -194,52 +172,34 @@ class Planner {
         c.bench = options_.bench;
       });
     };
-    const auto single = [&](std::size_t k, PlannedCase& c) { c.effects = {{all[k % all.size()], typical(c.seed)}}; };
-    part("changed", rounds(all, kSingles), single);
-    part("changed_short_reference", rounds(all, kSingles), [&](std::size_t k, PlannedCase& c) {
+    const auto single = [&](std::size_t k, PlannedCase& c) { this->single(k, c); };
+    part("changed", rounds(catalogue_, kSingles), single);
+    part("changed_short_reference", rounds(catalogue_, kSingles), [&](std::size_t k, PlannedCase& c) {
       c.seed = seed_of("changed", k);
       single(k, c);
       c.references = 1;
     });
-    part("changed_short_test", rounds(all, kSingles), [&](std::size_t k, PlannedCase& c) {
+    part("changed_short_test", rounds(catalogue_, kSingles), [&](std::size_t k, PlannedCase& c) {
       c.seed = seed_of("changed", k);
       single(k, c);
       c.flights = 1;
     });
     part("unchanged", kHarmless, [](std::size_t, PlannedCase&) {});
-    part("changed_calm", rounds(all, kHarmless), [&](std::size_t k, PlannedCase& c) {
+    part("changed_calm", rounds(catalogue_, kHarmless), [&](std::size_t k, PlannedCase& c) {
       single(k, c);
       c.calm_reference = true;
     });
     part("unchanged_calm", kHarmless, [](std::size_t, PlannedCase& c) { c.calm_reference = true; });
-    part("changed_withheld", rounds(all, kStrange), [&](std::size_t k, PlannedCase& c) {
+    part("changed_withheld", rounds(catalogue_, kStrange), [&](std::size_t k, PlannedCase& c) {
       single(k, c);
       c.withheld = model::whole_group(model::effects(), c.effects.front().id);
     });
     part("changed_outside", rounds(outside_, kStrange), [&](std::size_t k, PlannedCase& c) {
       c.effects = {{outside_[k % outside_.size()], kOutsideMagnitude}};
     });
-    part("changed_pairs", kPairs, [&](std::size_t, PlannedCase& c) {
-      std::uint64_t draw = c.seed;
-      pair(
-          all, [&](const std::string&) { return typical(draw++); }, c);
-    });
+    part("changed_pairs", catalogue_.size() > 1 ? kPairs : 0, [&](std::size_t, PlannedCase& c) { pair(c); });
     number();
     return std::move(cases_);
-  }
-
-  Ids shuffled_catalogue() {
-    Ids all;
-    for (const auto& [id, d] : of_)
-      if (!id.starts_with("outside_")) all.push_back(id);
-    shuffle(all);
-    for (const std::string& id : options_.effects)
-      if (!std::ranges::count(all, id))
-        throw io::InputError("--effects " + id + ": no effect of the catalogue; accepted: " + io::joined(all));
-    if (!options_.effects.empty())
-      std::erase_if(all, [&](const std::string& id) { return !std::ranges::count(options_.effects, id); });
-    random_.seed(first_seed_);
-    return all;
   }
 
   void number() {
@@ -248,36 +208,14 @@ class Planner {
     for (std::size_t i = 0; i < cases_.size(); ++i) cases_[i].number = i + 1;
   }
 
-  const std::map<std::string, Detectability>& of_;
   const PlanOptions& options_;
   std::uint64_t first_seed_;
-  Ids detectable_, typical_, outside_, hidden_;
+  Ids catalogue_, outside_, hidden_;  ///< hidden_: hover does not show them
   std::mt19937_64 random_;
   std::vector<PlannedCase> cases_;
 };
 
 }  // namespace
-
-std::map<std::string, Detectability> read_detectability(const std::filesystem::path& file,
-                                                        const blind::Family& family) {
-  const io::Config config = io::Config::load(file);
-  const io::Table root = config.root();
-  root.schema(1);
-  std::map<std::string, Detectability> all;
-  for (const blind::FamilyEffect& e : family.effects()) {
-    if (!in_catalogue(e) && !root.has(e.id)) continue;
-    const io::Table t = root.table(e.id);
-    Detectability d;
-    d.undetectable = t.boolean_or("undetectable", false);
-    if (!d.undetectable || t.has("detectable")) d.detectable = t.number("detectable", io::positive(kLargest));
-    if (!d.undetectable && kOverDetectable * d.detectable > kLargest)
-      t.fail("detectable", "twice that is beyond magnitude 4", "undetectable = true");
-    d.hidden = t.number("hover", io::positive(1e3)) > kOverDetectable * d.detectable && !d.undetectable;
-    all[e.id] = d;
-  }
-  root.finish();
-  return all;
-}
 
 blind::Assignment assignment_of(const PlannedCase& planned, const std::filesystem::path& vehicle) {
   blind::Assignment a;
@@ -299,10 +237,8 @@ std::optional<blind::Assignment> reference_of(const PlannedCase& planned, const 
   return a;
 }
 
-std::vector<PlannedCase> plan_cases(const blind::Family& family,
-                                    const std::map<std::string, Detectability>& detectability,
-                                    const PlanOptions& options) {
-  return Planner(family, detectability, options).run();
+std::vector<PlannedCase> plan_cases(const blind::Family& family, const PlanOptions& options) {
+  return Planner(family, options).run();
 }
 
 }  // namespace flappy::benchmark

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,19 +11,6 @@
 #include "lab/blind/family.hpp"
 
 namespace flappy::benchmark {
-
-struct Detectability {
-  double detectable = 0;      ///< detectable magnitude, in units of the family
-  bool undetectable = false;  ///< twice the detectable magnitude exceeds what a robot may have
-  bool hidden = false;        ///< hover alone does not show twice the detectable magnitude
-};
-
-/// Magnitude of most effects over the detectable one.
-inline constexpr double kOverDetectable = 2;
-
-/// Reads the table for every effect of a family that the catalogue has, and listed ones outside it. InputError if an
-/// effect of the catalogue is missing.
-std::map<std::string, Detectability> read_detectability(const std::filesystem::path& file, const blind::Family& family);
 
 /// One robot and its flights, as only the maker knows them.
 struct PlannedCase {
@@ -52,7 +38,7 @@ struct PlanOptions {
   bool reported = false;             ///< seeds of the reported scores; false: seeds for development
   bool contrast = false;             ///< parts of the contrast; false: of the diagnosis without reference flights
   std::vector<std::string> parts;    ///< empty: all
-  std::vector<std::string> effects;  ///< robots of contrasts have these effects alone; empty: all
+  std::vector<std::string> effects;  ///< robots have these effects of the catalogue alone; empty: all
   std::size_t at_most = 0;           ///< most cases of each part; 0: all
   std::size_t flights = blind::Family::kFlights;  ///< most flights of a session of a contrast
   /// Of the references of a contrast; other numbers have other seeds.
@@ -62,8 +48,6 @@ struct PlanOptions {
 
 /// Seeds of family b begin at 20,000,000 (development) and 29,000,000 (reported); a and c: 10,000,000 and 30,000,000
 /// likewise.
-std::vector<PlannedCase> plan_cases(const blind::Family& family,
-                                    const std::map<std::string, Detectability>& detectability,
-                                    const PlanOptions& options);
+std::vector<PlannedCase> plan_cases(const blind::Family& family, const PlanOptions& options);
 
 }  // namespace flappy::benchmark

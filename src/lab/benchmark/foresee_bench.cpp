@@ -13,15 +13,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Magnitudes over the typical ones, of an effect of a case without reference flights: as in part "singles".
-std::map<std::string, double> magnitudes_alone(const std::string& family) {
-  std::map<std::string, double> all;
-  const auto table = read_detectability(io::config_path("lab/detectable/" + family + ".toml"), family_named(family));
-  for (const auto& [effect, d] : table)
-    if (!d.undetectable && !effect.starts_with("outside_")) all[effect] = kOverDetectable * d.detectable;
-  return all;
-}
-
 fs::path file_of(const fs::path& folder, std::size_t number) {
   return folder / "foreseen" / (number_text(number) + ".json");
 }
@@ -50,7 +41,6 @@ bool foresee_bench(const BenchQuestions& command) {
     if (const std::string other = command.other_option(folder / "foreseen" / "options.txt"); !other.empty())
       throw io::InputError(folder.string() + ": was planned with another " + other +
                            "; accepted: the same options, or without the folder " + (folder / "foreseen").string());
-    const std::map<std::string, double> alone = magnitudes_alone(manifest.family);
     std::vector<const PublicCase*> open;
     for (const PublicCase& c : manifest.cases)
       if (!fs::exists(file_of(folder, c.number))) open.push_back(&c);
@@ -58,7 +48,7 @@ bool foresee_bench(const BenchQuestions& command) {
       const PublicCase& c = *open[k];
       const Question q = command.question(folder, manifest, c);
       Json json;
-      for (const Foreseen& f : foresee(q, q.reference.empty() ? alone : std::map<std::string, double>()))
+      for (const Foreseen& f : foresee(q))
         json[f.effect] = {{"rival", f.rival}, {"nats", f.nats}, {"probability", f.probability}};
       io::write_atomically(file_of(folder, c.number), json.dump(1) + "\n");
     });

@@ -23,8 +23,7 @@ class Maker {
       : command_(command),
         family_(family_named(command.family)),
         sealed_(command.out / "sealed"),
-        detectability_(read_detectability(table_of(command), family_)),
-        plan_(plan_cases(family_, detectability_, command.plan)),
+        plan_(plan_cases(family_, command.plan)),
         declared_(blind::declared_case(command.vehicle)),
         sampled_(sim::read_randomisation(declared_.vehicle, io::Config::load(command.randomise).root())) {}
 
@@ -52,10 +51,6 @@ class Maker {
   }
 
  private:
-  static fs::path table_of(const MakeCommand& command) {
-    if (!command.detectable.empty()) return command.detectable;
-    return io::config_path("lab/detectable/" + command.family + ".toml");
-  }
   fs::path label_file(const PlannedCase& p) const { return sealed_ / (number_text(p.number) + ".json"); }
   fs::path case_folder(const PlannedCase& p) const { return command_.out / "cases" / number_text(p.number); }
 
@@ -128,7 +123,7 @@ class Maker {
                io::commit(),
                family_.engine(),
                {}};
-    Json cases = Json::array(), never = Json::array(), undetectable = Json::array();
+    Json cases = Json::array(), never = Json::array();
     std::size_t lost = 0;
     for (const PlannedCase& p : plan_) {
       Json label = read_json(label_file(p));
@@ -144,26 +139,19 @@ class Maker {
           c.files[e.path().lexically_relative(command_.out).string()] = io::sha256(io::read_text(e.path()));
       m.cases.push_back(std::move(c));
     }
-    for (const auto& [id, d] : detectability_)
-      if (d.undetectable) undetectable.push_back(id);
     const std::string labels =
-        Json{{"schema", 1}, {"set", m.set}, {"undetectable", undetectable}, {"never_fly", never}, {"cases", cases}}
-            .dump(1) +
-        "\n";
+        Json{{"schema", 1}, {"set", m.set}, {"never_fly", never}, {"cases", cases}}.dump(1) + "\n";
     m.labels_sha256 = io::sha256(labels);
     io::write_atomically(sealed_ / "labels.json", labels);
     io::write_atomically(command_.out / "manifest.json", to_json(m).dump(1) + "\n");
     for (const PlannedCase& p : plan_) fs::remove(label_file(p));
-    std::printf(
-        "%s: %zu cases of family %s, %zu robots that crashed drawn again, %zu that never fly, %zu effects "
-        "undetectable\n",
-        command_.out.c_str(), m.cases.size(), command_.family.c_str(), lost, never.size(), undetectable.size());
+    std::printf("%s: %zu cases of family %s, %zu robots that crashed drawn again, %zu that never fly\n",
+                command_.out.c_str(), m.cases.size(), command_.family.c_str(), lost, never.size());
   }
 
   const MakeCommand& command_;
   const blind::Family& family_;
   fs::path sealed_;
-  std::map<std::string, Detectability> detectability_;
   std::vector<PlannedCase> plan_;
   blind::Case declared_;
   sim::Randomisation sampled_;

@@ -14,8 +14,7 @@ namespace flappy::benchmark {
 struct MakeCommand {
   std::string family = "a";
   std::filesystem::path out, vehicle = io::config_path("vehicles/hummingbird_nominal.toml"),
-                             randomise = io::config_path("randomisation/published.toml"),
-                             detectable;  ///< `detectable`: table of detectable magnitudes; empty: that of the family
+                             randomise = io::config_path("randomisation/published.toml");
   PlanOptions plan;
   std::size_t other_sessions = kOtherSessions;  ///< that tell which effects count; 0: this is not computed
   int threads = 0;                              ///< 0: one for each processor

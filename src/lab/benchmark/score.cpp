@@ -448,8 +448,6 @@ std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases) {
                    of_rivals(singles, rival_group)));
   l.push_back(line("top3", "right effect among three", Bar::at_least, 0.95, 0.99, share(singles, among_three),
                    of_rivals(singles, rival_among_three)));
-  l.push_back(
-      first_line("top1_typical", "right effect first at typical magnitude", 0.80, 0.93, of_parts(cases, {"typical"})));
   l.push_back(line("suspects", "given that an effect is missing: it is among the three named", Bar::at_least, 0.60,
                    0.80, share(singles, [](const ScoredCase& c) {
                      return std::ranges::count(c.prediction.suspects, c.truth.effects.front()) > 0;

@@ -22,27 +22,26 @@ struct CaseTruth {
 };
 /// Parts of a benchmark, by their robots. Those with effects have independent parameters and, but for redeclared,
 /// inexact declarations.
-///   singles, singles_current  one effect at twice its detectable magnitude; singles_current also logs currents
+///   singles, singles_current  one effect; singles_current also logs currents
 ///   redeclared                the robots of singles, with exact declarations
-///   typical                   one effect at magnitude 1, where that is detectable
 ///   none, parameters, own_parameters, conventions
 ///                             no effect: as the vehicle file; parameters of the published randomisation; each
 ///                             parameter of each body independent; declarations within the habits of laboratories
 ///   withheld, outside         an effect whose group is withheld from the catalogue; one never in the catalogue
 ///   pairs, hover              two effects of different groups; an effect that hover alone does not show, in hover
-inline constexpr const char* kParts[] = {"singles",  "singles_current", "redeclared",     "typical",
-                                         "none",     "parameters",      "own_parameters", "conventions",
-                                         "withheld", "outside",         "pairs",          "hover"};
+inline constexpr const char* kParts[] = {"singles",    "singles_current", "redeclared",  "none",
+                                         "parameters", "own_parameters",  "conventions", "withheld",
+                                         "outside",    "pairs",           "hover"};
 /// Parts of a contrast. All robots have independent parameters and inexact declarations; their tests are of another
 /// session than their references.
-///   changed, changed_pairs    one effect, and two of different groups, at magnitude 1
+///   changed, changed_pairs    one effect, and two of different groups, at typical magnitude
 ///   changed_short_reference, changed_short_test
 ///                             the robots of changed with one reference or one test flight of 10 s
 ///   unchanged                 no effect
 ///   changed_calm, unchanged_calm
-///                             references that hover and follow slow paths; one effect at magnitude 1, and none
+///                             references that hover and follow slow paths; one effect at typical magnitude, and none
 ///   changed_withheld, changed_outside
-///                             an effect whose group is withheld, at magnitude 1; one never in the catalogue, at 2
+///                             an effect whose group is withheld, at typical magnitude; one never in the catalogue, at 2
 inline constexpr const char* kContrastParts[] = {
     "changed",        "changed_short_reference", "changed_short_test", "unchanged",    "changed_calm",
     "unchanged_calm", "changed_withheld",        "changed_outside",    "changed_pairs"};

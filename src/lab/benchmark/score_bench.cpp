@@ -339,12 +339,9 @@ Json score_bench(const ScoreCommand& command) {
   }
 
   std::vector<CaseRecord> records;
-  std::set<std::string> undetectable;
   std::size_t never = 0;
   for (const auto& b : benches) {
     std::ranges::move(records_of(*b), std::back_inserter(records));
-    for (const Json& id : b->truths.at("undetectable"))
-      undetectable.insert(b->manifest.family + ": " + id.get<std::string>());
     never += b->truths.at("never_fly").size();
   }
   for (const fs::path& file : command.cases) std::ranges::move(read_records(file), std::back_inserter(records));
@@ -383,8 +380,7 @@ Json score_bench(const ScoreCommand& command) {
   if (by_family.size() > 1) text += table("all families", scores) + "\n";
   text += io::joined({sets.begin(), sets.end()}) + " seeds, " + std::to_string(all.size()) + " cases, " +
           std::to_string(drawn_again) + " robots that crashed drawn again, " + std::to_string(never) +
-          " that never fly left out. Undetectable, left out: " + std::to_string(undetectable.size()) +
-          (undetectable.empty() ? "" : " (" + io::joined({undetectable.begin(), undetectable.end()}) + ")") + ".\n";
+          " that never fly left out.\n";
   if (commits.size() > 1) text += "Predicted by " + std::to_string(commits.size()) + " different versions.\n";
   std::fputs(text.c_str(), stdout);
   if (!io::writes(command.ranks)) return nullptr;
@@ -394,7 +390,6 @@ Json score_bench(const ScoreCommand& command) {
   io::write_atomically(out / "score.csv", lines);
   io::write_atomically(out / "cases.jsonl", json_lines);
   std::printf("%s\n", io::shown_by(out.string()).c_str());
-  json["undetectable"] = undetectable;
   json["never_fly"] = never;
   json["drawn_again"] = drawn_again;
   json["set"] = sets;

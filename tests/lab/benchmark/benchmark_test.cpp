@@ -27,27 +27,12 @@ namespace fs = std::filesystem;
 
 const std::string kConfigs = FLAPPY_SOURCE_DIR "/configs/";
 
-/// Every effect is detectable at 0.2, or these alone, but the tether; hover hides the ceiling.
-std::string detectability(const std::vector<std::string>& only = {}) {
-  std::string text = "schema = 1\n";
-  for (const model::CatalogueEffect& e : model::effects()) {
-    const std::string id = e.info.id;
-    text += "[" + id + "]\n";
-    const bool left_out = id == "tether" || (!only.empty() && std::ranges::count(only, id) == 0);
-    text += left_out ? "undetectable = true\n" : "detectable = 0.2\n";
-    text += id == "ceiling_effect" ? "hover = 1000\n" : "hover = 0.3\n";
-  }
-  return text +
-         "[outside_slosh]\nundetectable = true\nhover = 1000\n[outside_vortex_ring]\ndetectable = 1.5\nhover = 1.5\n";
-}
-
-/// A folder of its own, with a table of detectability in it, by which ground and ceiling effect fly.
+/// A folder of its own.
 class Benchmark : public testing::Test {
  protected:
   Benchmark() : root_(fs::path(testing::TempDir()) / ("blind_" + name())) {
     fs::remove_all(root_);
     fs::create_directories(root_);
-    io::write_atomically(root_ / "detectable.toml", detectability({"ground_effect", "ceiling_effect"}));
   }
   ~Benchmark() override { fs::remove_all(root_); }
 
@@ -58,7 +43,7 @@ class Benchmark : public testing::Test {
     c.out = root_ / "bench";
     c.vehicle = kConfigs + "vehicles/hummingbird_nominal.toml";
     c.randomise = kConfigs + "randomisation/published.toml";
-    c.detectable = root_ / "detectable.toml";
+    c.plan.effects = {"ground_effect", "ceiling_effect"};
     c.plan.parts = {part};
     c.plan.at_most = at_most;
     c.other_sessions = 0;
@@ -127,7 +112,6 @@ TEST_F(Benchmark, PredictsSealsAndScores) {
   EXPECT_EQ(json.at("group_top1"), 1.0);
   EXPECT_NEAR(json.at("closure_median").get<double>(), 0.5 * (1 + 0.5 / 0.75), 1e-12);
   EXPECT_TRUE(json.at("top1_current").is_null());
-  EXPECT_EQ(json.at("undetectable").size(), model::effects().size() - 1) << "outside_slosh, and all but two";
   for (const char* key : {"top1_mocap_imu", "top1_current", "group_top1", "top3", "false_alarm_none", "unknown",
                           "unknown_wrong", "ece", "closure_median", "pairs_f1", "hover_abstain"})
     for (const char* end : {"", "_low", "_high"}) EXPECT_TRUE(json.contains(std::string(key) + end)) << key << end;
@@ -330,15 +314,13 @@ TEST_F(BlindContrast, CallsUnknownWhatTheCatalogueLacks) {
 
 TEST_F(Benchmark, PlansContrasts) {
   const blind::Family& family = family_named("a");
-  io::write_atomically(root_ / "detectable.toml", detectability());
-  const auto of = read_detectability(root_ / "detectable.toml", family);
   PlanOptions options;
   options.contrast = true;
   std::map<std::string, std::size_t> count;
   std::map<std::string, std::set<std::string>> effects;
   std::map<std::uint64_t, std::set<std::string>> by_seed;
   std::set<double> magnitudes;
-  std::vector<PlannedCase> cases = plan_cases(family, of, options);
+  std::vector<PlannedCase> cases = plan_cases(family, options);
   std::ranges::stable_sort(cases, {}, [](const PlannedCase& c) { return c.part != "changed"; });
   for (const PlannedCase& c : cases) {
     ++count[c.part];
@@ -365,30 +347,29 @@ TEST_F(Benchmark, PlansContrasts) {
   }
   const std::map<std::string, std::size_t> expected = {
       {"changed", 60},      {"changed_short_reference", 60}, {"changed_short_test", 60}, {"unchanged", 30},
-      {"changed_calm", 30}, {"unchanged_calm", 30},          {"changed_withheld", 30},   {"changed_outside", 18},
+      {"changed_calm", 30}, {"unchanged_calm", 30},          {"changed_withheld", 30},   {"changed_outside", 20},
       {"changed_pairs", 20}};
   EXPECT_EQ(count, expected);
   EXPECT_GT(magnitudes.size(), 100U) << "each robot has its own";
   EXPECT_LT(*magnitudes.begin(), 0.75);
   EXPECT_GT(*magnitudes.rbegin(), 1.9);
-  EXPECT_EQ(effects["changed"].size(), 30U) << "every effect, even an undetectable one";
+  EXPECT_EQ(effects["changed"].size(), 30U) << "every effect, even one that sessions hide";
   for (const auto& [seed, ids] : by_seed)
     if (ids.size() > 1) EXPECT_EQ(ids.size(), 2U) << "of a pair, not of another robot: " << seed;
   options.parts = {"singles"};
   EXPECT_TRUE(test::refusal([&] {
-                plan_cases(family, of, options);
+                plan_cases(family, options);
               }).starts_with("--part singles: not with --contrast; accepted: changed, "));
 }
 
 TEST_F(Benchmark, PlansEveryPart) {
   const blind::Family& family = family_named("a");
-  io::write_atomically(root_ / "detectable.toml", detectability());
-  const auto of = read_detectability(root_ / "detectable.toml", family);
-  const std::vector<PlannedCase> plan = plan_cases(family, of, {});
+  const std::vector<PlannedCase> plan = plan_cases(family, {});
   std::map<std::string, std::size_t> count;
   std::set<std::size_t> numbers;
   std::map<std::uint64_t, std::vector<const PlannedCase*>> by_seed;
   std::size_t in_order = 0;
+  std::set<std::string> hidden;
   for (const PlannedCase& c : plan) {
     ++count[c.part];
     numbers.insert(c.number);
@@ -397,9 +378,9 @@ TEST_F(Benchmark, PlansEveryPart) {
     EXPECT_GE(c.seed, 10'000'000U);
     EXPECT_LT(c.seed, 15'000'000U);
     for (const blind::BlindEffect& e : c.effects) {
-      if (c.part.starts_with("singles") || c.part == "pairs") EXPECT_DOUBLE_EQ(e.magnitude, 0.4) << e.id;
-      if (c.part == "typical") EXPECT_DOUBLE_EQ(e.magnitude, 1) << e.id;
-      if (c.part != "hover") EXPECT_NE(e.id, "tether") << "undetectable, in " << c.part;
+      if (c.part == "outside") EXPECT_DOUBLE_EQ(e.magnitude, 2) << e.id;
+      else EXPECT_TRUE(e.magnitude >= 0.7 && e.magnitude <= 2) << e.id;
+      if (c.part == "hover") hidden.insert(e.id);
       EXPECT_EQ(e.id.starts_with("outside_"), c.part == "outside") << e.id;
     }
     if (c.part == "pairs") {
@@ -415,18 +396,17 @@ TEST_F(Benchmark, PlansEveryPart) {
     EXPECT_EQ(c.withheld.empty(), c.part != "withheld");
     if (c.part == "withheld" && c.effects[0].id == "wind")
       EXPECT_EQ(std::ranges::count(c.withheld, "tether"), 1) << "of its group";
-    if (c.part == "outside") {
-      EXPECT_NE(c.effects[0].id, "outside_slosh") << "undetectable";
-      EXPECT_DOUBLE_EQ(c.effects[0].magnitude, c.effects[0].id == "outside_vortex_ring" ? 3 : 2) << c.effects[0].id;
-    }
     EXPECT_EQ(c.power, c.part == "singles_current");
     EXPECT_EQ(c.hover, c.part == "hover");
   }
-  // 29 effects in turn, 9 outside, one that hover hides
-  const std::map<std::string, std::size_t> expected = {
-      {"singles", 116},        {"singles_current", 116}, {"redeclared", 100}, {"typical", 116},
-      {"none", 100},           {"parameters", 100},      {"withheld", 58},    {"outside", 54},
-      {"own_parameters", 100}, {"conventions", 100},     {"pairs", 100},      {"hover", 100}};
+  // 30 effects in turn, 10 outside
+  EXPECT_TRUE(hidden.contains("body_drag") && hidden.contains("ceiling_effect"));
+  EXPECT_FALSE(hidden.contains("wing_damage") || hidden.contains("wind")) << "they act in hover, too";
+  const std::size_t of_hover = (100 + hidden.size() - 1) / hidden.size() * hidden.size();
+  const std::map<std::string, std::size_t> expected = {{"singles", 120}, {"singles_current", 120}, {"redeclared", 100},
+                                                       {"none", 100},    {"parameters", 100},      {"withheld", 60},
+                                                       {"outside", 50},  {"own_parameters", 100},  {"conventions", 100},
+                                                       {"pairs", 100},   {"hover", of_hover}};
   EXPECT_EQ(count, expected);
   EXPECT_EQ(numbers.size(), plan.size());
   EXPECT_EQ(*numbers.rbegin(), plan.size());
@@ -444,13 +424,12 @@ TEST_F(Benchmark, PlansEveryPart) {
   }
   PlanOptions reported;
   reported.reported = true;
-  for (const PlannedCase& c : plan_cases(family, of, reported))
-    EXPECT_TRUE(c.seed >= 15'000'000U && c.seed < 20'000'000U);
+  for (const PlannedCase& c : plan_cases(family, reported)) EXPECT_TRUE(c.seed >= 15'000'000U && c.seed < 20'000'000U);
   // what a part holds does not depend on what else is made
   PlanOptions pairs;
   pairs.parts = {"pairs"};
   std::set<std::string> alone, among;
-  for (const PlannedCase& c : plan_cases(family, of, pairs)) alone.insert(c.effects[0].id + std::to_string(c.seed));
+  for (const PlannedCase& c : plan_cases(family, pairs)) alone.insert(c.effects[0].id + std::to_string(c.seed));
   for (const PlannedCase& c : plan)
     if (c.part == "pairs") among.insert(c.effects[0].id + std::to_string(c.seed));
   EXPECT_EQ(alone, among);
@@ -462,18 +441,6 @@ TEST_F(Benchmark, FamilyAHasTheCatalogue) {
     if (in_catalogue(e)) own.insert(e.id);
   for (const model::CatalogueEffect& e : model::effects()) catalogue.insert(std::string(e.info.id));
   EXPECT_EQ(own, catalogue);
-}
-
-TEST_F(Benchmark, HoverHidesWhatTheTableSays) {
-  std::string text = detectability();
-  for (const char* id : {"com_offset", "tether"})
-    text.replace(text.find("hover = 0.3", text.find("[" + std::string(id) + "]")), 11, "hover = 0.5");
-  io::write_atomically(root_ / "detectable.toml", text);
-  const auto of = read_detectability(root_ / "detectable.toml", family_named("a"));
-  EXPECT_FALSE(of.at("wind").hidden) << "twice 0.2 shows in hover";
-  EXPECT_TRUE(of.at("com_offset").hidden);
-  EXPECT_TRUE(of.at("ceiling_effect").hidden);
-  EXPECT_FALSE(of.at("tether").hidden) << "nothing shows it";
 }
 
 TEST_F(Benchmark, SealsWhereEffectsActAndWhatTheFileDeclares) {
@@ -636,17 +603,16 @@ TEST_F(Benchmark, RefusesWhatThereIsNot) {
             "flight 3: there is none of this number; accepted: 0, 1 and 2");
 }
 
-TEST_F(Benchmark, RefusesATableOfMagnitudesThatIsNone) {
-  const fs::path file = root_ / "detectable.toml";
-  io::write_atomically(file, detectability() + "[no_such_effect]\ndetectable = 1\n");
-  EXPECT_NE(test::refusal([&] { read_detectability(file, family_named("a")); }).find("no_such_effect"),
-            std::string::npos);
-  std::string text = detectability();
-  text.replace(text.find("detectable = 0.2"), 16, "detectable = 2.1");
-  io::write_atomically(file, text);
-  EXPECT_NE(
-      test::refusal([&] { read_detectability(file, family_named("a")); }).find("twice that is beyond magnitude 4"),
-      std::string::npos);
+TEST_F(Benchmark, RefusesEffectsThatItCannotPlan) {
+  PlanOptions options;
+  options.effects = {"grund_effect"};
+  EXPECT_TRUE(test::refusal([&] {
+                plan_cases(family_named("a"), options);
+              }).starts_with("--effects grund_effect: no effect of the catalogue; accepted: "));
+  options.effects = {"ground_effect", "ceiling_effect"};
+  options.parts = {"pairs"};
+  EXPECT_EQ(test::refusal([&] { plan_cases(family_named("a"), options); }),
+            "--effects: all are of one group; accepted: of two groups for pairs");
 }
 
 }  // namespace

@@ -127,5 +127,17 @@ TEST(CatalogueLaws, AreWrittenDownForEveryEffectButGeometry) {
   EXPECT_EQ(asked, law_questions().size());
 }
 
+#if defined(FLAPPY_FAMILIES) && defined(FLAPPY_HAVE_MUJOCO)
+TEST(Families, ShareNoLawAndNoNumber) {
+  const std::vector<const blind::Family*> all = {&family_named("a"), &family_named("b"), &family_named("c")};
+  for (const LawPair& p : compare_laws(all)) {
+    SCOPED_TRACE(p.effect + ": " + p.first + " and " + p.second);
+    EXPECT_EQ(p.missing, "");
+    EXPECT_FALSE(p.equal_number) << *p.equal_number;
+    if (p.distance) EXPECT_GE(*p.distance, kMinDistance);
+  }
+}
+#endif
+
 }  // namespace
 }  // namespace flappy::benchmark

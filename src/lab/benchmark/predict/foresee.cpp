@@ -4,7 +4,7 @@
 
 namespace flappy::benchmark {
 
-std::vector<Foreseen> foresee(const Question& q, const std::map<std::string, double>& magnitudes) {
+std::vector<Foreseen> foresee(const Question& q) {
   gap::PlanSettings settings;
   settings.vehicle = q.vehicle;
   for (const std::filesystem::path& folder : q.flights) settings.like.push_back(folder);
@@ -14,7 +14,6 @@ std::vector<Foreseen> foresee(const Question& q, const std::map<std::string, dou
   settings.discrepancy = q.discrepancy;
   settings.verdict = q.verdict;
   settings.sessions = q.sessions;
-  settings.magnitudes = magnitudes;
   settings.matrix_only = true;
   settings.threads = 1;
   const gap::Plan plan = make_plan(settings);

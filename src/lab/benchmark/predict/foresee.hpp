@@ -1,6 +1,5 @@
 #pragma once
 
-#include <map>
 #include <string>
 #include <vector>
 
@@ -16,8 +15,8 @@ struct Foreseen {
   double probability = 0;  ///< that the diagnosis gives the effect
 };
 
-/// The plan (gap/next/plan.hpp) of flights with the inputs and paths of the question's, on one thread. `magnitudes`:
-/// [effect] over the typical magnitude. io::InputError for a file or log that is not accepted.
-std::vector<Foreseen> foresee(const Question& question, const std::map<std::string, double>& magnitudes);
+/// The plan (gap/next/plan.hpp) of flights with the inputs and paths of the question's, of effects at their typical
+/// magnitudes, on one thread. io::InputError for a file or log that is not accepted.
+std::vector<Foreseen> foresee(const Question& question);
 
 }  // namespace flappy::benchmark
