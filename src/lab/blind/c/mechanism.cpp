@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "lab/blind/c/c_laws.hpp"
 #include "lab/blind/c/mjcf.hpp"
 
 namespace flappy::blind::c {
@@ -41,27 +42,6 @@ Eigen::Map<const Eigen::Vector3d> vector_of(const mjtNum* at) { return Eigen::Ma
 // Thousands of times the torso's own, so what it still gives way is as small a share. Far larger ones would hide the
 // support's force from the solver's tolerance.
 constexpr double kClampMass_kg = 1e3, kClampInertia_kg_m2 = 1;
-
-/// An ellipsoid's velocity and rate in its axes per rate of each coordinate, and its virtual mass and moment of inertia.
-struct Carried {
-  Eigen::Matrix3d R;  ///< from its axes to W
-  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 32> v, w;
-  Eigen::Vector3d mass, moment;
-};
-
-Carried carried(const mjModel& m, const mjData& d, std::ptrdiff_t geom) {
-  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, 32> along(3, m.nv), about(3, m.nv);
-  mj_jac(&m, &d, along.data(), about.data(), d.geom_xpos + 3 * geom, m.geom_bodyid[geom]);
-  Carried c;
-  c.R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(d.geom_xmat + 9 * geom);
-  c.v = c.R.transpose() * along;
-  c.w = c.R.transpose() * about;
-  const mjtNum* fluid = m.geom_fluid + mjNFLUID * geom;
-  const double scale = m.opt.density * fluid[0];
-  c.mass = scale * vector_of(fluid + 6);
-  c.moment = scale * vector_of(fluid + 9);
-  return c;
-}
 
 /// J' q' of an ellipsoid's centre, m/s^2, and of its rate, rad/s^2, in W: its accelerations where all q'' are zero.
 std::pair<Eigen::Vector3d, Eigen::Vector3d> drift_of(const mjModel& m, const mjData& d, std::ptrdiff_t geom) {
@@ -111,12 +91,17 @@ Mechanism::Mechanism(const RobotParameters& parameters, const Build& build, doub
       strips_[side][i] = mj_name2id(&m, mjOBJ_GEOM, (names[side] + "_strip_" + std::to_string(i)).c_str());
     std::memcpy(strip_quat_[side].data(), m.geom_quat + 4 * strips_[side].back(), sizeof strip_quat_[side]);
   }
-  // Only the wings have virtual mass, and only with its effect.
-  for (std::ptrdiff_t geom = 0; geom < m.ngeom; ++geom) {
-    const bool of_wing = std::ranges::count(strips_[0], geom) + std::ranges::count(strips_[1], geom) > 0;
-    mjtNum* fluid = m.geom_fluid + mjNFLUID * geom;
-    for (int i = 6; i < mjNFLUID; ++i) fluid[i] *= of_wing ? build.added_mass : 0;
+  // Only the wings have virtual mass, and only with its effect; the engine's products are taken from all.
+  for (std::size_t side = 0; side < 2; ++side) {
+    growth_m_s_[side] = laws::kGrowthPeriods * parameters.sides[side].planform.chord_m * parameters.flapping_Hz;
+    for (std::size_t i = 0; i < kStrips; ++i) {
+      const mjtNum* fluid = m.geom_fluid + mjNFLUID * strips_[side][i];
+      virtual_m3_[side][i] = build.added_mass * fluid[6];
+      virtual_m5_[side][i] = build.added_mass * vector_of(fluid + 9);
+    }
   }
+  for (std::ptrdiff_t geom = 0; geom < m.ngeom; ++geom)
+    std::fill_n(m.geom_fluid + mjNFLUID * geom + 6, mjNFLUID - 6, mjtNum(0));
   mj_forward(&m, data_.get());
 }
 
@@ -181,6 +166,7 @@ void Mechanism::step(const std::array<double, 2>& motor_Nm, const std::array<dou
   if (added_mass_) {
     add_virtual_mass();
     Eigen::Map<Eigen::VectorXd>(d->qfrc_applied, m->nv) -= virtual_mass_bias();
+    Eigen::Map<Eigen::VectorXd>(d->qfrc_passive, m->nv) += virtual_mass_products();
   }
   for (std::size_t side = 0; side < 2; ++side) {
     d->qfrc_applied[drive_v_[side]] += motor_Nm[side];
@@ -211,74 +197,97 @@ void Mechanism::clamp() {
   for (int i = 0; i < 6; ++i) model_->dof_armature[i] = i < 3 ? kClampMass_kg : kClampInertia_kg_m2;
 }
 
-// The air's momentum about an ellipsoid moves with it: p = m_A v, h = I_A w in its axes, v and w without the wind.
-// Kirchhoff's equations [Lamb, Hydrodynamics, 6th ed. 1932, chapter VI] give the force on it
-//   F = -(m_A dv/dt + w x p),  T = -(I_A dw/dt + w x h + v x p)
-// and the air has the energy (v.p + w.h)/2. The products do no work, and are MuJoCo's. In coordinates q, with dv/dt in the
-// axes of the ellipsoid R^T (J q'' + J' q') - w x v, the rest is M_A q'' + b, M_A = J^T (m_A, I_A) J.
-// Wind is taken as steady.
+// The air that an ellipsoid carries has the momentum p along its normal, a function of its speed v along it, and h = I_A w,
+// in its axes, without the wind. As in Kirchhoff's equations [Lamb, Hydrodynamics, 6th ed. 1932, chapter VI] the force on it
+// is
+//   F = -(dp/dt + S w x p),  T = -(I_A dw/dt + w x h + S v x p)
+// with the share S of the products of p that suction leaves. What the rest turns of p is left to the wake. The products do no
+// work: v.(w x p) + w.(v x p) = 0, so the power is that of v dp/dt and w dh/dt. In coordinates q, with dv/dt in the axes of
+// the ellipsoid R^T (J q'' + J' q') - w x v, the rest is M_A q'' + b, M_A = J^T (dp/dv, I_A) J. Wind is taken as steady.
+struct Mechanism::Carried {
+  std::ptrdiff_t geom;
+  Eigen::Matrix3d R;                                              ///< from its axes to W
+  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 32> v_of, w_of;  ///< in its axes, per rate of each coordinate
+  Eigen::Vector3d v, w, p, h, mass, moment;                       ///< mass: dp/dv
+  double energy_J;
+};
+
+Mechanism::Carried Mechanism::carried(std::size_t side, std::size_t strip) const {
+  const mjModel& m = *model_;
+  const mjData& d = *data_;
+  Carried c;
+  c.geom = strips_[side][strip];
+  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, 32> along(3, m.nv), about(3, m.nv);
+  mj_jac(&m, &d, along.data(), about.data(), d.geom_xpos + 3 * c.geom, m.geom_bodyid[c.geom]);
+  c.R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(d.geom_xmat + 9 * c.geom);
+  c.v_of = c.R.transpose() * along;
+  c.w_of = c.R.transpose() * about;
+  const Eigen::Map<const Eigen::VectorXd> rates(d.qvel, m.nv);
+  c.v = c.v_of * rates - c.R.transpose() * vector_of(m.opt.wind);
+  c.w = c.w_of * rates;
+  const double density = m.opt.density * m.geom_fluid[mjNFLUID * c.geom];  // air's factor too
+  const double mass_kg = density * virtual_m3_[side][strip];
+  const laws::CarriedAir air = laws::carried_air(c.v.x(), growth_m_s_[side]);
+  c.mass = {mass_kg * air.mass, 0, 0};
+  c.p = {mass_kg * air.momentum_m_s, 0, 0};
+  c.moment = density * virtual_m5_[side][strip];
+  c.h = c.moment.cwiseProduct(c.w);
+  c.energy_J = mass_kg * air.energy_m2_s2 + c.w.dot(c.h) / 2;
+  return c;
+}
+
+std::array<Mechanism::Carried, 2 * Mechanism::kStrips> Mechanism::all_carried() const {
+  return {carried(0, 0), carried(0, 1), carried(1, 0), carried(1, 1)};
+}
+
 void Mechanism::add_virtual_mass() {
   mjModel* m = model_.get();
   mjData* d = data_.get();
   const int nv = static_cast<int>(m->nv);
-  for (const auto& wing : strips_)
-    for (const std::ptrdiff_t geom : wing) {
-      const Carried c = carried(*m, *d, geom);
-      const auto add = [&](int i, int j, mjtNum& to) {
-        to += c.v.col(i).dot(c.mass.cwiseProduct(c.v.col(j))) + c.w.col(i).dot(c.moment.cwiseProduct(c.w.col(j)));
-      };
-      for (int i = 0; i < nv; ++i)
+  for (const Carried& c : all_carried()) {
+    const auto add = [&](int i, int j, mjtNum& to) {
+      to += c.v_of.col(i).dot(c.mass.cwiseProduct(c.v_of.col(j))) +
+            c.w_of.col(i).dot(c.moment.cwiseProduct(c.w_of.col(j)));
+    };
+    for (int i = 0; i < nv; ++i)
 #if mjVERSION_HEADER < 300  // a row of M from its diagonal on, by parents
-        for (int j = i, at = m->dof_Madr[i]; j >= 0; j = m->dof_parentid[j]) add(i, j, d->qM[at++]);
+      for (int j = i, at = m->dof_Madr[i]; j >= 0; j = m->dof_parentid[j]) add(i, j, d->qM[at++]);
 #else  // its columns as listed
-        for (int at = m->M_rowadr[i]; at < m->M_rowadr[i] + m->M_rownnz[i]; ++at) add(i, m->M_colind[at], d->M[at]);
+      for (int at = m->M_rowadr[i]; at < m->M_rowadr[i] + m->M_rownnz[i]; ++at) add(i, m->M_colind[at], d->M[at]);
 #endif
-    }
+  }
   mj_factorM(m, d);
 }
 
 Eigen::VectorXd Mechanism::virtual_mass_bias() const {
-  const mjModel& m = *model_;
-  const mjData& d = *data_;
-  const Eigen::Map<const Eigen::VectorXd> rates(d.qvel, m.nv);
-  const Eigen::Vector3d wind_W = vector_of(m.opt.wind);
-  Eigen::VectorXd bias = Eigen::VectorXd::Zero(m.nv);
-  for (const auto& wing : strips_)
-    for (const std::ptrdiff_t geom : wing) {
-      const Carried c = carried(m, d, geom);
-      const auto [along_W, about_W] = drift_of(m, d, geom);
-      const Eigen::Vector3d v = c.v * rates - c.R.transpose() * wind_W, w = c.w * rates;
-      bias += c.v.transpose() * c.mass.cwiseProduct(c.R.transpose() * along_W - w.cross(v)) +
-              c.w.transpose() * c.moment.cwiseProduct(c.R.transpose() * about_W);
-    }
+  Eigen::VectorXd bias = Eigen::VectorXd::Zero(model_->nv);
+  for (const Carried& c : all_carried()) {
+    const auto [along_W, about_W] = drift_of(*model_, *data_, c.geom);
+    bias += c.v_of.transpose() * c.mass.cwiseProduct(c.R.transpose() * along_W - c.w.cross(c.v)) +
+            c.w_of.transpose() * c.moment.cwiseProduct(c.R.transpose() * about_W);
+  }
   return bias;
 }
 
+Eigen::VectorXd Mechanism::virtual_mass_products() const {
+  Eigen::VectorXd force = Eigen::VectorXd::Zero(model_->nv);
+  for (const Carried& c : all_carried())
+    force -= laws::kSuction * c.v_of.transpose() * c.w.cross(c.p) +
+             c.w_of.transpose() * (c.w.cross(c.h) + laws::kSuction * c.v.cross(c.p));
+  return force;
+}
+
 Eigen::VectorXd Mechanism::virtual_mass_load(const Eigen::VectorXd& accelerations) const {
-  const mjModel& m = *model_;
-  const mjData& d = *data_;
-  const Eigen::Map<const Eigen::VectorXd> rates(d.qvel, m.nv);
-  Eigen::VectorXd load = -virtual_mass_bias();
-  for (const auto& wing : strips_)
-    for (const std::ptrdiff_t geom : wing) {
-      const Carried c = carried(m, d, geom);
-      const Eigen::Vector3d v = c.v * rates, w = c.w * rates;
-      const Eigen::Vector3d p = c.mass.cwiseProduct(v), h = c.moment.cwiseProduct(w);
-      load -= c.v.transpose() * (c.mass.cwiseProduct(c.v * accelerations) + w.cross(p)) +
-              c.w.transpose() * (c.moment.cwiseProduct(c.w * accelerations) + w.cross(h) + v.cross(p));
-    }
+  Eigen::VectorXd load = virtual_mass_products() - virtual_mass_bias();
+  for (const Carried& c : all_carried())
+    load -= c.v_of.transpose() * c.mass.cwiseProduct(c.v_of * accelerations) +
+            c.w_of.transpose() * c.moment.cwiseProduct(c.w_of * accelerations);
   return load;
 }
 
 double Mechanism::virtual_mass_energy() const {
-  const Eigen::Map<const Eigen::VectorXd> rates(data_->qvel, model_->nv);
   double energy_J = 0;
-  for (const auto& wing : strips_)
-    for (const std::ptrdiff_t geom : wing) {
-      const Carried c = carried(*model_, *data_, geom);
-      const Eigen::Vector3d v = c.v * rates, w = c.w * rates;
-      energy_J += (v.dot(c.mass.cwiseProduct(v)) + w.dot(c.moment.cwiseProduct(w))) / 2;
-    }
+  for (const Carried& c : all_carried()) energy_J += c.energy_J;
   return energy_J;
 }
 

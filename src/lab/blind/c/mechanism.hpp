@@ -3,8 +3,8 @@
 // and moment about the shoulder are the whole planform's where of second degree in the radius. Chord: of an ellipse of
 // the wing's length and area, its middle 0.55 mean chords behind the leading edge. Without the effect added_mass a wing has
 // no virtual mass: MuJoCo's model has only the products of velocities of its force, and those alone would be no fluid's.
-// Up to 3.13 MuJoCo's lift has a floor of 1e-15 in
-// a denominator, which takes lift from these wings below 0.8 m/s: other versions have other robots (Family::engine).
+// With it, a law of our own (c_laws.hpp) takes their place. Up to 3.13 MuJoCo's lift has a floor of 1e-15 in a denominator,
+// which takes lift from these wings below 0.8 m/s: other versions have other robots (Family::engine).
 // Clamped: with a mass A and a moment of inertia added to the six coordinates t of the torso, and w the others,
 //   (M_tt + A) a_t + M_tw a_w = f_t,
 // the torso stays where it is as A grows, and A a_t tends to f_t - M_tw a_w, which it exerts on its support [2]: weight
@@ -48,8 +48,8 @@ inline constexpr double kRotationAxis = 0.068, kRotation = M_PI * (0.75 - kRotat
 // Damage: share of the outer ellipse's area, lost at its tip. Hawkmoths may need no active compensation up to 12 % of
 // asymmetry in the second moment of area (Fernandez, Springthorpe, Hedrick, J. Exp. Biol. 215, 3631, 2012); choice below.
 inline constexpr double kDamage = 0.043, kDamage_m = 1.351e-3;  ///< of area, and of the nominal wing's length
-// Virtual mass along the normal, and moment about the span, of the nominal wing's inner and outer ellipsoid: what MuJoCo derives.
-inline constexpr std::array<double, 2> kVirtual_kg = {1.2857e-5, 9.6459e-6}, kVirtual_kg_m2 = {2.8785e-10, 2.2617e-10};
+// Virtual mass along the normal of both ellipsoids of the nominal wing at small speeds: what MuJoCo derives.
+inline constexpr double kVirtual_kg = 2.2503e-5;
 // Play of the gear at the wing: choice, 80 um at a pitch radius of 5.6 mm. The teeth are a soft constraint of MuJoCo.
 inline constexpr double kBacklash_rad = 0.0143, kTeethTime_s = 2.3e-4, kTeethDamping = 0.86;
 // Softened stops, as of rubber: stiffness over 1 + 2.7 m, and an impedance that rises over an angle from a low one (MuJoCo
@@ -105,7 +105,7 @@ class Mechanism {
   void twist(std::size_t side, double angle_rad);
   void set_friction(std::size_t side, double torque_Nm);
 
-  /// Generalised force (N, Nm) of the virtual mass on all coordinates, at these accelerations, in still air.
+  /// Generalised force (N, Nm) of the virtual mass on all coordinates, at these accelerations, in steady wind.
   Eigen::VectorXd virtual_mass_load(const Eigen::VectorXd& accelerations) const;
   /// Energy of the air that the virtual mass stands for, J.
   double virtual_mass_energy() const;
@@ -122,8 +122,12 @@ class Mechanism {
   const Wrench& support() const { return support_; }
 
  private:
+  struct Carried;
+  Carried carried(std::size_t side, std::size_t strip) const;
+  std::array<Carried, 2 * kStrips> all_carried() const;
   void add_virtual_mass();
   Eigen::VectorXd virtual_mass_bias() const;
+  Eigen::VectorXd virtual_mass_products() const;
   void hold_torso(const Motion& held);
 
   std::unique_ptr<mjModel, void (*)(mjModel*)> model_;
@@ -132,6 +136,9 @@ class Mechanism {
   std::array<std::array<std::ptrdiff_t, kStrips>, 2> strips_{};
   std::array<std::array<double, 4>, 2> strip_quat_{};
   bool added_mass_ = false;
+  std::array<std::array<double, kStrips>, 2> virtual_m3_{};  ///< along the normal at small speeds, over the density
+  std::array<std::array<Eigen::Vector3d, kStrips>, 2> virtual_m5_{};  ///< moments of inertia over the density
+  std::array<double, 2> growth_m_s_{};                                ///< v0 of the virtual mass
   bool clamped_ = false;
   Motion clamp_;
   Wrench support_;

@@ -1284,12 +1284,48 @@ TEST(FamilyC, LawsOfTheRoomHaveTheirLimits) {
   EXPECT_EQ(laws::wake_share(0), 0);
 }
 
-TEST(FamilyC, AirsEnergyClosesWithTheVirtualMass) {
+TEST(FamilyC, AirsEnergyAndMomentumCloseWithTheVirtualMass) {
   Build build;
   build.added_mass = 1.7;
-  Mechanism mechanism(drawn_parameters(nominal(), 3), build);
+  const RobotParameters f = drawn_parameters(nominal(), 3);
+  Mechanism mechanism(f, build);
   mjModel& m = mechanism.model();
   mjData& d = const_cast<mjData&>(mechanism.data());
+  struct Ellipsoid {
+    int geom;
+    double mass_kg, growth_m_s;
+  };
+  std::vector<Ellipsoid> ellipsoids;
+  const auto only = [&](std::size_t side, std::size_t strip) {
+    for (std::size_t i = 0; i < 2; ++i)
+      for (std::size_t j = 0; j < Mechanism::kStrips; ++j)
+        mechanism.scale_air(i, j, side == 2 || (i == side && j == strip) ? 1 : 0);
+  };
+  for (std::size_t side = 0; side < 2; ++side)
+    for (std::size_t i = 0; i < Mechanism::kStrips; ++i) {
+      const std::string name = (side == 0 ? "left_strip_" : "right_strip_") + std::to_string(i);
+      const int geom = mj_name2id(&m, mjOBJ_GEOM, name.c_str());
+      only(side, i);
+      for (int k = 0; k < 3; ++k) d.qvel[k] = 1e-3 * d.geom_xmat[9 * geom + 3 * k];  // along its normal
+      ellipsoids.push_back({geom, 2e6 * mechanism.virtual_mass_energy(),
+                            laws::kGrowthPeriods * f.sides[side].planform.chord_m * f.flapping_Hz});
+    }
+  only(2, 0);
+  // what the ellipsoids carry in W, and the part of its turning that suction does not make
+  const auto carried = [&] {
+    std::pair<Eigen::Vector3d, Eigen::Vector3d> sum = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+    for (const Ellipsoid& one : ellipsoids) {
+      mjtNum v[6];
+      mj_objectVelocity(&m, &d, mjOBJ_GEOM, one.geom, v, 0);
+      const Eigen::Vector3d normal(d.geom_xmat[9 * one.geom], d.geom_xmat[9 * one.geom + 3],
+                                   d.geom_xmat[9 * one.geom + 6]);
+      const double along = normal.dot(Eigen::Vector3d(v + 3));
+      const Eigen::Vector3d p = one.mass_kg * laws::carried_air(along, one.growth_m_s).momentum_m_s * normal;
+      sum.first += p;
+      sum.second += (1 - laws::kSuction) * Eigen::Vector3d(v).cross(p);
+    }
+    return sum;
+  };
   Random random(1, "state");
   const int nv = static_cast<int>(m.nv);
   Eigen::VectorXd accelerations(nv);
@@ -1303,8 +1339,10 @@ TEST(FamilyC, AirsEnergyClosesWithTheVirtualMass) {
     // the work that the robot does on the air is what its energy gains, by central differences
     const Eigen::VectorXd q = Eigen::Map<Eigen::VectorXd>(d.qpos, m.nq), v = Eigen::Map<Eigen::VectorXd>(d.qvel, nv);
     const double power_W = -mechanism.virtual_mass_load(accelerations).dot(v), scale = mechanism.virtual_mass_energy();
+    const Eigen::Vector3d force_N = mechanism.virtual_mass_load(accelerations).head<3>() - carried().second;
     const double h = 1e-7;
     std::array<double, 2> energy_J{};
+    std::array<Eigen::Vector3d, 2> momentum;
     for (const int side : {0, 1}) {
       const double dt = side == 0 ? -h : h;
       Eigen::Map<Eigen::VectorXd>(d.qpos, m.nq) = q;
@@ -1313,20 +1351,66 @@ TEST(FamilyC, AirsEnergyClosesWithTheVirtualMass) {
       Eigen::Map<Eigen::VectorXd>(d.qvel, nv) = v + dt * accelerations;
       mj_forward(&m, &d);
       energy_J[static_cast<std::size_t>(side)] = mechanism.virtual_mass_energy();
+      momentum[static_cast<std::size_t>(side)] = carried().first;
     }
     // truncation is of the order h^2; rounding 1e-16/h of the energy
     EXPECT_NEAR(power_W, (energy_J[1] - energy_J[0]) / (2 * h), 1e-6 * scale / h * 1e-2 + 1e-6 * std::abs(power_W));
     EXPECT_GT(std::abs(power_W), 1e-6);
+    EXPECT_LT((force_N + (momentum[1] - momentum[0]) / (2 * h)).norm(), 1e-5 * force_N.norm());
   }
-  // the numbers that the table states are the engine's
+}
+
+TEST(FamilyC, CarriedAirIsItsClosedForms) {
+  // mass and energy follow from the momentum; the mass coefficient of an oscillation rises from 1 with its period parameter
+  const double v0 = 5.3;
+  for (double v = -20; v <= 20; v += 1.7) {
+    const double h = 1e-5;
+    const laws::CarriedAir before = laws::carried_air(v - h, v0), after = laws::carried_air(v + h, v0),
+                           now = laws::carried_air(v, v0);
+    EXPECT_NEAR((after.momentum_m_s - before.momentum_m_s) / (2 * h), now.mass, 1e-8);
+    EXPECT_NEAR((after.energy_m2_s2 - before.energy_m2_s2) / (2 * h), v * now.mass, 1e-6);
+    EXPECT_TRUE(now.mass >= 1 && now.mass <= 1 + laws::kGrowth);
+  }
+  double last = 1;
+  for (const double period : {1, 4, 16, 64}) {
+    double sum = 0, weight = 0;
+    for (int i = 0; i < 400; ++i) {
+      const double phase = 2 * M_PI * (i + 0.5) / 400, cosine = std::cos(phase);
+      sum += cosine * cosine * laws::carried_air(v0 * period / laws::kGrowthPeriods * std::sin(phase), v0).mass;
+      weight += cosine * cosine;
+    }
+    EXPECT_GT(sum / weight, last);
+    EXPECT_LT(sum / weight, 1 + laws::kGrowth);
+    last = sum / weight;
+  }
+  // blade elements of flat elliptic discs, 4/3 pi rho a b^2 / E [Lamb, chapter V]: a stroke that speeds up with the chord
+  // upright, and the moment of a steady one; the moments of inertia fall out or are what is left at rest
+  const Planform& p = nominal().sides[0].planform;
+  const double growth = laws::kGrowthPeriods * p.chord_m * nominal().flapping_Hz, rate = 180, angle = 0.6, a = 2e4;
+  const auto law = [](double rotation, double stroke_rate, double acceleration) {
+    return law_of("added_mass", std::array{rotation, stroke_rate, 0.0, acceleration, 0.0});
+  };
+  double whole = 0, inertia = -law(0, 0, a)[0] / a, more = 0, munk = 0;
+  for (const Strip& strip : strips_of(p)) {
+    const double half_chord = 2 * p.chord_m / M_PI, half = half_length(strip) * p.length_m,
+                 r = strip.radius * p.length_m;
+    const double least = std::min(half, half_chord), most = std::max(half, half_chord), of = least / most;
+    const double mass =
+        4.0 / 3 * M_PI * nominal().density_kg_m3 * most * least * least / std::comp_ellint_2(std::sqrt(1 - of * of));
+    whole += mass;
+    inertia -= mass * r * r;
+    more += mass * r * r * (laws::carried_air(rate * r, growth).mass - 1);
+    munk += mass * rate * r * std::sin(angle) * laws::carried_air(rate * r * std::cos(angle), growth).momentum_m_s;
+  }
+  EXPECT_NEAR(whole, kVirtual_kg, 0.02 * kVirtual_kg);
+  Build build;
   build.added_mass = 1;
-  const Mechanism whole(nominal(), build);
-  for (std::size_t i = 0; i < 2; ++i) {
-    const int geom = mj_name2id(&whole.model(), mjOBJ_GEOM, i == 0 ? "left_strip_0" : "left_strip_1");
-    const mjtNum* fluid = whole.model().geom_fluid + mjNFLUID * geom;
-    EXPECT_NEAR(fluid[6] * whole.model().opt.density / kVirtual_kg[i], 1, 1e-3);
-    EXPECT_NEAR(fluid[10] * whole.model().opt.density / kVirtual_kg_m2[i], 1, 1e-3);
-  }
+  Mechanism robot(nominal(), build);
+  const_cast<mjData&>(robot.data()).qvel[0] = 1e-3;  // along the normals of both wings
+  EXPECT_NEAR(robot.virtual_mass_energy(), kVirtual_kg * 1e-6, 1e-3 * kVirtual_kg * 1e-6);
+  EXPECT_NEAR(law(0, 0, a)[0] - law(0, rate, a)[0], more * a, 0.03 * more * a);
+  const double steady = -laws::kSuction * munk - rate * rate * inertia * std::sin(angle) * std::cos(angle);
+  EXPECT_NEAR(law(angle, rate, 0)[1], steady, 0.03 * std::abs(steady));
 }
 
 TEST(FamilyC, FlightsHaveTheLawOfTheVirtualMass) {
@@ -1398,6 +1482,10 @@ TEST(FamilyC, LawsOfTheDriveLoseEnergyAndHaveTheirLimits) {
   EXPECT_NEAR(laws::warmed_K(0, 1, 0, 1e-3), 1e-3 / laws::kWinding_J_K, 1e-6);
   for (double t = 0.1; t < 30; t += 1)
     EXPECT_GT(law_of("battery_sag", std::array{t + 1, 0.3})[0], law_of("battery_sag", std::array{t, 0.3})[0]);
+  // friction acts against the motion, and what it has above Coulomb's falls by e for 53 rad/s
+  const auto friction = [](double rate) { return law_of("coulomb_friction", std::array{rate})[0]; };
+  for (double rate = -240; rate <= 240; rate += 30) EXPECT_LE(friction(rate) * rate, 0);
+  EXPECT_NEAR(friction(10) / friction(63), M_E, 1e-9);
   // a spring: odd, so it has a potential, and as stiff as two far out
   const Spring& spring = nominal().sides[0].spring;
   EXPECT_NEAR(second_spring_Nm(spring, 0.9), -second_spring_Nm(spring, -0.9), 1e-15);
