@@ -53,8 +53,10 @@ def main():
         shutil.copyfile(output, shipped)
 
     def robot(family, number):
+        """Flights of a robot as its file, each of another session: what differs between days belongs to what models get wrong."""
         folder = o.out / "robots" / f"{family}{number}"
-        run(folder / "flight_3", blind, "fly", "--family", family, "--seed", FIRST_SEED + number, "--power", "--out", folder)
+        run(folder / "flight_3", blind, "fly", "--family", family, "--seed", FIRST_SEED + number, "--power", "--reference", folder,
+            "--reference-sessions", 3, "--out", o.out / "later" / f"{family}{number}")
         return folder
 
     def pair(family, number):
