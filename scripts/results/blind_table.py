@@ -3,9 +3,9 @@
 
     scripts/results/blind_table.py OUT [--cases 4] [--families a b c] [--kinds contrast alone bench] [--launch "mpirun -n 4"] [--add cases.jsonl ...]
 
-Makes and scores the robots of each family, with what is learnt from the other two, and writes OUT/table.md, OUT/score.csv and
-OUT/cases.jsonl. After any stop, the same command goes on. --launch runs the programs on several ranks, which may be on several machines that
-share OUT. --add takes in cases.jsonl of this table's other parts. A build that is not of a commit is refused.
+Makes and scores the robots of each family, with what is learnt from the other two, and writes OUT/table.md, and score.csv and cases.jsonl
+of robots in flight and on a bench, OUT/flight and OUT/bench. After any stop, the same command goes on. --launch runs the programs on several ranks, which may be on several machines that
+share OUT. --add takes in cases.jsonl of this table's other parts. With reported seeds, a build that is of no commit is refused.
 """
 import argparse
 import json
@@ -32,9 +32,16 @@ def learnt(kind, family):
     options = ["--discrepancy", LAB / "discrepancy" / f"without_{family}.toml"]
     if kind != "alone":
         options += ["--verdict", LAB / "sessions" / f"verdict_without_{family}.toml"]
-        bench = LAB / "sessions" / f"bench_without_{family}.toml"
-        options += ["--sessions", bench if kind == "bench" and bench.exists() else LAB / "sessions" / f"without_{family}.toml"]
+        sessions = LAB / "sessions" / f"{'bench_' if kind == 'bench' else ''}without_{family}.toml"
+        if not sessions.exists():
+            sys.exit(f"{sessions}: is not there; scripts/results/learn_laboratory.py --steps bench learns it")
+        options += ["--sessions", sessions]
     return options
+
+
+def is_of_bench(cases):
+    """Whether a cases.jsonl is of clamped robots."""
+    return json.loads(cases.read_text().splitlines()[0])["bench"]
 
 
 def main():
@@ -82,15 +89,14 @@ def main():
             if not (folder / "cases.jsonl").exists():
                 sys.exit(f"{folder}: stopped; the same command goes on")
     text = f"{version}; {sum(seconds.values()) / 3600:.1f} h on this machine.\n"
-    # the bench has its own tables: its robots are clamped, its parts are called as those that fly
-    for title, kinds in (("In flight", ["contrast", "alone"]), ("On the bench", ["bench"])):
-        files = [o.out / f"{f}.{k}" / "cases.jsonl" for k in kinds for f in o.families] + [a for a in o.add if ("bench" in a.name) == (title == "On the bench")]
-        files = [f for f in files if f.exists()]
+    # robots on a bench have tables of their own: their parts are called as those that fly
+    for name, kinds in (("flight", ["contrast", "alone"]), ("bench", ["bench"])):
+        files = [o.out / f"{f}.{k}" / "cases.jsonl" for k in kinds for f in o.families]
+        files = [f for f in files if f.exists()] + [a for a in o.add if is_of_bench(a) == (name == "bench")]
         if not files:
             continue
-        out = o.out / title.split()[-1]
-        subprocess.run([o.program, "score", "--cases", *files, "--out", out], check=True, stdout=subprocess.DEVNULL)
-        text += f"\n## {title}\n\n{(out / 'score.md').read_text()}"
+        subprocess.run([o.program, "score", "--cases", *files, "--out", o.out / name], check=True, stdout=subprocess.DEVNULL)
+        text += f"\n## Robots {'in flight' if name == 'flight' else 'on a bench'}\n\n{(o.out / name / 'score.md').read_text()}"
     (o.out / "table.md").write_text(text)
     print(o.out / "table.md")
 

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Learns anew, from robots of the families, all files that say what models get wrong and what differs between sessions.
 
-    scripts/results/learn_laboratory.py OUT [--robots 4] [--pairs 12] [--cases 12] [--steps discrepancy sessions verdict]
+    scripts/results/learn_laboratory.py OUT [--robots 3] [--pairs 6] [--cases 6] [--steps discrepancy sessions bench verdict]
 
-Robots are flown with seeds that no benchmark uses, and kept in OUT; after any stop, the same command goes on. In the end configs/lab and
-configs/gap hold what was learnt: for each family from the other two, and for users from all three. A build that is not of a commit is refused.
+Robots are flown with seeds that no benchmark uses, but for the last step, whose robots are development robots, and kept in OUT. After any
+stop, the same command goes on. In the end configs/lab and configs/gap hold what was learnt: for each family from the other two, starting
+from the file for this family, and for users from all three. The last step learns what verdicts say. A build of no commit is refused.
 """
 import argparse
 import random
@@ -15,19 +16,22 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 CONFIGS = ROOT / "configs"
+LAB = CONFIGS / "lab"
 VEHICLE = CONFIGS / "vehicles" / "hummingbird_nominal.toml"
 FAMILIES = ["a", "b", "c"]
+ON_BENCH = ["b", "c"]  # those that can be clamped
+STEPS = ["discrepancy", "sessions", "bench", "verdict"]
 FIRST_SEED = 900_000  # below those of benchmarks, beyond those that are spent
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path)
-    parser.add_argument("--robots", type=int, default=4, help="of each family, as their file, for what models get wrong (4)")
-    parser.add_argument("--pairs", type=int, default=12, help="of sessions of each family, half of them with an effect (12)")
-    parser.add_argument("--cases", type=int, default=12, help="of each part and family, for the verdict (12)")
-    parser.add_argument("--steps", nargs="+", default=["discrepancy", "sessions", "verdict"],
-                        choices=["discrepancy", "sessions", "verdict"])
+    parser.add_argument("--robots", type=int, default=3, help="of each family, as their file, for what models get wrong (3)")
+    parser.add_argument("--pairs", type=int, default=6, help="of sessions of each family, half of them with an effect (6)")
+    parser.add_argument("--cases", type=int, default=6, help="of each part and family, for the verdict (6)")
+    parser.add_argument("--steps", nargs="+", default=STEPS,
+                        choices=STEPS)
     parser.add_argument("--programs", type=Path, default=ROOT / "build" / "release" / "bin", help="of a build with -DFLAPPY_FAMILIES=ON")
     o = parser.parse_args()
     blind, gap = o.programs / "flappy-blind", o.programs / "flappy-gap"
@@ -59,51 +63,62 @@ def main():
             "--reference-sessions", 3, "--out", o.out / "later" / f"{family}{number}")
         return folder
 
-    def pair(family, number):
-        """Two sessions of a robot of its own; every second one has an effect in the later one."""
-        folder, effect = o.out / "pairs" / f"{family}{number}", ""
-        if number % 2 == 1:
-            effects = sorted(e for e in effects_of(family) if not e.startswith("outside_"))
-            random.Random(7).shuffle(effects)
-            effect = effects[(number // 2) % len(effects)]
-        options = ["--effect", f"{effect}=1"] if effect else []
-        run(folder / "test" / "flight_3", blind, "fly", "--family", family, "--seed", FIRST_SEED + 1000 + number, "--own-parameters",
-            "--conventions", "--reference", folder / "reference", "--reference-sessions", 3, *options, "--out", folder / "test")
-        return f"{folder / 'reference'}:{folder / 'test'}" + (f":{effect}" if effect else "")
-
     def effects_of(family):
         text = subprocess.run([blind, "effects", "--family", family], capture_output=True, text=True, check=True).stdout
-        return [line.split()[0] for line in text.splitlines() if line and not line.startswith(" ")]
+        effects = sorted(line.split()[0] for line in text.splitlines() if line and not line.startswith((" ", "outside_")))
+        random.Random(7).shuffle(effects)
+        return effects
+
+    effects = {f: effects_of(f) for f in FAMILIES}
+
+    def pair(family, number, bench=False):
+        """Two sessions of a robot of its own; in flight, every second one has an effect in the later one, each family others."""
+        folder, effect = o.out / ("benches" if bench else "pairs") / f"{family}{number}", ""
+        if number % 2 == 1 and not bench:
+            effect = effects[family][(number // 2 * len(FAMILIES) + FAMILIES.index(family)) % len(effects[family])]
+        options = ["--effect", f"{effect}=1"] if effect else []
+        run(folder / "test" / "flight_3", blind, "fly", "--family", family, "--seed", FIRST_SEED + 1000 + number, "--own-parameters",
+            "--conventions", "--reference", folder / "reference", "--reference-sessions", 3, *options, *(["--bench"] if bench else []),
+            "--out", folder / "test")
+        return f"{folder / 'reference'}:{folder / 'test'}" + (f":{effect}" if effect else "")
 
     if "discrepancy" in o.steps:
-        base = CONFIGS / "gap" / "model_discrepancy.toml"
-
-        def robots(families):
-            return ["--discrepancy", base, "--robots", *[robot(f, n) for f in families for n in range(o.robots)]]
-
-        for family in FAMILIES:
-            learn(f"discrepancy_without_{family}.toml", others(family), CONFIGS / "lab" / "discrepancy" / f"without_{family}.toml", robots)
-        learn("model_discrepancy.toml", FAMILIES, base, robots)
+        for family in [*FAMILIES, ""]:
+            shipped = LAB / "discrepancy" / f"without_{family}.toml" if family else CONFIGS / "gap" / "model_discrepancy.toml"
+            learn(f"discrepancy_without_{family or 'none'}.toml", others(family), shipped, lambda families: [
+                "--discrepancy", shipped, "--robots", *[robot(f, n) for f in families for n in range(o.robots)]])
     if "sessions" in o.steps:
         for family in [*FAMILIES, ""]:
-            shipped = CONFIGS / "lab" / "sessions" / f"without_{family}.toml" if family else CONFIGS / "gap" / "session_variation.toml"
-            discrepancy = CONFIGS / "lab" / "discrepancy" / f"without_{family}.toml" if family else CONFIGS / "gap" / "model_discrepancy.toml"
+            shipped = LAB / "sessions" / f"without_{family}.toml" if family else CONFIGS / "gap" / "session_variation.toml"
+            discrepancy = LAB / "discrepancy" / f"without_{family}.toml" if family else CONFIGS / "gap" / "model_discrepancy.toml"
             learn(f"sessions_without_{family or 'none'}.toml", others(family), shipped, lambda families: [
                 "--sessions", shipped, "--discrepancy", discrepancy, "--pairs", *[pair(f, n) for f in families for n in range(o.pairs)]])
+    if "bench" in o.steps:
+        for family in ON_BENCH:
+            shipped = LAB / "sessions" / f"bench_without_{family}.toml"
+            start = shipped if shipped.exists() else LAB / "sessions" / f"without_{family}.toml"
+            learn(f"bench_without_{family}.toml", [f for f in ON_BENCH if f != family], shipped, lambda families: [
+                "--sessions", start, "--discrepancy", LAB / "discrepancy" / f"without_{family}.toml",
+                "--pairs", *[pair(f, n, True) for f in families for n in range(o.pairs)]])
     if "verdict" in o.steps:
+        for f in FAMILIES:
+            run(o.out / f"cases_{f}" / "manifest.json", blind, "make", "--family", f, "--contrast", "--set", "development", "--part", "changed",
+                "unchanged", "--cases", o.cases, "--out", o.out / f"cases_{f}")
         for family in FAMILIES:
-            folder = o.out / f"cases_{family}"
-            run(folder / "manifest.json", blind, "make", "--family", family, "--contrast", "--set", "development", "--part", "changed", "unchanged",
-                "--cases", o.cases, "--out", folder)
-            run(folder / "cases.jsonl", blind, "score", folder, "--discrepancy", CONFIGS / "lab" / "discrepancy" / f"without_{family}.toml",
-                "--sessions", CONFIGS / "lab" / "sessions" / f"without_{family}.toml", "--verdict", CONFIGS / "gap" / "contrast_verdict.toml")
-        for family in [*FAMILIES, ""]:
-            name = f"verdict_without_{family or 'none'}.toml"
-            run(o.out / name, blind, "calibrate", *[o.out / f"cases_{f}" for f in others(family)], "--verdict",
-                CONFIGS / "gap" / "contrast_verdict.toml", "--out", o.out / name)
-        for family in FAMILIES:
-            shutil.copyfile(o.out / f"verdict_without_{family}.toml", CONFIGS / "lab" / "sessions" / f"verdict_without_{family}.toml")
-        shutil.copyfile(o.out / "verdict_without_none.toml", CONFIGS / "gap" / "contrast_verdict.toml")
+            # the robots of the other two, judged by what has not seen this family either
+            shipped, scored = LAB / "sessions" / f"verdict_without_{family}.toml", []
+            for f in others(family):
+                folder = o.out / f"cases_{f}_without_{family}"
+                for part in ("cases", "sealed", "manifest.json"):
+                    if not (folder / part).exists():
+                        folder.mkdir(exist_ok=True)
+                        (folder / part).symlink_to(o.out.resolve() / f"cases_{f}" / part)
+                run(folder / "cases.jsonl", blind, "score", folder, "--discrepancy", LAB / "discrepancy" / f"without_{family}.toml",
+                    "--sessions", LAB / "sessions" / f"without_{family}.toml", "--verdict", shipped)
+                scored.append(folder)
+            run(o.out / f"verdict_without_{family}.toml", blind, "calibrate", *scored, "--said", "--verdict", shipped, "--out",
+                o.out / f"verdict_without_{family}.toml")
+            shutil.copyfile(o.out / f"verdict_without_{family}.toml", shipped)
 
 
 if __name__ == "__main__":

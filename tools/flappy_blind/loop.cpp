@@ -33,8 +33,8 @@ enum Policy { kAsShipped, kFile, kCorrected, kPolicies };
 constexpr std::array<const char*, kPolicies> kNames = {"as_shipped", "file", "corrected"};
 
 /// Parts of a benchmark whose robots have an effect and are diagnosed from rich flights. Each robot occurs once in them.
-constexpr std::string_view kParts[] = {"singles", "typical",         "withheld",      "outside",
-                                       "pairs",   "changed_outside", "changed_pairs", "changed"};
+constexpr std::string_view kParts[] = {"singles",         "withheld",      "outside", "pairs",
+                                       "changed_outside", "changed_pairs", "changed"};
 
 /// A scored benchmark. The constructor checks the hashes of its predictions and opens the labels.
 struct Scored {

@@ -148,7 +148,7 @@ Json fly_case(const RobotOptions& o, Programme programme) {
   return {{"seed", o.seed}, {"draw", sampled.draw}, {"crashes", crashes}, {"flights", list}};
 }
 
-/// Prints the nearest pair of laws of each effect, and all that is refused.
+/// Prints all pairs of laws, and which are refused.
 Json check_laws(const std::vector<std::string>& names, const std::filesystem::path& page) {
   std::vector<const Family*> families;
   for (const std::string& name : names) families.push_back(&benchmark::family_named(name));
@@ -293,6 +293,7 @@ int main(int argc, char** argv) {
   benchmark::CalibrateCommand calibrated;
   calibrate.option("folders", calibrated.folders, "of flappy-blind score").required();
   calibrate.option("--verdict", calibrated.verdict, "constants to start from").shows_default();
+  calibrate.flag("--said", calibrated.said, "learn only what verdicts say, from robots that taught no constant");
   calibrate.option("--out", calibrated.out, "file for the constants").required();
   io::Command loop =
       program.app().command("loop", "trains on with what was diagnosed, and flies robots with it and without");

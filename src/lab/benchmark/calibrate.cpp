@@ -8,7 +8,6 @@
 #include <functional>
 
 #include "gap/answer/verdict.hpp"
-#include "gap/question/alone.hpp"
 #include "io/files.hpp"
 #include "io/program.hpp"
 #include "io/sha256.hpp"
@@ -80,6 +79,7 @@ std::vector<Constant> constants_of(const std::string& file) {
 struct Case {
   CaseTruth truth;
   std::vector<ScoredHypothesis> hypotheses;
+  Claim verdict;  ///< with the probability by evidence and priors
   double weight = 0;
   std::size_t part = 0;
 };
@@ -124,6 +124,8 @@ class Calibration {
     std::vector<double> counts;
     for (const fs::path& folder : command.folders) {
       const Manifest manifest = read_manifest(folder);
+      if (families_.find(manifest.family) == std::string::npos)
+        families_ += (families_.empty() ? "" : " and ") + manifest.family;
       if (!fs::exists(true_fits(folder)))
         throw io::InputError(folder.string() + ": was not scored; accepted: folders of flappy-blind score");
       check_verdict(folder, manifest, command.verdict);
@@ -147,6 +149,8 @@ class Calibration {
         }
         if (own.hypotheses.empty()) continue;  // its data were faulty
         if (!own.truth.counts()) continue;     // as the score does
+        const Answer answer = answer_of(p);
+        own.verdict = {rule_.said.evidence(answer.probability), right(own.truth, answer)};
         own.part = parts.try_emplace(manifest.family + " " + own.truth.part, counts.size()).first->second;
         if (own.part == counts.size()) counts.push_back(0);
         counts[own.part] += 1;
@@ -194,27 +198,17 @@ class Calibration {
     return rule;
   }
 
-  /// What verdicts by `rule` should say.
-  VerdictRule::Said said(const VerdictRule& rule) const {
-    VerdictRule plain = rule;
-    plain.said = {};
+  /// What verdicts with the constants of scoring should say.
+  VerdictRule::Said said() const {
     std::vector<Claim> verdicts;
     std::vector<double> weights;
     for (const Case& c : cases_) {
-      gap::Inference d;
-      d.hypotheses = moved(c, rule);
-      const bool contrast = std::ranges::count(kContrastParts, c.truth.part) > 0;
-      const auto pool = [&](const ScoredHypothesis& a) {
-        return contrast && a.kind == gap::HypothesisKind::none ? "/parameters" : gap::pool_of(a);
-      };
-      gap::conclude(plain, pool, d);
-      const Answer answer{.kind = d.verdict.remainder ? "remainder" : name_of(d.verdict.kind),
-                          .effects = d.verdict.effects};
-      verdicts.push_back({d.verdict.probability, right(c.truth, answer)});
+      verdicts.push_back(c.verdict);
       weights.push_back(c.weight * static_cast<double>(cases_.size()));
     }
     return learn_said(verdicts, weights);
   }
+  const std::string& families() const { return families_; }
 
  private:
   /// The hypotheses of a case with the probabilities of another rule.
@@ -251,6 +245,7 @@ class Calibration {
   VerdictRule rule_;
   std::vector<Constant> constants_;
   std::vector<Case> cases_;
+  std::string families_;
 };
 
 constexpr double kMinSlope = 0.05;  // more evidence never says less
@@ -262,27 +257,67 @@ std::string rounded(double x) { return io::format("%.4g", x); }
 VerdictRule::Said learn_said(const std::vector<Claim>& claims, const std::vector<double>& weights) {
   constexpr double kEdge = 1e-6;
   const Eigen::Vector2d before(1, 0);
-  Eigen::Vector2d at = before;
-  for (int i = 0; i < 50; ++i) {
-    Eigen::Vector2d gradient = (before - at) / (kPriorOfSaid * kPriorOfSaid);
-    Eigen::Matrix2d curvature = Eigen::Matrix2d::Identity() / (kPriorOfSaid * kPriorOfSaid);
-    for (std::size_t k = 0; k < claims.size(); ++k) {
-      const double p = std::clamp(claims[k].probability, kEdge, 1 - kEdge);
-      const Eigen::Vector2d x(std::log(p / (1 - p)), 1);
-      const double q = 1 / (1 + std::exp(-at.dot(x)));
-      gradient += weights[k] * (claims[k].right - q) * x;
-      curvature += weights[k] * q * (1 - q) * x * x.transpose();
+  const auto fitted = [&](Eigen::Vector2d at, bool slope_is_free) {
+    for (int i = 0; i < 50; ++i) {
+      Eigen::Vector2d gradient = (before - at) / (kPriorOfSaid * kPriorOfSaid);
+      Eigen::Matrix2d curvature = Eigen::Matrix2d::Identity() / (kPriorOfSaid * kPriorOfSaid);
+      for (std::size_t k = 0; k < claims.size(); ++k) {
+        const double p = std::clamp(claims[k].probability, kEdge, 1 - kEdge);
+        const Eigen::Vector2d x(std::log(p / (1 - p)), 1);
+        const double q = 1 / (1 + std::exp(-at.dot(x)));
+        gradient += weights[k] * (claims[k].right - q) * x;
+        curvature += weights[k] * q * (1 - q) * x * x.transpose();
+      }
+      const Eigen::Vector2d step = slope_is_free ? Eigen::Vector2d(curvature.ldlt().solve(gradient))
+                                                 : Eigen::Vector2d(0, gradient[1] / curvature(1, 1));
+      at += std::min(1.0, 1 / step.norm()) * step;  // far from the optimum Newton's step can be too long
+      if (step.norm() < 1e-9) break;
     }
-    const Eigen::Vector2d step = curvature.ldlt().solve(gradient);
-    at += std::min(1.0, 1 / step.norm()) * step;  // far from the optimum Newton's step can be too long
-    if (step.norm() < 1e-9) break;
-  }
-  return {std::max(at[0], kMinSlope), at[1]};
+    return at;
+  };
+  Eigen::Vector2d at = fitted(before, true);
+  if (at[0] < kMinSlope) at = fitted({kMinSlope, at[1]}, false);
+  return {at[0], at[1]};
 }
+
+namespace {
+
+/// What verdicts say stands last in a file; replaces it, or adds it.
+void set_said(std::string& text, const VerdictRule::Said& said, const std::string& learnt) {
+  const std::string begin = "\n# What a verdict says";
+  text.erase(std::min(text.find(begin), text.size()));
+  text += begin +
+          " whose probability by evidence and priors is p: 1 / (1 + exp(-(slope logit(p) + offset))). Learnt:\n"
+          "# flappy-blind calibrate --said, " +
+          learnt + ".\n[said]\nslope = " + rounded(said.slope) + "\noffset = " + rounded(said.offset) + "\n";
+}
+
+/// Says at the head of a file where its constants come from.
+void set_origin(std::string& text, const std::string& learnt) {
+  const std::string begin = "# Learnt: flappy-blind calibrate";
+  const std::string line = begin + ", " + learnt + ".\n";
+  if (const std::size_t at = text.find(begin); at != std::string::npos)
+    text.replace(at, text.find('\n', at) + 1 - at, line);
+  else text.insert(text.find("schema = "), line);
+}
+
+}  // namespace
 
 Json calibrate(const CalibrateCommand& command) {
   io::check_output(command.out);
   const Calibration calibration(command);
+  const std::string learnt = std::to_string(calibration.cases()) + " development robots of families " +
+                             calibration.families() + ", commit " + io::commit();
+  if (command.said) {
+    std::string text = io::read_text(command.verdict);
+    const VerdictRule::Said said = calibration.said();
+    set_said(text, said, learnt);
+    gap::parse_verdict_rule(text, command.out.string());
+    io::write_atomically(command.out, text);
+    std::printf("a verdict says 1 / (1 + exp(-(%s logit(p) %+.4g))), of %zu cases\n", rounded(said.slope).c_str(),
+                said.offset, calibration.cases());
+    return {{"cases", calibration.cases()}, {"slope", said.slope}, {"offset", said.offset}};
+  }
   VerdictRule before = calibration.start(), after = calibration.best();
   after.prior.none = std::stod(rounded(after.prior.none));
   after.prior.parameters = std::stod(rounded(after.prior.parameters));
@@ -296,16 +331,11 @@ Json calibrate(const CalibrateCommand& command) {
     json[std::string(c.table) + "." + c.key] = c.of(after);
     std::printf("%-12s %-24s %10.4g, was %.4g\n", c.table, c.key, c.of(after), c.of(before));
   }
-  after.said = calibration.said(after);
-  for (const auto& [key, value] : {std::pair{"slope", after.said.slope}, {"offset", after.said.offset}}) {
-    set_number(text, "said", key, rounded(value));
-    json[std::string("said.") + key] = value;
-    std::printf("%-12s %-24s %10.4g\n", "said", key, value);
-  }
   for (const auto& [key, value] : {std::pair{"none", after.prior.none}, {"effect", after.prior.effect}})
     set_number(text, "prior", key, io::shortest_digits(value));
   std::printf("mean log probability of what is right: %.3f, was %.3f, of %zu cases\n", json["score"].get<double>(),
               json["score_before"].get<double>(), calibration.cases());
+  set_origin(text, learnt);
   gap::parse_verdict_rule(text, command.out.string());  // a file that no program reads is not written
   io::write_atomically(command.out, text);
   return json;

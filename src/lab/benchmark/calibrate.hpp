@@ -17,6 +17,9 @@ struct CalibrateCommand {
   std::vector<std::filesystem::path> folders;                           ///< scored benchmarks
   std::filesystem::path verdict = io::config_path("gap/verdict.toml");  ///< constants to start from
   std::filesystem::path out;
+  /// Learns only what verdicts say (VerdictRule::Said), from verdicts as they were scored: of robots that taught none of
+  /// the constants, or they would seem too sure.
+  bool said = false;
 };
 
 /// Writes the verdict file to `out`, and prints new and old values. InputError if a folder was not scored.

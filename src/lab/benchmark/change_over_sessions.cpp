@@ -17,6 +17,7 @@ using flightlog::FlightLog;
 
 constexpr double kBeats = 5;             // of a window: long enough for the slowest motion capture
 constexpr std::size_t kFewest = 12;      // samples in a window
+constexpr std::size_t kMinSessions = 4;  // two in each half
 constexpr std::size_t kFirstOther = 11;  // first number of the other sessions: none that a case flies
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
@@ -124,14 +125,17 @@ void add_motion(std::vector<WindowedChannel>& all, const Windows& windows, const
             Vector3d(imu.accel_x_m_s2[i], imu.accel_y_m_s2[i], imu.accel_z_m_s2[i]) -
         Vector3d(0, 0, log.header.gravity_m_s2);
   std::vector<WindowedChannel> own;
-  for (const char* what : {"place", "attitude", "turn less the gyro's", "acceleration less the accelerometer's"})
+  for (const char* what :
+       {"place", "forward axis", "upward axis", "turn less the gyro's", "acceleration less the accelerometer's"})
     for (const char* axis : {" x", " y", " z"}) own.push_back({std::string(what) + axis, {}});
   const auto put = [&](std::size_t first, const std::optional<Vector3d>& x) {
     for (std::size_t k = 0; k < 3; ++k) own[first + k].values.push_back(x ? (*x)[static_cast<Eigen::Index>(k)] : kNone);
   };
   for (std::size_t w = 0; w < windows.count; ++w) {
     put(0, places[w]);
-    put(3, attitudes[w] ? std::optional(rotation_vector(*attitudes[w])) : std::nullopt);
+    // axes, as a rotation vector jumps at half a turn
+    put(3, attitudes[w] ? std::optional<Vector3d>(*attitudes[w] * Vector3d::UnitX()) : std::nullopt);
+    put(6, attitudes[w] ? std::optional<Vector3d>(*attitudes[w] * Vector3d::UnitZ()) : std::nullopt);
     std::optional<Vector3d> turn, second;
     const double middle_s = windows.begin(w) + windows.width_s / 2;
     if (w + 1 < windows.count && attitudes[w] && attitudes[w + 1]) {
@@ -144,7 +148,7 @@ void add_motion(std::vector<WindowedChannel>& all, const Windows& windows, const
       }
       if (to > from) turn = rotation_vector(turned.conjugate() * (attitudes[w]->conjugate() * *attitudes[w + 1]));
     }
-    put(6, turn);
+    put(9, turn);
     if (w > 0 && w + 1 < windows.count && places[w - 1] && places[w] && places[w + 1]) {
       const auto [from, to] = samples(imu.t_s, middle_s - 1.5 * windows.width_s + imu_late_s,
                                       middle_s + 1.5 * windows.width_s + imu_late_s);
@@ -158,7 +162,7 @@ void add_motion(std::vector<WindowedChannel>& all, const Windows& windows, const
         second =
             (*places[w - 1] - 2 * *places[w] + *places[w + 1]) / (windows.width_s * windows.width_s) - sum / weight;
     }
-    put(9, second);
+    put(12, second);
   }
   std::ranges::move(own, std::back_inserter(all));
 }
@@ -213,14 +217,38 @@ std::vector<WindowedChannel> windowed_channels(const FlightLog& log) {
   return all;
 }
 
+namespace {
+
+/// <e, d_s> / |e| of each session, and |e|.
+struct Projected {
+  std::string channel;
+  double square = 0;             // |e|^2
+  std::vector<double> products;  // <e, d_s>
+
+  double size() const { return std::sqrt(square); }
+  /// Variance among the sessions `from`, `from` + 2, ..., or all with a stride of 1.
+  double variance(std::size_t from, std::size_t stride) const {
+    double sum = 0, squares = 0, count = 0;
+    for (std::size_t s = from; s < products.size(); s += stride) sum += products[s], ++count;
+    for (std::size_t s = from; s < products.size(); s += stride) squares += std::pow(products[s] - sum / count, 2);
+    return squares / (count - 1) / square;
+  }
+};
+
+/// Of the channels, that with the largest ratio by the sessions `from`, `from` + 2, ...
+const Projected* largest(const std::vector<Projected>& channels, std::size_t from) {
+  const Projected* best = nullptr;
+  double most = 0;
+  for (const Projected& c : channels)
+    if (const double ratio = c.size() / std::sqrt(c.variance(from, 2)); ratio > most) best = &c, most = ratio;
+  return best;
+}
+
+}  // namespace
+
 OverSessions over_sessions(const std::vector<std::pair<FlightLog, FlightLog>>& change,
                            const std::vector<std::vector<FlightLog>>& sessions) {
-  struct Channel {
-    std::string name;
-    double square = 0;             // |e|^2
-    std::vector<double> products;  // <e, d_s>
-  };
-  std::vector<Channel> channels;
+  std::vector<Projected> channels;
   for (std::size_t flight = 0; flight < change.size(); ++flight) {
     const auto with = windowed_channels(change[flight].first), without = windowed_channels(change[flight].second);
     std::vector<std::vector<WindowedChannel>> others;
@@ -237,15 +265,12 @@ OverSessions over_sessions(const std::vector<std::pair<FlightLog, FlightLog>>& c
       }
     }
   }
-  OverSessions most;
-  for (const Channel& c : channels) {
-    double sum = 0;
-    for (const double p : c.products) sum += p * p;
-    if (!(c.square > 0) || !(sum > 0)) continue;
-    const double sd = std::sqrt(sum / c.square / (2 * static_cast<double>(sessions.size())));
-    if (const double ratio = std::sqrt(c.square) / sd; ratio > most.ratio) most = {c.name, ratio};
-  }
-  return most;
+  std::erase_if(channels, [](const Projected& c) { return !(c.square > 0) || !(c.variance(0, 1) > 0); });
+  const Projected *even = largest(channels, 0), *odd = largest(channels, 1);
+  if (!even || !odd) return {};
+  // each half of the sessions judges the channel that the other half chose
+  const double of_even = even->variance(1, 2) / even->square, of_odd = odd->variance(0, 2) / odd->square;
+  return {even->channel, std::sqrt(2 / (of_even + of_odd))};
 }
 
 std::vector<OverSessions> change_over_sessions(const blind::Family& family, const blind::Assignment& robot,
@@ -264,12 +289,13 @@ std::vector<OverSessions> change_over_sessions(const blind::Family& family, cons
     return logs;
   };
   std::vector<std::vector<FlightLog>> sessions;
-  // a session in which the robot crashes is replaced by the next; a robot that crashes in most of them has fewer
+  // a session in which the robot crashes is replaced by the next
   for (std::size_t s = 0; sessions.size() < other_sessions && s < 2 * other_sessions; ++s) {
     other.session = kFirstOther + s;
     if (std::vector<FlightLog> logs = fly(other); !logs.empty()) sessions.push_back(std::move(logs));
   }
   std::vector<OverSessions> all;
+  if (sessions.size() < kMinSessions) return all;
   for (const auto& [id, magnitude] : robot.effects) {
     blind::Assignment without = robot;
     std::erase_if(without.effects, [&](const auto& e) { return e.first == id; });

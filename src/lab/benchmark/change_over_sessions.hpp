@@ -21,17 +21,19 @@ struct WindowedChannel {
 std::vector<WindowedChannel> windowed_channels(const flightlog::FlightLog& log);
 
 struct OverSessions {
-  std::string channel;  ///< in which the ratio is largest
+  std::string channel;  ///< in which the ratio is largest, as every second session has it
   double ratio = 0;
 };
 
-/// `change[flight]`: logs with the effect and without it, of one session, programme and noise. `sessions[s][flight]`: without it, the
-/// same programme in other sessions. In each channel,
+/// `change[flight]`: logs with the effect and without it, of one session, programme and noise. `sessions[s][flight]`:
+/// without it, the same programme in other sessions, of which there are at least four. In each channel,
 ///
-///   e = with - without     d_s = session s - without     sd^2 = sum over s of (<e, d_s> / |e|)^2 / (2 S)     ratio = |e| / sd
+///   e = with - without     x_s = <e, session s - without> / |e|     ratio = |e| / (standard deviation of x_s)
 ///
-/// over all windows of all flights. A matched filter for the change would so see it `ratio` standard deviations of a session with its noise
-/// high: each d_s holds two sessions, hence the 2 (Kay, Fundamentals of Statistical Signal Processing II, 1998, ch. 4).
+/// over all windows of all flights: how many standard deviations of a session, with its noise, a matched filter for the
+/// change sees it high (Kay, Fundamentals of Statistical Signal Processing II, 1998, ch. 4). The largest ratio of some
+/// forty channels would be large by chance: every second session chooses the channel, and the others give its variance;
+/// then the other way round, and the mean of both variances counts. No channel: the effect changes nothing.
 OverSessions over_sessions(const std::vector<std::pair<flightlog::FlightLog, flightlog::FlightLog>>& change,
                            const std::vector<std::vector<flightlog::FlightLog>>& sessions);
 
@@ -40,7 +42,8 @@ inline constexpr double kCounts = 3;
 /// Other sessions that a robot flies for it.
 inline constexpr std::size_t kOtherSessions = 6;
 
-/// Of each effect of `robot`, which has `flown` these flights: flies what else is needed. None without other sessions.
+/// Of each effect of `robot`, which has `flown` these flights: flies what else is needed. Empty, so not known, with
+/// fewer than four other sessions, or where the robot crashes in nearly all.
 std::vector<OverSessions> change_over_sessions(const blind::Family& family, const blind::Assignment& robot,
                                                const std::vector<flightlog::FlightLog>& flown,
                                                std::size_t other_sessions = kOtherSessions);

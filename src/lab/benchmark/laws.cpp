@@ -250,10 +250,16 @@ struct Party {
 Points asked(const LawQuestion& question, const Party& party) {
   const Points at = grid_of(question);
   Points outcomes;
+  bool acts = false;
   for (const std::vector<double>& point : at) {
     outcomes.push_back(party.law(point));
-    if (outcomes.back().empty()) return {};
+    if (outcomes.back().size() != question.outcomes.size()) return {};
+    for (const double x : outcomes.back()) {
+      if (!std::isfinite(x)) return {};
+      acts = acts || x != 0;
+    }
   }
+  if (!acts) return {};
   return question.invariants ? question.invariants(at, outcomes) : outcomes;
 }
 
@@ -387,20 +393,20 @@ std::vector<LawPair> compare_laws(const std::vector<const blind::Family*>& famil
     std::vector<Points> of(all.size());
     if (question != law_questions().end())
       std::ranges::transform(all, of.begin(), [&](const Party& p) { return asked(*question, p); });
-    for (std::size_t i = 0; i < all.size(); ++i) {
+    const auto missing = [&](std::size_t i) -> std::string {
       const blind::FamilyEffect* e = all[i].effect;
-      if (!e) continue;
-      std::string missing;
-      if (e->law.empty() || (question != law_questions().end() && of[i].empty())) missing = "law";
-      else if (e->source.empty()) missing = "source";
-      else if (e->numbers.empty()) missing = "numbers";
-      if (all.size() == 1) pairs.push_back({id, all[i].name, "", {}, {}, missing});
+      if (!e) return "";
+      if (e->law.empty() || (question != law_questions().end() && of[i].empty())) return "law";
+      return e->source.empty() ? "source" : e->numbers.empty() ? "numbers" : "";
+    };
+    if (all.size() == 1) pairs.push_back({id, all[0].name, "", {}, {}, missing(0)});
+    for (std::size_t i = 0; i < all.size(); ++i)
       for (std::size_t k = i + 1; k < all.size(); ++k) {
-        LawPair pair{id, all[i].name, all[k].name, {}, equal_number(all[i].numbers, all[k].numbers), missing};
+        LawPair pair{id, all[i].name, all[k].name, {}, equal_number(all[i].numbers, all[k].numbers), missing(i)};
+        if (pair.missing.empty()) pair.missing = missing(k);
         if (!of[i].empty() && !of[k].empty()) pair.distance = law_distance(of[i], of[k]);
         pairs.push_back(std::move(pair));
       }
-    }
   }
   return pairs;
 }
@@ -412,7 +418,8 @@ std::string laws_page(const std::vector<const blind::Family*>& families) {
       "robots](diagnosis.md#11-how-blind-benchmarks-judge-it), by\n"
       "family. `flappy-blind laws --page FILE` writes it, and checks that no two families, and no family and the "
       "catalogue, share a law or a\n"
-      "number: on a grid, after the best scale factor, two laws of one effect differ by at least 3 % of their change. "
+      "number: on a grid, after the best scale factor, two laws of one effect of the catalogue differ by at least 3 % "
+      "of their change. "
       "Angles are in rad, all else\n"
       "in SI units.\n";
   for (const std::string& id : ids_of(families)) {

@@ -55,7 +55,8 @@ struct LawPair {
   bool refused() const { return !missing.empty() || equal_number || (distance && *distance < kMinDistance); }
 };
 
-/// All pairs of the families, and each with the catalogue; only of `effect` if it is given.
+/// All pairs of the families, and each with the catalogue. A law that is not finite, is 0 everywhere or has other
+/// outcomes than asked counts as missing. Effects outside the catalogue are compared by their id alone.
 std::vector<LawPair> compare_laws(const std::vector<const blind::Family*>& families);
 
 /// A page for readers: each effect's law and source, by family.

@@ -203,10 +203,12 @@ std::optional<double> optional_number(const Json& json) {
 }
 
 Json to_json(const Answer& a, const CaseTruth& truth) {
-  constexpr double kRare = 1e-3;
   Json sets = Json::array(), hypotheses = Json::array();
+  double least = 1e-3;  // what is rarer than this, and than the truth, changes no score
   for (const gap::RankedHypothesis& s : a.sets)
-    if (s.probability >= kRare || s.effects == truth.effects || s.effects == a.effects)
+    if (s.effects == truth.effects) least = std::min(least, s.probability);
+  for (const gap::RankedHypothesis& s : a.sets)
+    if (s.probability >= least || s.effects == a.effects)
       sets.push_back({{"effects", s.effects},
                       {"probability", s.probability},
                       {"loss", number_or_null(s.loss)},
@@ -274,6 +276,7 @@ Json to_json(const CaseRecord& r) {
                {"set", r.set},
                {"commit", r.commit},
                {"number", r.number},
+               {"bench", r.bench},
                {"row", r.row},
                {"part", t.part},
                {"effects", t.effects},
@@ -291,7 +294,8 @@ Json to_json(const CaseRecord& r) {
 
 CaseRecord case_record_from(const Json& json, const std::string& where) {
   try {
-    CaseRecord r{json.at("family"), json.at("set"), json.at("commit"), json.at("number"), json.at("row"), {}};
+    CaseRecord r{
+        json.at("family"), json.at("set"), json.at("commit"), json.at("number"), json.at("bench"), json.at("row"), {}};
     CaseTruth& t = r.scored.truth;
     t.part = json.at("part");
     t.effects = json.at("effects").get<Names>();

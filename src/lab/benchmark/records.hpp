@@ -69,6 +69,7 @@ Label label_from(const Json& json);
 struct CaseRecord {
   std::string family, set, commit;  ///< `commit`: of the prediction
   std::size_t number = 0;           ///< in its benchmark
+  bool bench = false;               ///< clamped
   std::string row;                  ///< its line in score.csv
   ScoredCase scored;
 };

@@ -117,15 +117,19 @@ ScoreValue share(const Cases& cases, const Is& is) {
 /// A rival's name and score.
 using NamedScore = std::optional<std::pair<std::string, ScoreValue>>;
 
-/// The best of the rivals that have an answer for each of the cases.
+/// The best of the rivals. One that has no answer for a case, as its logs are faulty, names nothing there.
 template <class Score>
 NamedScore best_of_rivals(const Cases& cases, const Score& score) {
+  static const Rival kSilent;
   NamedScore best;
-  if (cases.empty()) return best;
-  for (const auto& [name, rival] : cases.front()->prediction.rivals) {
-    const auto answers = [&](const ScoredCase* c) { return c->prediction.rivals.contains(name); };
-    if (!std::ranges::all_of(cases, answers)) continue;
-    const ScoreValue value = score([&](const ScoredCase& c) -> const Rival& { return c.prediction.rivals.at(name); });
+  std::set<std::string> names;
+  for (const ScoredCase* c : cases)
+    for (const auto& [name, rival] : c->prediction.rivals) names.insert(name);
+  for (const std::string& name : names) {
+    const ScoreValue value = score([&](const ScoredCase& c) -> const Rival& {
+      const auto at = c.prediction.rivals.find(name);
+      return at == c.prediction.rivals.end() ? kSilent : at->second;
+    });
     if (value.value && (!best || *value.value > *best->second.value)) best = {name, value};
   }
   return best;
@@ -138,11 +142,11 @@ NamedScore of_rivals(const Cases& cases, const Is& is) {
 }
 
 bool rival_first(const CaseTruth& t, const Rival& b) {
-  return !b.named.empty() && b.ranking.front() == t.effects.front();
+  return !b.named.empty() && !b.ranking.empty() && b.ranking.front() == t.effects.front();
 }
 
 bool rival_group(const CaseTruth& t, const Rival& b) {
-  return !b.named.empty() && group_of(b.ranking.front()) == group_of(t.effects.front());
+  return !b.named.empty() && !b.ranking.empty() && group_of(b.ranking.front()) == group_of(t.effects.front());
 }
 
 bool rival_among_three(const CaseTruth& t, const Rival& b) {
@@ -315,7 +319,23 @@ Answer answer_of(const Prediction& p) {
 bool abstains(const Answer& a) { return a.kind == "group" || a.probability < 0.5; }
 
 bool CaseTruth::counts() const {
-  return std::ranges::all_of(over_sessions, [](double ratio) { return ratio >= kCounts; });
+  // in hover, effects are asked about that hover does not show
+  return part == "hover" || std::ranges::all_of(over_sessions, [](double ratio) { return ratio >= kCounts; });
+}
+
+ScoredCase by_what_counts(ScoredCase c) {
+  std::vector<double>& ratios = c.truth.over_sessions;
+  const auto visible = std::ranges::count_if(ratios, [](double ratio) { return ratio >= kCounts; });
+  if (ratios.size() != c.truth.effects.size() || visible == 0 || visible == std::ssize(ratios)) return c;
+  for (std::size_t i = ratios.size(); i-- > 0;) {
+    if (ratios[i] >= kCounts) continue;
+    const std::string id = c.truth.effects[i];
+    std::erase(c.truth.effects, id);
+    ratios.erase(ratios.begin() + static_cast<std::ptrdiff_t>(i));
+    std::erase(c.prediction.effects, id);
+    for (auto& [name, rival] : c.prediction.rivals) std::erase(rival.named, id), std::erase(rival.ranking, id);
+  }
+  return c;
 }
 
 bool right(const CaseTruth& t, const Answer& p) {
@@ -365,7 +385,8 @@ bool needs_true_fit(const ScoredCase& c) {
 Scores score(const std::vector<ScoredCase>& cases) {
   std::array<std::vector<ScoredCase>, 2> counting, hidden;  // absolute, contrasts
   Scores s;
-  for (const ScoredCase& c : cases) {
+  for (const ScoredCase& whole : cases) {
+    const ScoredCase c = by_what_counts(whole);
     const bool contrast = std::ranges::count(kContrastParts, c.truth.part) > 0;
     (c.truth.counts() ? counting : hidden)[contrast].push_back(c);
   }

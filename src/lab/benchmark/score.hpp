@@ -34,14 +34,14 @@ inline constexpr const char* kParts[] = {"singles",    "singles_current", "redec
                                          "outside",    "pairs",           "hover"};
 /// Parts of a contrast. All robots have independent parameters and inexact declarations; their tests are of another
 /// session than their references.
-///   changed, changed_pairs    one effect, and two of different groups, at typical magnitude
+///   changed, changed_pairs    one effect, and two of different groups, at 0.7 to 2 times typical magnitude
 ///   changed_short_reference, changed_short_test
 ///                             the robots of changed with one reference or one test flight of 10 s
 ///   unchanged                 no effect
 ///   changed_calm, unchanged_calm
-///                             references that hover and follow slow paths; one effect at typical magnitude, and none
+///                             references that hover and follow slow paths; one effect at 0.7 to 2 times typical magnitude, and none
 ///   changed_withheld, changed_outside
-///                             an effect whose group is withheld, at typical magnitude; one never in the catalogue, at 2
+///                             an effect whose group is withheld, at 0.7 to 2 times typical magnitude; one never in the catalogue, at 2
 inline constexpr const char* kContrastParts[] = {
     "changed",        "changed_short_reference", "changed_short_test", "unchanged",    "changed_calm",
     "unchanged_calm", "changed_withheld",        "changed_outside",    "changed_pairs"};
@@ -103,6 +103,10 @@ struct Scores {
 };
 
 Scores score(const std::vector<ScoredCase>& cases);
+
+/// Of a pair of effects of which sessions hide one, the case of the other: to name the hidden one is neither asked nor
+/// wrong. Any other case as it is.
+ScoredCase by_what_counts(ScoredCase c);
 
 /// Whether the verdict is right for a case of its part.
 bool right(const CaseTruth& truth, const Answer& prediction);

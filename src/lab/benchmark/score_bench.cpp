@@ -281,13 +281,14 @@ std::string case_line(const Bench& bench, std::size_t i, const Json& prediction)
     over_sessions += (over_sessions.empty() ? "" : "+") + io::format("%.3g", o.ratio);
   const bool alone = c.truth.part == "singles" || c.truth.part == "changed";
   const std::optional<double> closed = alone ? closure(c) : std::nullopt;
-  return io::joined({std::to_string(label.planned.number), c.truth.part, io::joined(c.truth.effects, "+"), magnitudes,
-                     over_sessions, p.kind, io::joined(p.effects, "+"), figure(p.probability),
-                     right(c.truth, p) ? "1" : "0", closed ? figure(closed) : "",
-                     io::shortest_digits(prediction.at("seconds").get<double>()), p.where ? p.where->channel : "",
-                     p.where ? p.where->regime : "", std::to_string(c.truth.seed), std::to_string(c.truth.draw),
-                     bench.manifest.family, bench.manifest.set, prediction.at("commit").get<std::string>()},
-                    ",");
+  return io::joined(
+      {std::to_string(label.planned.number), c.truth.part, io::joined(c.truth.effects, "+"), magnitudes, over_sessions,
+       p.kind, io::joined(p.effects, "+"), figure(p.probability),
+       right(by_what_counts(c).truth, by_what_counts(c).prediction) ? "1" : "0", closed ? figure(closed) : "",
+       io::shortest_digits(prediction.at("seconds").get<double>()), p.where ? p.where->channel : "",
+       p.where ? p.where->regime : "", std::to_string(c.truth.seed), std::to_string(c.truth.draw),
+       bench.manifest.family, bench.manifest.set, prediction.at("commit").get<std::string>()},
+      ",");
 }
 
 std::vector<CaseRecord> records_of(const Bench& bench) {
@@ -296,23 +297,24 @@ std::vector<CaseRecord> records_of(const Bench& bench) {
     const std::size_t number = bench.manifest.cases[i].number;
     const Json prediction = bench.predictions.read(number);
     all.push_back({bench.manifest.family, bench.manifest.set, prediction.at("commit"), number,
-                   case_line(bench, i, prediction), bench.cases[i]});
+                   bench.labels.at(number).planned.bench, case_line(bench, i, prediction), bench.cases[i]});
   }
   return all;
 }
 
-std::vector<CaseRecord> read_records(const fs::path& file) {
-  std::vector<CaseRecord> all;
+/// Adds the cases of a file; returns how many of its robots never flew.
+std::size_t read_records(const fs::path& file, std::vector<CaseRecord>& all) {
   std::istringstream lines(io::read_text(file));
-  std::size_t number = 0;
+  std::size_t number = 0, never = 0;
   for (std::string line; std::getline(lines, line);) {
     const std::string where = file.string() + ":" + std::to_string(++number);
     const Json json = Json::parse(line, nullptr, false);
     if (json.is_discarded())
       throw io::InputError(where + ": is no JSON; accepted: a line that flappy-blind score wrote");
-    all.push_back(case_record_from(json, where));
+    if (json.contains("never_fly")) never += json.at("never_fly").get<std::size_t>();
+    else all.push_back(case_record_from(json, where));
   }
-  return all;
+  return never;
 }
 
 }  // namespace
@@ -344,7 +346,7 @@ Json score_bench(const ScoreCommand& command) {
     std::ranges::move(records_of(*b), std::back_inserter(records));
     never += b->truths.at("never_fly").size();
   }
-  for (const fs::path& file : command.cases) std::ranges::move(read_records(file), std::back_inserter(records));
+  for (const fs::path& file : command.cases) never += read_records(file, records);
 
   std::map<std::string, std::vector<ScoredCase>> by_family;
   std::vector<ScoredCase> all;
@@ -357,6 +359,10 @@ Json score_bench(const ScoreCommand& command) {
   std::string json_lines;
   for (const CaseRecord& r : records) {
     const CaseTruth& t = r.scored.truth;
+    if (r.bench != records.front().bench)
+      throw io::InputError("case " + std::to_string(r.number) + " of family " + r.family + ": is " +
+                           (r.bench ? "clamped and others fly" : "flown and others are clamped") +
+                           "; accepted: one of both in a table");
     if (!seen.emplace(r.family, r.set, t.part, t.seed, r.number).second)
       throw io::InputError("case " + std::to_string(r.number) + " of family " + r.family + ", " + t.part +
                            ": is given twice; accepted: each case once");
@@ -388,6 +394,7 @@ Json score_bench(const ScoreCommand& command) {
   io::make_folder(out);
   io::write_atomically(out / "score.md", text);
   io::write_atomically(out / "score.csv", lines);
+  if (never > 0) json_lines += Json{{"never_fly", never}}.dump() + "\n";
   io::write_atomically(out / "cases.jsonl", json_lines);
   std::printf("%s\n", io::shown_by(out.string()).c_str());
   json["never_fly"] = never;

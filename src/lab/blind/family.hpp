@@ -1,5 +1,5 @@
 // A family of blind robots is one simulator, written apart, and its robots. Families share this header and no other code
-// (tests/structure checks this). docs/theory/diagnosis.md says which laws and numbers they share all the same.
+// (tests/structure checks this), and no law or number of an effect (lab/benchmark/laws.hpp).
 #pragma once
 
 #include <algorithm>

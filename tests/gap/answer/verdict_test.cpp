@@ -147,6 +147,7 @@ TEST(Verdict, SaysAProbabilityThatRobotsWithKnownFaultsTaught) {
   gap::conclude(rule, pool_in_contrast, d);
   EXPECT_NEAR(d.verdict.probability, 18.0 / 19, 1e-12) << "odds are doubled";
   EXPECT_DOUBLE_EQ(d.hypotheses[0].probability, 0.9) << "evidence stays";
+  EXPECT_NEAR(rule.said.evidence(rule.said(0.3)), 0.3, 1e-12);
   EXPECT_EQ(rule.said(0), 0);
   EXPECT_EQ(rule.said(1), 1);
 }

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <set>
 
 namespace flappy::benchmark {
 namespace {
@@ -65,22 +66,73 @@ TEST(WindowedChannels, MotionCaptureAndImuAgreeOnACircle) {
   EXPECT_NEAR(of("turn less the gyro's y"), 0.1 * 5 / 34, 1e-3);
 }
 
+/// The circle, with what is added to every sample.
+FlightLog shifted(double accel_z, double gyro_x = 0) {
+  FlightLog log = circling();
+  for (double& x : log.imu.accel_z_m_s2) x += accel_z;
+  for (double& x : log.imu.gyro_x_rad_s) x += gyro_x;
+  return log;
+}
+
 TEST(OverSessions, IsTheChangeOverTheirStandardDeviation) {
-  const FlightLog before = circling();
-  const auto shifted = [&](double accel_z, double gyro_x) {
-    FlightLog log = before;
-    for (double& x : log.imu.accel_z_m_s2) x += accel_z;
-    for (double& x : log.imu.gyro_x_rad_s) x += gyro_x;
-    return log;
+  // x_s = d_s sqrt(W): even sessions +-0.3 (variance 0.18), odd ones +-0.1 (0.02); the mean of both is 0.1
+  const auto of = [](double change) {
+    return over_sessions({{shifted(change), shifted(0)}},
+                         {{shifted(0.3)}, {shifted(0.1)}, {shifted(-0.3)}, {shifted(-0.1)}});
   };
-  // <e, d_s> / |e| = d_s sqrt(W): 0.5 / sqrt((0.3^2 + 0.1^2) / 4)
-  const OverSessions seen = over_sessions({{shifted(0.5, 0), before}}, {{shifted(0.3, 0)}, {shifted(-0.1, 0)}});
-  EXPECT_NEAR(seen.ratio, 0.5 / std::sqrt((0.09 + 0.01) / 4), 1e-6);
-  EXPECT_TRUE(seen.channel == "accel_z mean" || seen.channel.starts_with("acceleration")) << seen.channel;
-  // what sessions change in another channel hides nothing, and no change is none
-  const OverSessions beside = over_sessions({{shifted(0, 0.5), before}}, {{shifted(5, 0.01)}, {shifted(-5, 0.01)}});
-  EXPECT_GT(beside.ratio, 50);
-  EXPECT_DOUBLE_EQ(over_sessions({{before, before}}, {{shifted(0.3, 0)}}).ratio, 0);
+  EXPECT_NEAR(of(0.5).ratio, 0.5 / std::sqrt(0.1), 1e-6);
+  EXPECT_TRUE(of(0.5).channel == "accel_z mean" || of(0.5).channel.starts_with("acceleration")) << of(0.5).channel;
+  EXPECT_DOUBLE_EQ(of(0).ratio, 0);
+  // what all sessions have alike hides nothing, as references have it, too; nor does what another channel has
+  const OverSessions beside =
+      over_sessions({{shifted(0, 0.5), shifted(0)}},
+                    {{shifted(5, 0.11)}, {shifted(-5, 0.11)}, {shifted(-5, 0.09)}, {shifted(5, 0.09)}});
+  EXPECT_GE(beside.ratio, 0.5 / std::sqrt(2e-4) - 1e-3) << "by gyro_x; a turn less the gyro's shows it, too";
+}
+
+/// A robot whose sessions shift its accelerometer, and whose effect shifts it more; it crashes in one session.
+class Shifting final : public blind::Family {
+ public:
+  std::string name() const override { return "x"; }
+  const std::vector<blind::FamilyEffect>& effects() const override { return effects_; }
+  blind::FamilyFlight fly(const blind::Assignment& a, std::size_t flight) const override {
+    if (a.session == 12) return {true, "crashed", {}};
+    EXPECT_EQ(a.programme_of.value_or(a.session), 1U) << "every flight has the programme of the tests";
+    flown_.insert(a.session);
+    double shift = static_cast<double>(a.session % 2 == 0 ? 1 : -1) * 0.1;
+    for (const auto& [id, magnitude] : a.effects) shift += magnitude;
+    return {false, "", shifted(shift + static_cast<double>(flight))};
+  }
+  blind::Contrast contrast(const blind::Assignment&, std::size_t, const std::string&, double) const override {
+    return {};
+  }
+  blind::FamilyFlight fly_on_board(const blind::Assignment&, std::size_t, const std::array<double, 4>&, double,
+                                   blind::OnBoard&) const override {
+    return {};
+  }
+  blind::FamilyEscape escape(const blind::Assignment&, std::size_t, const blind::EscapeAssignment&) const override {
+    return {};
+  }
+  mutable std::set<std::size_t> flown_;
+
+ private:
+  std::vector<blind::FamilyEffect> effects_;
+};
+
+TEST(ChangeOverSessions, FliesTheProgrammeOfTheTestsInOtherSessions) {
+  const Shifting family;
+  blind::Assignment robot;
+  robot.session = 1;
+  robot.effects = {{"wind", 0.5}, {"tether", 0.05}};
+  const std::vector<OverSessions> found =
+      change_over_sessions(family, robot, {family.fly(robot, 0).log, family.fly(robot, 1).log});
+  // sessions 11, 13 to 17: -0.1, -0.1, 0.1, -0.1, 0.1, -0.1; halves 11, 14, 16 and 13, 15, 17
+  ASSERT_EQ(found.size(), 2U);
+  const double even = (0.04 * 2 / 3) / 2, odd = 0;  // variances of -0.1, 0.1, 0.1 and of three equal ones
+  EXPECT_NEAR(found[0].ratio, 0.5 / std::sqrt((even + odd) / 2), 1e-3);
+  EXPECT_NEAR(found[1].ratio, found[0].ratio / 10, 1e-3);
+  EXPECT_EQ(family.flown_, (std::set<std::size_t>{1, 11, 13, 14, 15, 16, 17}));
+  EXPECT_TRUE(change_over_sessions(family, robot, {family.fly(robot, 0).log}, 3).empty()) << "too few to say";
 }
 
 }  // namespace

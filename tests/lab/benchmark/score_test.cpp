@@ -415,8 +415,32 @@ TEST(Calibrate, LearnsWhatAVerdictShouldSay) {
   EXPECT_DOUBLE_EQ(nothing.offset, 0);
   // confident verdicts that are all wrong are believed less, but more evidence never says less
   const auto wrong = learn_said(std::vector<Claim>(50, {0.99, false}), std::vector<double>(50, 1));
-  EXPECT_LT(wrong(0.99), 0.5);
-  EXPECT_GT(wrong.slope, 0);
+  EXPECT_LT(wrong(0.99), 0.25);
+  EXPECT_LT(wrong(0.9), wrong(0.99));
+}
+
+TEST(Score, ARivalWithoutANameAndOneWithoutAnAnswerNameNothing) {
+  std::vector<ScoredCase> cases = {judged("changed", {"wind"}, "effect", {"wind"}, 0.9),
+                                   judged("changed", {"wind"}, "effect", {"wind"}, 0.9),
+                                   judged("unchanged", {}, "none", {}, 0.9)};
+  cases[0].prediction.rivals["Hotelling"] = {{kSomething}, {}, 0.99};  // the other's logs were faulty
+  cases[2].prediction.rivals["Hotelling"] = {{kSomething}, {}, 0.5};
+  const Scores s = score(cases);
+  EXPECT_DOUBLE_EQ(*line_of(s.lines, "contrast_top1").rival->value, 0);
+  EXPECT_DOUBLE_EQ(*line_of(s.lines, "contrast_noticed").rival->value, 0.5);
+}
+
+TEST(Score, OfAPairTheEffectCountsThatSessionsDoNotHide) {
+  ScoredCase c = judged("changed_pairs", {"wind", "com_offset"}, "effect", {"wind"}, 0.9);
+  c.truth.over_sessions = {kCounts + 1, kCounts - 1};
+  EXPECT_DOUBLE_EQ(*main_score({c}, "contrast_pairs_f1").value, 1);
+  c.prediction.effects = {"wind", "com_offset"};  // the hidden one is there, too
+  EXPECT_DOUBLE_EQ(*main_score({c}, "contrast_pairs_f1").value, 1);
+  c.prediction.effects = {"tether"};
+  EXPECT_DOUBLE_EQ(*main_score({c}, "contrast_pairs_f1").value, 0);
+  ScoredCase hover = judged("hover", {"body_drag"}, "group", {"body_drag", "wind"}, 0.9);
+  hover.truth.over_sessions = {0.1};  // as hover is meant to
+  EXPECT_DOUBLE_EQ(*main_score({hover}, "hover_abstain").value, 1);
 }
 
 TEST(Score, ARivalIsComparedAtTheSameShareOfFalseAlarms) {

@@ -25,11 +25,16 @@ std::vector<double> energies(const gap::FlightList& flights, const std::vector<d
   return sums;
 }
 
+/// What the parameters alone leave: like the residuals of hypotheses, of flights held out in a contrast, else of the fit.
+const gap::TestResiduals& before_effects(const gap::Flights& flights, const gap::Inference& d) {
+  return flights.references.empty() ? d.parameters.residual : d.refit;
+}
+
 /// Ranks effects by what `left` says of the hypothesis that has them, against `before` of the parameters alone.
 Rival least(const gap::Flights& flights, const gap::Inference& d,
             const std::function<double(const std::vector<double>& energies)>& left) {
   const bool contrast = !flights.references.empty();
-  const double before = left(energies(flights.tests, d.noise_sd, d.refit));
+  const double before = left(energies(flights.tests, d.noise_sd, before_effects(flights, d)));
   std::vector<std::pair<double, std::vector<std::string>>> hypotheses;
   for (const gap::ScoredHypothesis& a : d.hypotheses)
     if (a.fitted())
@@ -68,7 +73,7 @@ Rival best_rmse(const gap::Flights& flights, const gap::Inference& d) {
 }
 
 Rival largest_residual(const gap::Flights& flights, const gap::Inference& d) {
-  const std::vector<double> before = energies(flights.tests, d.noise_sd, d.refit);
+  const std::vector<double> before = energies(flights.tests, d.noise_sd, before_effects(flights, d));
   const auto largest = static_cast<std::size_t>(std::ranges::max_element(before) - before.begin());
   return least(flights, d, [&](const std::vector<double>& of) { return of[largest]; });
 }
