@@ -1,17 +1,19 @@
 #!/usr/bin/env python3
 """Learns anew, from robots of the families, all files that say what models get wrong and what differs between sessions.
 
-    scripts/results/learn_laboratory.py OUT [--robots 3] [--pairs 6] [--cases 6] [--steps discrepancy sessions bench verdict]
+    scripts/results/learn_laboratory.py OUT [--robots 3] [--pairs 12] [--cases 6] [--steps discrepancy sessions bench verdict]
 
 Robots are flown with seeds that no benchmark uses, but for the last step, whose robots are development robots, and kept in OUT. After any
 stop, the same command goes on. In the end configs/lab and configs/gap hold what was learnt: for each family from the other two, starting
 from the file for this family, and for users from all three. The last step learns what verdicts say. A build of no commit is refused.
 """
 import argparse
+import os
 import random
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -28,7 +30,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path)
     parser.add_argument("--robots", type=int, default=3, help="of each family, as their file, for what models get wrong (3)")
-    parser.add_argument("--pairs", type=int, default=6, help="of sessions of each family, half of them with an effect (6)")
+    parser.add_argument("--pairs", type=int, default=12, help="of sessions of each family, half of them with an effect (12)")
     parser.add_argument("--cases", type=int, default=6, help="of each part and family, for the verdict (6)")
     parser.add_argument("--steps", nargs="+", default=STEPS,
                         choices=STEPS)
@@ -82,18 +84,26 @@ def main():
             "--out", folder / "test")
         return f"{folder / 'reference'}:{folder / 'test'}" + (f":{effect}" if effect else "")
 
+    def fly_all(fly, *arguments):
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(fly, *arguments))
+
     if "discrepancy" in o.steps:
+        fly_all(robot, [f for f in FAMILIES for _ in range(o.robots)], [n for _ in FAMILIES for n in range(o.robots)])
         for family in [*FAMILIES, ""]:
             shipped = LAB / "discrepancy" / f"without_{family}.toml" if family else CONFIGS / "gap" / "model_discrepancy.toml"
             learn(f"discrepancy_without_{family or 'none'}.toml", others(family), shipped, lambda families: [
                 "--discrepancy", shipped, "--robots", *[robot(f, n) for f in families for n in range(o.robots)]])
     if "sessions" in o.steps:
+        fly_all(pair, [f for f in FAMILIES for _ in range(o.pairs)], [n for _ in FAMILIES for n in range(o.pairs)])
         for family in [*FAMILIES, ""]:
             shipped = LAB / "sessions" / f"without_{family}.toml" if family else CONFIGS / "gap" / "session_variation.toml"
             discrepancy = LAB / "discrepancy" / f"without_{family}.toml" if family else CONFIGS / "gap" / "model_discrepancy.toml"
             learn(f"sessions_without_{family or 'none'}.toml", others(family), shipped, lambda families: [
                 "--sessions", shipped, "--discrepancy", discrepancy, "--pairs", *[pair(f, n) for f in families for n in range(o.pairs)]])
     if "bench" in o.steps:
+        fly_all(pair, [f for f in ON_BENCH for _ in range(o.pairs)], [n for _ in ON_BENCH for n in range(o.pairs)],
+                [True] * o.pairs * len(ON_BENCH))
         for family in ON_BENCH:
             shipped = LAB / "sessions" / f"bench_without_{family}.toml"
             start = shipped if shipped.exists() else LAB / "sessions" / f"without_{family}.toml"
