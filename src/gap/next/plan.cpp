@@ -291,7 +291,7 @@ class Planner {
     return groups;
   }
 
-  /// Of the plan that was asked for, as PlannedChoice::probability.
+  /// The mean of what a plan gives its effects, 0 for one that it does not see (PlannedChoice::probability).
   static double mean_probability(const Plan& plan) {
     double sum = 0;
     for (const PlannedEffect& e : plan.effects) sum += e.probability;

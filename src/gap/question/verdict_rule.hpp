@@ -46,8 +46,8 @@ struct VerdictRule {
     /// Effects are named if the probabilities of all hypotheses that contain their groups add up to at least this.
     double least;
   } naming{};
-  /// What a verdict of probability p says: 1 / (1 + exp(-(slope logit(p) + offset))). Learnt from robots with known
-  /// faults, so that of verdicts that say it this share is right (Platt 1999).
+  /// Maps the probability p of a verdict, by evidence and priors, to the one it says:
+  /// 1 / (1 + exp(-(slope logit(p) + offset))), so that this share of such verdicts is right (Platt 1999).
   struct Said {
     double slope = 1, offset = 0;
     double operator()(double probability) const;

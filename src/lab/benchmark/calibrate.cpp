@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <set>
 
 #include "gap/answer/verdict.hpp"
 #include "io/files.hpp"
@@ -124,8 +125,7 @@ class Calibration {
     std::vector<double> counts;
     for (const fs::path& folder : command.folders) {
       const Manifest manifest = read_manifest(folder);
-      if (families_.find(manifest.family) == std::string::npos)
-        families_ += (families_.empty() ? "" : " and ") + manifest.family;
+      families_.insert(manifest.family);
       if (!fs::exists(true_fits(folder)))
         throw io::InputError(folder.string() + ": was not scored; accepted: folders of flappy-blind score");
       check_verdict(folder, manifest, command.verdict);
@@ -198,7 +198,7 @@ class Calibration {
     return rule;
   }
 
-  /// What verdicts with the constants of scoring should say.
+  /// Slope and offset of what a verdict says, from the verdicts as they were scored.
   VerdictRule::Said said() const {
     std::vector<Claim> verdicts;
     std::vector<double> weights;
@@ -208,7 +208,7 @@ class Calibration {
     }
     return learn_said(verdicts, weights);
   }
-  const std::string& families() const { return families_; }
+  std::string families() const { return io::joined({families_.begin(), families_.end()}); }
 
  private:
   /// The hypotheses of a case with the probabilities of another rule.
@@ -245,7 +245,7 @@ class Calibration {
   VerdictRule rule_;
   std::vector<Constant> constants_;
   std::vector<Case> cases_;
-  std::string families_;
+  std::set<std::string> families_;
 };
 
 constexpr double kMinSlope = 0.05;  // more evidence never says less
@@ -282,7 +282,7 @@ VerdictRule::Said learn_said(const std::vector<Claim>& claims, const std::vector
 
 namespace {
 
-/// What verdicts say stands last in a file; replaces it, or adds it.
+/// Replaces the table [said], which is the last of a file, or appends it.
 void set_said(std::string& text, const VerdictRule::Said& said, const std::string& learnt) {
   const std::string begin = "\n# What a verdict says";
   text.erase(std::min(text.find(begin), text.size()));

@@ -41,7 +41,7 @@ struct PlanOptions {
   std::vector<std::string> effects;  ///< robots have these effects of the catalogue alone; empty: all
   std::size_t at_most = 0;           ///< most cases of each part; 0: all
   std::size_t flights = blind::Family::kFlights;  ///< most flights of a session of a contrast
-  /// Of the references of a contrast; other numbers have other seeds.
+  /// The references of a contrast are of so many sessions. Plans of other numbers have other seeds.
   std::size_t reference_sessions = blind::Family::kFlights;
   bool bench = false;  ///< robots of contrasts are clamped in place of flying
 };

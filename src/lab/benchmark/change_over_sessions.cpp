@@ -15,8 +15,8 @@ using Eigen::Vector3d;
 using flightlog::Column;
 using flightlog::FlightLog;
 
-constexpr double kBeats = 5;             // of a window: long enough for the slowest motion capture
-constexpr std::size_t kFewest = 12;      // samples in a window
+constexpr double kBeats = 5;             // a window is so long that slow motion capture has kFewest samples in it
+constexpr std::size_t kFewest = 12;      // a window with fewer samples has no value
 constexpr std::size_t kMinSessions = 4;  // two in each half
 constexpr std::size_t kFirstOther = 11;  // first number of the other sessions: none that a case flies
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
@@ -235,7 +235,7 @@ struct Projected {
   }
 };
 
-/// Of the channels, that with the largest ratio by the sessions `from`, `from` + 2, ...
+/// The channel with the largest ratio, if the sessions `from`, `from` + 2, ... give the variance; null: there is none.
 const Projected* largest(const std::vector<Projected>& channels, std::size_t from) {
   const Projected* best = nullptr;
   double most = 0;

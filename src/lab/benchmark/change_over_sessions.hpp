@@ -17,7 +17,7 @@ struct WindowedChannel {
   std::vector<double> values;
 };
 
-/// Of one flight, or one run on a bench; the same names, and as many values, for all logs with one header and duration.
+/// The channels of one flight, or of one run on a bench. Logs with one header and duration have the same names, and as many values.
 std::vector<WindowedChannel> windowed_channels(const flightlog::FlightLog& log);
 
 struct OverSessions {
@@ -42,7 +42,7 @@ inline constexpr double kCounts = 3;
 /// Other sessions that a robot flies for it.
 inline constexpr std::size_t kOtherSessions = 6;
 
-/// Of each effect of `robot`, which has `flown` these flights: flies what else is needed. Empty, so not known, with
+/// Flies what is needed in addition to what `robot` has `flown`, and compares each of its effects. Empty, so not known, with
 /// fewer than four other sessions, or where the robot crashes in nearly all.
 std::vector<OverSessions> change_over_sessions(const blind::Family& family, const blind::Assignment& robot,
                                                const std::vector<flightlog::FlightLog>& flown,

@@ -22,8 +22,8 @@ using Eigen::Vector3d;
 
 Vector3d three(const std::vector<double>& x, std::size_t from = 0) { return {x[from], x[from + 1], x[from + 2]}; }
 
-/// Of a displacement that is linear in what it acts on, least squares over the grid: norms of what turns, of what skews, of what
-/// stretches, of the constant, and of the rest, as root mean squares.
+/// Fits a linear law to displacements, by least squares over the grid, and returns root mean squares of its parts: what it turns, what it
+/// skews, what it stretches, its constant, and what is not linear.
 Points parts_of_linear(const Points& at, const Points& outcomes) {
   const auto n = static_cast<Eigen::Index>(at.size());
   Eigen::MatrixXd x(n, 4), y(n, 3);
@@ -45,7 +45,8 @@ Points parts_of_linear(const Points& at, const Points& outcomes) {
           {(y - x * fit).norm() / std::sqrt(static_cast<double>(n))}};
 }
 
-/// Of a place and an attitude, in the axes of the body: norms of the mean and of what varies with the attitude.
+/// Splits the changes of place and of attitude, in the axes of the body, into their means and what varies with the attitude; returns the
+/// norms.
 Points parts_of_marker(const Points& at, const Points& outcomes) {
   Eigen::MatrixXd seen(6, static_cast<Eigen::Index>(at.size()));
   for (std::size_t i = 0; i < at.size(); ++i) {

@@ -383,13 +383,10 @@ bool needs_true_fit(const ScoredCase& c) {
 }
 
 Scores score(const std::vector<ScoredCase>& cases) {
-  std::array<std::vector<ScoredCase>, 2> counting, hidden;  // absolute, contrasts
   Scores s;
-  for (const ScoredCase& whole : cases) {
-    const ScoredCase c = by_what_counts(whole);
-    const bool contrast = std::ranges::count(kContrastParts, c.truth.part) > 0;
-    (c.truth.counts() ? counting : hidden)[contrast].push_back(c);
-  }
+  std::array<std::vector<ScoredCase>, 2> all, counting, hidden;  // absolute, contrasts
+  for (const ScoredCase& c : cases)
+    all[std::ranges::count(kContrastParts, c.truth.part) > 0].push_back(by_what_counts(c));
   std::map<std::string, Cases> harmless;
   for (const ScoredCase& c : cases)
     for (const auto& [name, rival] : c.prediction.rivals)
@@ -398,11 +395,8 @@ Scores score(const std::vector<ScoredCase>& cases) {
     s.unbounded_alarms[name] =
         share(list, [&](const ScoredCase& c) { return !c.prediction.rivals.at(name).named.empty(); });
   for (const std::size_t half : {0U, 1U}) {
-    std::vector<ScoredCase> both = counting[half];
-    std::ranges::move(hidden[half], std::back_inserter(both));
-    silence_rivals(both);
-    counting[half].clear(), hidden[half].clear();
-    for (ScoredCase& c : both) (c.truth.counts() ? counting : hidden)[half].push_back(std::move(c));
+    silence_rivals(all[half]);
+    for (ScoredCase& c : all[half]) (c.truth.counts() ? counting : hidden)[half].push_back(std::move(c));
   }
   if (!counting[0].empty() || !hidden[0].empty()) {
     s.lines = absolute_lines(counting[0]);

@@ -279,16 +279,16 @@ std::string case_line(const Bench& bench, std::size_t i, const Json& prediction)
     magnitudes += (magnitudes.empty() ? "" : "+") + io::shortest_digits(e.magnitude);
   for (const OverSessions& o : label.over_sessions)
     over_sessions += (over_sessions.empty() ? "" : "+") + io::format("%.3g", o.ratio);
+  const ScoredCase asked = by_what_counts(c);
   const bool alone = c.truth.part == "singles" || c.truth.part == "changed";
   const std::optional<double> closed = alone ? closure(c) : std::nullopt;
-  return io::joined(
-      {std::to_string(label.planned.number), c.truth.part, io::joined(c.truth.effects, "+"), magnitudes, over_sessions,
-       p.kind, io::joined(p.effects, "+"), figure(p.probability),
-       right(by_what_counts(c).truth, by_what_counts(c).prediction) ? "1" : "0", closed ? figure(closed) : "",
-       io::shortest_digits(prediction.at("seconds").get<double>()), p.where ? p.where->channel : "",
-       p.where ? p.where->regime : "", std::to_string(c.truth.seed), std::to_string(c.truth.draw),
-       bench.manifest.family, bench.manifest.set, prediction.at("commit").get<std::string>()},
-      ",");
+  return io::joined({std::to_string(label.planned.number), c.truth.part, io::joined(c.truth.effects, "+"), magnitudes,
+                     over_sessions, p.kind, io::joined(p.effects, "+"), figure(p.probability),
+                     right(asked.truth, asked.prediction) ? "1" : "0", closed ? figure(closed) : "",
+                     io::shortest_digits(prediction.at("seconds").get<double>()), p.where ? p.where->channel : "",
+                     p.where ? p.where->regime : "", std::to_string(c.truth.seed), std::to_string(c.truth.draw),
+                     bench.manifest.family, bench.manifest.set, prediction.at("commit").get<std::string>()},
+                    ",");
 }
 
 std::vector<CaseRecord> records_of(const Bench& bench) {

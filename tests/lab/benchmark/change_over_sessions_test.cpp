@@ -7,6 +7,8 @@
 #include <numbers>
 #include <set>
 
+#include "lab/benchmark/stub_family.hpp"
+
 namespace flappy::benchmark {
 namespace {
 
@@ -91,10 +93,9 @@ TEST(OverSessions, IsTheChangeOverTheirStandardDeviation) {
 }
 
 /// A robot whose sessions shift its accelerometer, and whose effect shifts it more; it crashes in one session.
-class Shifting final : public blind::Family {
+class Shifting final : public StubFamily {
  public:
-  std::string name() const override { return "x"; }
-  const std::vector<blind::FamilyEffect>& effects() const override { return effects_; }
+  Shifting() : StubFamily("x") {}
   blind::FamilyFlight fly(const blind::Assignment& a, std::size_t flight) const override {
     if (a.session == 12) return {true, "crashed", {}};
     EXPECT_EQ(a.programme_of.value_or(a.session), 1U) << "every flight has the programme of the tests";
@@ -103,20 +104,7 @@ class Shifting final : public blind::Family {
     for (const auto& [id, magnitude] : a.effects) shift += magnitude;
     return {false, "", shifted(shift + static_cast<double>(flight))};
   }
-  blind::Contrast contrast(const blind::Assignment&, std::size_t, const std::string&, double) const override {
-    return {};
-  }
-  blind::FamilyFlight fly_on_board(const blind::Assignment&, std::size_t, const std::array<double, 4>&, double,
-                                   blind::OnBoard&) const override {
-    return {};
-  }
-  blind::FamilyEscape escape(const blind::Assignment&, std::size_t, const blind::EscapeAssignment&) const override {
-    return {};
-  }
   mutable std::set<std::size_t> flown_;
-
- private:
-  std::vector<blind::FamilyEffect> effects_;
 };
 
 TEST(ChangeOverSessions, FliesTheProgrammeOfTheTestsInOtherSessions) {

@@ -9,6 +9,7 @@
 
 #include "io/files.hpp"
 #include "lab/benchmark/families.hpp"
+#include "lab/benchmark/stub_family.hpp"
 #include "model/effects/registry.hpp"
 
 namespace flappy::benchmark {
@@ -17,32 +18,17 @@ namespace {
 using Points = std::vector<std::vector<double>>;
 
 /// A family whose effects and laws are given.
-class Written final : public blind::Family {
+class Written final : public StubFamily {
  public:
   using Law = std::vector<double> (*)(std::span<const double>);
   Written(std::string name, std::vector<blind::FamilyEffect> effects, std::map<std::string, Law> laws)
-      : name_(std::move(name)), effects_(std::move(effects)), laws_(std::move(laws)) {}
-  std::string name() const override { return name_; }
-  const std::vector<blind::FamilyEffect>& effects() const override { return effects_; }
+      : StubFamily(std::move(name), std::move(effects)), laws_(std::move(laws)) {}
   std::vector<double> law(const std::string& effect, std::span<const double> at) const override {
     const auto found = laws_.find(effect);
     return found == laws_.end() ? std::vector<double>{} : found->second(at);
   }
-  blind::FamilyFlight fly(const blind::Assignment&, std::size_t) const override { return {}; }
-  blind::Contrast contrast(const blind::Assignment&, std::size_t, const std::string&, double) const override {
-    return {};
-  }
-  blind::FamilyFlight fly_on_board(const blind::Assignment&, std::size_t, const std::array<double, 4>&, double,
-                                   blind::OnBoard&) const override {
-    return {};
-  }
-  blind::FamilyEscape escape(const blind::Assignment&, std::size_t, const blind::EscapeAssignment&) const override {
-    return {};
-  }
 
  private:
-  std::string name_;
-  std::vector<blind::FamilyEffect> effects_;
   std::map<std::string, Law> laws_;
 };
 
