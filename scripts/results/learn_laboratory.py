@@ -32,8 +32,7 @@ def main():
     parser.add_argument("--robots", type=int, default=3, help="of each family, as their file, for what models get wrong (3)")
     parser.add_argument("--pairs", type=int, default=12, help="of sessions of each family, half of them with an effect (12)")
     parser.add_argument("--cases", type=int, default=6, help="of each part and family, for the verdict (6)")
-    parser.add_argument("--steps", nargs="+", default=STEPS,
-                        choices=STEPS)
+    parser.add_argument("--steps", nargs="+", default=STEPS, choices=STEPS)
     parser.add_argument("--programs", type=Path, default=ROOT / "build" / "release" / "bin", help="of a build with -DFLAPPY_FAMILIES=ON")
     o = parser.parse_args()
     blind, gap = o.programs / "flappy-blind", o.programs / "flappy-gap"
@@ -112,23 +111,16 @@ def main():
                 "--pairs", *[pair(f, n, True) for f in families for n in range(o.pairs)]])
     if "verdict" in o.steps:
         for f in FAMILIES:
-            run(o.out / f"cases_{f}" / "manifest.json", blind, "make", "--family", f, "--contrast", "--set", "development", "--part", "changed",
-                "unchanged", "--cases", o.cases, "--out", o.out / f"cases_{f}")
+            folder = o.out / f"cases_{f}"
+            run(folder / "manifest.json", blind, "make", "--family", f, "--contrast", "--set", "development", "--part", "changed",
+                "unchanged", "--cases", o.cases, "--out", folder)
+            # judged as reported robots are: by what has not seen their family
+            run(folder / "cases.jsonl", blind, "score", folder, "--discrepancy", LAB / "discrepancy" / f"without_{f}.toml",
+                "--sessions", LAB / "sessions" / f"without_{f}.toml", "--verdict", LAB / "sessions" / f"verdict_without_{f}.toml")
         for family in FAMILIES:
-            # the robots of the other two, judged by what has not seen this family either
-            shipped, scored = LAB / "sessions" / f"verdict_without_{family}.toml", []
-            for f in others(family):
-                folder = o.out / f"cases_{f}_without_{family}"
-                for part in ("cases", "sealed", "manifest.json"):
-                    if not (folder / part).exists():
-                        folder.mkdir(exist_ok=True)
-                        (folder / part).symlink_to(o.out.resolve() / f"cases_{f}" / part)
-                run(folder / "cases.jsonl", blind, "score", folder, "--discrepancy", LAB / "discrepancy" / f"without_{family}.toml",
-                    "--sessions", LAB / "sessions" / f"without_{family}.toml", "--verdict", shipped)
-                scored.append(folder)
-            run(o.out / f"verdict_without_{family}.toml", blind, "calibrate", *scored, "--said", "--verdict", shipped, "--out",
-                o.out / f"verdict_without_{family}.toml")
-            shutil.copyfile(o.out / f"verdict_without_{family}.toml", shipped)
+            shipped, output = LAB / "sessions" / f"verdict_without_{family}.toml", o.out / f"verdict_without_{family}.toml"
+            run(output, blind, "calibrate", *[o.out / f"cases_{f}" for f in others(family)], "--said", "--verdict", shipped, "--out", output)
+            shutil.copyfile(output, shipped)
 
 
 if __name__ == "__main__":

@@ -15,8 +15,6 @@ from self_test import misjudged, run
 
 CODE, CONFIGS = "src/gap", "configs/gap"
 THEORY = "docs/theory/diagnosis.md"
-# Files that are still to be learnt again from a clean commit.
-DIRTY = ("configs/gap/session_variation.toml",)
 # Which file a key of the theory is of: the first that has it.
 FILES = ("verdict.toml", "model_discrepancy.toml", "contrast_verdict.toml", "session_variation.toml", "beat_averaged/verdict.toml")
 KINDS = "Choice|Source|Learnt|Derived|Size"
@@ -216,7 +214,7 @@ def filled(root, text):
 
 def faults(root):
     """One line for each constant without an origin, and for each name in the theory that no constant has."""
-    found, dirty = [], set()
+    found = []
     for c in [*of_code(root), *of_configs(root)]:
         where = f"{c.file}:{c.line}: {c.name}"
         if not c.origin:
@@ -226,12 +224,9 @@ def faults(root):
             if commit is None:
                 found.append(f"{where} is learnt, of no commit; accepted: Learnt: COMMAND, COMMIT.")
             elif commit["dirty"]:
-                dirty.add(c.file)
-                if c.file not in DIRTY:
-                    found.append(f"{where} is learnt from a changed commit; accepted: a clean one")
+                found.append(f"{where} is learnt from a changed commit; accepted: a clean one")
         elif not c.what:
             found.append(f"{where} does not say what it is")
-    found += [f"{file}: is learnt from a clean commit; take it out of DIRTY in {Path(__file__).name}" for file in DIRTY if (root / file).exists() and file not in dirty]
     if (page := root / THEORY).exists():
         names, text = named(root), page.read_text(encoding="utf-8")
         for use in re.finditer(rf"`(k[A-Z]\w*|[\w.]+(?=`\s+=\s+{NUMBER}))`", text):
@@ -257,8 +252,6 @@ def self_test():
         ({"configs/gap/a.toml": "schema = 1\n[prior]\nnone = 0.1\n"}, "configs/gap/a.toml:3: prior.none has no origin"),
         ({"configs/gap/a.toml": "# All is new. Learnt: by somebody.\nschema = 1\n[prior]\nnone = 0.1\n"}, "is learnt, of no commit"),
         ({"configs/gap/a.toml": "# All is new. Learnt: x, commit 0123456-dirty.\nschema = 1\n[prior]\nnone = 0.1\n"}, "learnt from a changed commit"),
-        ({DIRTY[0]: "# All is new. Learnt: x, commit 0123456-dirty.\nschema = 1\n[spread]\nrobot_sd = 0.1\n"}, None),
-        ({DIRTY[0]: "# All is new. Learnt: x, commit 0123456.\nschema = 1\n[spread]\nrobot_sd = 0.1\n"}, "take it out of DIRTY"),
         ({THEORY: "After `kStep` steps.\n"}, "no one constant is named kStep"),
         ({THEORY: "Of `kSteps` = 4,\n`prior.no`\n= 0.1.\n"}, f"{THEORY}:2: no one constant is named prior.no"),
     ]
