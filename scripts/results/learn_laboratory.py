@@ -117,9 +117,11 @@ def main():
             # judged as reported robots are: by what has not seen their family
             run(folder / "cases.jsonl", blind, "score", folder, "--discrepancy", LAB / "discrepancy" / f"without_{f}.toml",
                 "--sessions", LAB / "sessions" / f"without_{f}.toml", "--verdict", LAB / "sessions" / f"verdict_without_{f}.toml")
-        for family in FAMILIES:
-            shipped, output = LAB / "sessions" / f"verdict_without_{family}.toml", o.out / f"verdict_without_{family}.toml"
-            run(output, blind, "calibrate", *[o.out / f"cases_{f}" for f in others(family)], "--said", "--verdict", shipped, "--out", output)
+        start = CONFIGS / "gap" / "contrast_verdict.toml"
+        shutil.copyfile(start, o.out / "verdict_start.toml")
+        for family in [*FAMILIES, ""]:
+            shipped, output = LAB / "sessions" / f"verdict_without_{family}.toml" if family else start, o.out / f"verdict_without_{family or 'none'}.toml"
+            run(output, blind, "calibrate", *[o.out / f"cases_{f}" for f in others(family)], "--verdict", o.out / "verdict_start.toml", "--out", output)
             shutil.copyfile(output, shipped)
 
 

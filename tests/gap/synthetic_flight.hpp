@@ -1,6 +1,7 @@
 // A flight whose rows are made up, and whose vehicles predict them by a law that a test writes down.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <memory>
@@ -159,5 +160,17 @@ inline void synthetic_law(const SyntheticFlight& f, const VehicleHypothesis& h, 
 }
 
 inline int group_index(int channel, int coefficient) { return channel * kCoefficients + coefficient; }
+
+/// What differs between sessions, with spreads that no learning changes.
+inline SessionVariation fixed_session_variation() {
+  SessionVariation s = read_session_variation();
+  s.scale_sd = 1, s.own_scale_sd = 0.3, s.own_offset = 0, s.own_share = 0.05, s.effect_freedom = 6;
+  s.law_error.fill(0.2);
+  s.law_spread = 1.4, s.law_most = 7;
+  for (auto& channel : s.shares)
+    for (auto& harmonic : channel) std::ranges::fill(harmonic, 0.0005);
+  for (auto& [effect, sd] : s.background) sd = 0.015;
+  return s;
+}
 
 }  // namespace flappy::gap

@@ -293,7 +293,6 @@ int main(int argc, char** argv) {
   benchmark::CalibrateCommand calibrated;
   calibrate.option("folders", calibrated.folders, "of flappy-blind score").required();
   calibrate.option("--verdict", calibrated.verdict, "constants to start from").shows_default();
-  calibrate.flag("--said", calibrated.said, "learn only what verdicts say, from robots that taught no constant");
   calibrate.option("--out", calibrated.out, "file for the constants").required();
   io::Command loop =
       program.app().command("loop", "trains on with what was diagnosed, and flies robots with it and without");

@@ -33,6 +33,12 @@ constexpr double kClipSd = 3;
 
 std::size_t row_of(std::size_t beat, int group) { return beat * kRowsPerBeat + static_cast<std::size_t>(group); }
 
+/// For least squares on the whole basis.
+Eigen::LDLT<MatrixXd> loose_factor(MatrixXd normal) {
+  normal.diagonal().array() += kLooseRidge * normal(0, 0);
+  return normal.ldlt();
+}
+
 /// A group with delta integrated out: sums a' b over its rows become a' b - of(a)' of(b).
 struct WithoutDiscrepancy {
   WithoutDiscrepancy(const MatrixXd& normal, VectorXd discrepancy_sd) : sd(std::move(discrepancy_sd)) {
@@ -135,15 +141,17 @@ Evidence Evidence::with_discrepancy(ModelDiscrepancy discrepancy) const {
 }
 
 Evidence Evidence::with_tests(const std::vector<char>& tests, SufficientStatistics& statistics) const {
-  Evidence e = *this;
+  std::vector<std::vector<MatrixXd>> sums = sums_->of_flights;
   for (std::size_t f = 0; f < tests.size(); ++f) {
     const MatrixXd to = basis().without_offsets(tests[f] != 0);
     for (std::size_t g = 0; g < static_cast<std::size_t>(kGroups); ++g) {
       if (!has_rows(static_cast<int>(g))) continue;
-      e.normal_[f][g] = to.transpose() * normal_[f][g] * to;
+      sums[f][g] = to.transpose() * sums[f][g] * to;
       statistics.sums[f][g] = to.transpose() * statistics.sums[f][g];
     }
   }
+  Evidence e = *this;
+  e.take_sums(std::move(sums));
   return e;
 }
 
@@ -252,11 +260,12 @@ void Evidence::for_whitened(std::size_t flight, int group, const Use& use) const
 
 void Evidence::sum_basis() {
   const Index q = basis().size();
-  normal_.assign(flights_->size(), std::vector<MatrixXd>(kGroups, MatrixXd::Zero(q, q)));
+  std::vector<std::vector<MatrixXd>> sums(flights_->size(), std::vector<MatrixXd>(kGroups, MatrixXd::Zero(q, q)));
   for (std::size_t f = 0; f < flights_->size(); ++f) {
     const MatrixXd& values = basis().values(f);
-    for (int g = 0; g < kGroups; ++g) {
-      if (!has_rows(g)) continue;
+    io::parallel_for(static_cast<std::size_t>(kGroups), threads_, [&](std::size_t group) {
+      const int g = static_cast<int>(group);
+      if (!has_rows(g)) return;
       MatrixXd rows(static_cast<Index>(flight(f).beats()), q);
       Index n = 0;
       for_whitened(f, g, [&](std::size_t j, double now, double past) {
@@ -265,13 +274,66 @@ void Evidence::sum_basis() {
         else rows.row(n) = now * values.row(i);
         ++n;
       });
-      if (n == 0) continue;
+      if (n == 0) return;
       const auto used = rows.topRows(n);
-      normal_[f][static_cast<std::size_t>(g)].selfadjointView<Eigen::Lower>().rankUpdate(used.transpose());
-      normal_[f][static_cast<std::size_t>(g)] =
-          MatrixXd(normal_[f][static_cast<std::size_t>(g)].selfadjointView<Eigen::Lower>());
-    }
+      sums[f][group].selfadjointView<Eigen::Lower>().rankUpdate(used.transpose());
+      sums[f][group] = MatrixXd(sums[f][group].selfadjointView<Eigen::Lower>());
+    });
   }
+  take_sums(std::move(sums));
+}
+
+void Evidence::take_sums(std::vector<std::vector<MatrixXd>> of_flights) {
+  auto s = std::make_shared<Sums>();
+  s->of_flights = std::move(of_flights);
+  s->all.resize(kGroups);
+  s->loose.resize(kGroups);
+  io::parallel_for(static_cast<std::size_t>(kGroups), threads_, [&](std::size_t g) {
+    MatrixXd& all = s->all[g];
+    all = s->of_flights[0][g];
+    for (std::size_t f = 1; f < s->of_flights.size(); ++f) all += s->of_flights[f][g];
+    s->loose[g] = loose_factor(all);
+  });
+  sums_ = std::move(s);
+}
+
+/// Sums of a group over the flights that count.
+class Evidence::GroupSums {
+ public:
+  GroupSums(const Evidence& e, const std::vector<char>& use, int group)
+      : sums_(*e.sums_), use_(use), g_(static_cast<std::size_t>(group)) {
+    if (std::ranges::all_of(use, std::identity())) return;
+    own_ = MatrixXd::Zero(e.basis().size(), e.basis().size());
+    for (std::size_t f = 0; f < use.size(); ++f)
+      if (use[f]) own_ += sums_.of_flights[f][g_];
+    own_loose_ = loose_factor(own_);
+  }
+  const MatrixXd& normal() const { return own_.size() > 0 ? own_ : sums_.all[g_]; }
+  bool has_rows() const { return normal()(0, 0) != 0; }
+  VectorXd right(const SufficientStatistics& residual) const {
+    VectorXd sum = VectorXd::Zero(normal().rows());
+    for (std::size_t f = 0; f < use_.size(); ++f)
+      if (use_[f]) sum += residual.sums[f][g_];
+    return sum;
+  }
+  /// Square of the smooth part of a residual.
+  double smooth_square(const VectorXd& right) const {
+    return (own_.size() > 0 ? own_loose_ : sums_.loose[g_]).solve(right).dot(right);
+  }
+
+ private:
+  const Sums& sums_;
+  const std::vector<char>& use_;
+  std::size_t g_;
+  MatrixXd own_;  ///< empty: all flights count
+  Eigen::LDLT<MatrixXd> own_loose_;
+};
+
+Evidence::GroupSum Evidence::sum_of(const SufficientStatistics& residual, const std::vector<char>& use,
+                                    int group) const {
+  const GroupSums sums(*this, use, group);
+  const VectorXd right = sums.right(residual);
+  return {sums.normal(), right, sums.smooth_square(right)};
 }
 
 BasisCoefficients Evidence::basis_coefficients(const Residuals& rows) const {
@@ -317,7 +379,7 @@ void Evidence::add(double share, const BasisCoefficients& change, SufficientStat
   for (std::size_t f = 0; f < flights_->size(); ++f)
     for (int g = 0; g < kGroups; ++g)
       to.sums[f][static_cast<std::size_t>(g)] +=
-          share * (normal_[f][static_cast<std::size_t>(g)] * change.row(g).transpose());
+          share * (sums_->of_flights[f][static_cast<std::size_t>(g)] * change.row(g).transpose());
 }
 
 double Evidence::noise_sd(int group) const {
@@ -343,49 +405,49 @@ BasisCoefficients Evidence::discrepancy_sd(const Scales& scales) const {
   return sd;
 }
 
-double Evidence::smooth_square(MatrixXd normal, const VectorXd& right) {
-  normal.diagonal().array() += kLooseRidge * normal(0, 0);
-  return normal.ldlt().solve(right).dot(right);
-}
-
-/// Sums over the chosen flights: basis x basis, and basis x residual.
-std::pair<MatrixXd, VectorXd> Evidence::sums_of(const SufficientStatistics& residual, const std::vector<char>& use,
-                                                int group) const {
-  const auto g = static_cast<std::size_t>(group);
-  std::pair<MatrixXd, VectorXd> sums{MatrixXd::Zero(basis().size(), basis().size()), VectorXd::Zero(basis().size())};
-  for (std::size_t f = 0; f < use.size(); ++f) {
-    if (!use[f]) continue;
-    sums.first += normal_[f][g];
-    sums.second += residual.sums[f][g];
-  }
-  return sums;
-}
-
 Reduced Evidence::reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& regressors,
-                         const std::vector<char>& use, const BasisCoefficients& discrepancy_sd,
-                         const MatrixXd* known) const {
+                         const std::vector<char>& use, const BasisCoefficients& discrepancy_sd) const {
+  return *std::move(reduce_each({residual}, regressors, use, discrepancy_sd).front());
+}
+
+std::vector<std::optional<Reduced>> Evidence::reduce_each(const std::vector<SufficientStatistics>& residuals,
+                                                          const std::vector<const BasisCoefficients*>& regressors,
+                                                          const std::vector<char>& use,
+                                                          const BasisCoefficients& discrepancy_sd,
+                                                          const MatrixXd* known) const {
   const Index q = basis().size(), k = static_cast<Index>(regressors.size());
-  Reduced result{MatrixXd::Zero(k + 1, k + 1), 0};
-  if (known != nullptr) result.sums.topLeftCorner(k, k) = *known;
+  MatrixXd sums = known != nullptr ? *known : MatrixXd(MatrixXd::Zero(k, k));
+  std::vector<std::optional<Reduced>> results(residuals.size());
+  for (std::size_t i = 0; i < residuals.size(); ++i)
+    if (!residuals[i].sums.empty()) results[i] = Reduced{MatrixXd::Zero(k + 1, k + 1), 0};
   MatrixXd change(q, k), weighed(q, k);
   for (int g = 0; g < kGroups; ++g) {
-    const auto [normal, right] = sums_of(residual, use, g);
-    if (normal(0, 0) == 0) continue;  // no rows
+    const GroupSums group(*this, use, g);
+    if (!group.has_rows()) continue;
+    const MatrixXd& normal = group.normal();
     for (Index i = 0; i < k; ++i) change.col(i) = regressors[static_cast<std::size_t>(i)]->row(g).transpose();
     const WithoutDiscrepancy without(normal, discrepancy_sd.row(g).transpose());
     if (k > 0 && known == nullptr) {  // Eigen's triangular product reads the first element even of an empty matrix
       const MatrixXd half = without.of(normal);
       weighed.noalias() = (normal - half.transpose() * half) * change;
-      result.sums.topLeftCorner(k, k).triangularView<Eigen::Lower>() += change.transpose() * weighed;
+      sums.triangularView<Eigen::Lower>() += change.transpose() * weighed;
     }
-    const VectorXd half_right = without.of(right);
-    const VectorXd delta = without.sd.cwiseProduct(without.llt.matrixU().solve(half_right));
-    result.sums.row(k).head(k) += (right - normal * delta).transpose() * change;
-    result.sums(k, k) += smooth_square(normal, right) - half_right.squaredNorm();
-    result.log_scale -= without.llt.matrixLLT().diagonal().array().log().sum();
+    io::parallel_for(residuals.size(), threads_, [&](std::size_t i) {
+      if (!results[i]) return;
+      Reduced& result = *results[i];
+      const VectorXd right = group.right(residuals[i]), half_right = without.of(right);
+      const VectorXd delta = without.sd.cwiseProduct(without.llt.matrixU().solve(half_right));
+      result.sums.row(k).head(k) += (right - normal * delta).transpose() * change;
+      result.sums(k, k) += group.smooth_square(right) - half_right.squaredNorm();
+      result.log_scale -= without.llt.matrixLLT().diagonal().array().log().sum();
+    });
   }
-  result.sums = MatrixXd(result.sums.selfadjointView<Eigen::Lower>());
-  return result;
+  for (std::optional<Reduced>& result : results) {
+    if (!result) continue;
+    result->sums.topLeftCorner(k, k) = sums;
+    result->sums = MatrixXd(result->sums.selfadjointView<Eigen::Lower>());
+  }
+  return results;
 }
 
 BasisCoefficients Evidence::discrepancy_mean(const SufficientStatistics& residual, const BasisCoefficients& explained,
@@ -393,10 +455,10 @@ BasisCoefficients Evidence::discrepancy_mean(const SufficientStatistics& residua
                                              const BasisCoefficients& discrepancy_sd) const {
   BasisCoefficients mean = BasisCoefficients::Zero(kGroups, basis().size());
   for (int g = 0; g < kGroups; ++g) {
-    const auto [normal, right] = sums_of(residual, use, g);
-    if (normal(0, 0) == 0) continue;  // no rows
-    const WithoutDiscrepancy without(normal, discrepancy_sd.row(g).transpose());
-    const VectorXd half = without.of(right - normal * explained.row(g).transpose());
+    const GroupSums group(*this, use, g);
+    if (!group.has_rows()) continue;
+    const WithoutDiscrepancy without(group.normal(), discrepancy_sd.row(g).transpose());
+    const VectorXd half = without.of(group.right(residual) - group.normal() * explained.row(g).transpose());
     mean.row(g) = without.sd.cwiseProduct(without.llt.matrixU().solve(half)).transpose();
   }
   return mean;

@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -190,11 +191,15 @@ class Evidence {
 
   /// Prior standard deviation of the discrepancy coefficients, [group][basis].
   BasisCoefficients discrepancy_sd(const Scales& scales) const;
-  /// Integrates delta out. `use`: [flight] whether it counts. `discrepancy_sd`: [group][basis]. `known`: sums of
-  /// products of the regressors from an earlier call; null: computed.
+  /// Integrates delta out. `use`: [flight] whether it counts. `discrepancy_sd`: [group][basis].
   Reduced reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& regressors,
-                 const std::vector<char>& use, const BasisCoefficients& discrepancy_sd,
-                 const Eigen::MatrixXd* known = nullptr) const;
+                 const std::vector<char>& use, const BasisCoefficients& discrepancy_sd) const;
+  /// The same for several residuals under one prior. Statistics without sums give nothing. `known`: sums of products of
+  /// the regressors from an earlier call; null: computed.
+  std::vector<std::optional<Reduced>> reduce_each(const std::vector<SufficientStatistics>& residuals,
+                                                  const std::vector<const BasisCoefficients*>& regressors,
+                                                  const std::vector<char>& use, const BasisCoefficients& discrepancy_sd,
+                                                  const Eigen::MatrixXd* known = nullptr) const;
   /// Posterior mean of the discrepancy coefficients, [group][basis], given what else explains the residual.
   BasisCoefficients discrepancy_mean(const SufficientStatistics& residual, const BasisCoefficients& explained,
                                      const std::vector<char>& use, const BasisCoefficients& discrepancy_sd) const;
@@ -226,13 +231,26 @@ class Evidence {
     double sd = 1, past = 0, signal = 0;
     double declared_sd = 0;
   };
+  /// Basis x basis, summed over whitened rows.
+  struct Sums {
+    std::vector<std::vector<Eigen::MatrixXd>> of_flights;  ///< [flight][group]
+    std::vector<Eigen::MatrixXd> all;                      ///< [group]
+    std::vector<Eigen::LDLT<Eigen::MatrixXd>> loose;       ///< [group] of `all` with a ridge
+  };
+  class GroupSums;
   class Weighing;
   enum class Learn { declared, weights, noise, rest_as_noise };
   const PredictedFlight& flight(std::size_t f) const { return *(*flights_)[f]; }
   bool has_rows(int group) const { return flight(0).has_rows(group / kCoefficients, group % kCoefficients); }
   void sum_basis();
-  std::pair<Eigen::MatrixXd, Eigen::VectorXd> sums_of(const SufficientStatistics& residual,
-                                                      const std::vector<char>& use, int group) const;
+  void take_sums(std::vector<std::vector<Eigen::MatrixXd>> of_flights);
+  struct GroupSum {
+    Eigen::MatrixXd normal;  ///< basis x basis
+    Eigen::VectorXd right;   ///< basis x residual
+    double square = 0;       ///< of the smooth part of the residual
+  };
+  /// Of the flights that count.
+  GroupSum sum_of(const SufficientStatistics& residual, const std::vector<char>& use, int group) const;
   void learn(const Residuals& residual, Learn what);
   Eigen::VectorXd session_means(const Residuals& residual, int group) const;
   template <class Use>
@@ -240,7 +258,6 @@ class Evidence {
   template <class Use>
   void for_whitened(std::size_t flight, int group, const Use& use) const;
   Eigen::VectorXd prior_sd(int group) const;
-  static double smooth_square(Eigen::MatrixXd normal, const Eigen::VectorXd& right);
 
   const EvidenceRules* rules_;
   const Flights* flights_;
@@ -251,7 +268,7 @@ class Evidence {
   bool scales_held_ = false;
   Residuals weights_;
   std::vector<Eigen::MatrixXd> inverse_;              ///< [channel] inverse of basis x basis, without whitening
-  std::vector<std::vector<Eigen::MatrixXd>> normal_;  ///< [flight][group] basis x basis of the whitened rows
+  std::shared_ptr<const Sums> sums_;
 };
 
 }  // namespace flappy::gap

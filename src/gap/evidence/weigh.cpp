@@ -12,7 +12,9 @@
 #include <limits>
 
 #include "gap/evidence/evidence.hpp"
+#include "gap/evidence/wide_kernel.hpp"
 #include "io/parallel.hpp"
+#include "sim/kernels.hpp"
 
 namespace flappy::gap {
 namespace {
@@ -20,6 +22,8 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+/// Row after row, as WideKernel has it.
+using WideMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// Iterations end when they gain less evidence than this. Choice.
 constexpr double kSettled_nats = 0.1;
@@ -61,6 +65,13 @@ Scales strided(const Scales& from, const Scales& to, double stride) {
 }
 
 }  // namespace
+
+FLAPPY_KERNELS(WideKernel, wide_kernel_of_set);
+
+const WideKernel& wide_kernel() {
+  static const WideKernel& kernel = *wide_kernel_of_sets[sim::place_of("")];
+  return kernel;
+}
 
 void Scales::centre_tests(const SessionVariation& sessions) {
   session = sessions.first_scale();
@@ -132,15 +143,17 @@ class Evidence::Weighing {
  private:
   /// What does not depend on scales, of a group.
   struct Sums {
-    MatrixXd normal, change, all;  ///< basis x basis; basis x regressors; normal (change), then basis x residual
+    MatrixXd normal, change;  ///< basis x basis; basis x regressors
+    WideMatrix all;           ///< normal (change), then basis x residual, then columns of zeros
     VectorXd prior_sd;             ///< prior standard deviation of delta at scale 1
     double squares = 0;            ///< sum of squares of the residual
   };
   /// A group under given scales.
   struct Half {
     VectorXd sd, law_sd;
-    Eigen::LLT<MatrixXd> llt;  ///< L L^T = H
-    MatrixXd half;             ///< L^-1 d all
+    double log_determinant = 0;  ///< half that of H
+    WideMatrix lower;            ///< L, with L L^T = H
+    WideMatrix half;             ///< L^-1 d all, then columns of zeros
   };
   /// Scales that follow a centre f: the sums of nu, and of nu / s^2.
   struct Followers {
@@ -158,7 +171,7 @@ class Evidence::Weighing {
   void find_groups(const std::vector<char>& use) {
     for (int g = 0; g < kGroups; ++g)
       for (std::size_t f = 0; f < use.size(); ++f)
-        if (use[f] && e_.normal_[f][static_cast<std::size_t>(g)](0, 0) > 0) {
+        if (use[f] && e_.sums_->of_flights[f][static_cast<std::size_t>(g)](0, 0) > 0) {
           seen_.push_back(g);
           break;
         }
@@ -177,16 +190,16 @@ class Evidence::Weighing {
     halves_.resize(seen_.size());
     io::parallel_for(seen_.size(), e_.threads_, [&](std::size_t n) {
       Sums& s = sums_[n];
-      auto [normal, right] = e_.sums_of(residual, use, seen_[n]);
-      s.normal = std::move(normal);
+      GroupSum sum = e_.sum_of(residual, use, seen_[n]);
+      s.normal = std::move(sum.normal);
       s.change.resize(q_, k_);
       for (Index i = 0; i < k_; ++i)
         s.change.col(i) = regressors_.columns[static_cast<std::size_t>(i)]->row(seen_[n]).transpose();
-      s.all.resize(q_, k_ + 1);
+      s.all = WideMatrix::Zero(q_, padded(k_ + 1));
       s.all.leftCols(k_).noalias() = s.normal * s.change;
-      s.all.col(k_) = right;
+      s.all.col(k_) = sum.right;
       s.prior_sd = e_.prior_sd(seen_[n]);
-      s.squares = smooth_square(s.normal, right);
+      s.squares = sum.square;
     });
     whole_ = MatrixXd::Zero(k_ + 1, k_ + 1);
     for (const Sums& s : sums_) {
@@ -213,6 +226,11 @@ class Evidence::Weighing {
 
   /// The evidence with delta integrated out, under these scales. Leaves the groups in halves_.
   ScaledEvidence evidence_at(const Scales& scales, bool covariance) {
+    // regressors in units of the prior of their coefficients
+    VectorXd unit = VectorXd::Ones(padded(k_ + 1));
+    for (Index i = 0; i < k_; ++i)
+      if (const int e = regressors_.effects[static_cast<std::size_t>(i)]; e >= 0)
+        unit[i] = scales.effects[static_cast<std::size_t>(e)];
     // each group: H, and what delta takes from the sums
     io::parallel_for(seen_.size(), e_.threads_, [&](std::size_t n) {
       const Sums& s = sums_[n];
@@ -225,21 +243,20 @@ class Evidence::Weighing {
       }
       MatrixXd precision = h.sd.asDiagonal() * s.normal * h.sd.asDiagonal();
       precision.diagonal().array() += 1;
-      h.llt.compute(precision);
-      h.half = h.llt.matrixL().solve(h.sd.asDiagonal() * s.all);
+      const Eigen::LLT<MatrixXd> llt(precision);
+      h.log_determinant = llt.matrixLLT().diagonal().array().log().sum();
+      h.lower = llt.matrixLLT();
+      h.half = h.sd.asDiagonal() * s.all * unit.asDiagonal();
+      kernel_.solve_lower(h.lower.data(), q_, h.half.cols(), h.half.data());
     });
-    // regressors in units of the prior of their coefficients
-    VectorXd unit = VectorXd::Ones(k_ + 1);
-    for (Index i = 0; i < k_; ++i)
-      if (const int e = regressors_.effects[static_cast<std::size_t>(i)]; e >= 0)
-        unit[i] = scales.effects[static_cast<std::size_t>(e)];
-    io::parallel_for(seen_.size(), e_.threads_, [&](std::size_t n) { halves_[n].half *= unit.asDiagonal(); });
     // the sum over the groups
-    Reduced reduced{unit.asDiagonal() * whole_ * unit.asDiagonal(), 0};
+    Reduced reduced{unit.head(k_ + 1).asDiagonal() * whole_ * unit.head(k_ + 1).asDiagonal(), 0};
+    WideMatrix sums = WideMatrix::Zero(unit.size(), unit.size());
     for (const Half& h : halves_) {
-      reduced.sums.selfadjointView<Eigen::Lower>().rankUpdate(h.half.transpose(), -1);
-      reduced.log_scale -= h.llt.matrixLLT().diagonal().array().log().sum();
+      kernel_.subtract_squares(h.half.data(), q_, h.half.cols(), sums.data());
+      reduced.log_scale -= h.log_determinant;
     }
+    reduced.sums += sums.topLeftCorner(k_ + 1, k_ + 1);
     reduced.sums = MatrixXd(reduced.sums.selfadjointView<Eigen::Lower>());
     ScaledEvidence w{posterior(reduced, chosen_, prior_mean_, covariance), scales, 1,
                      BasisCoefficients::Zero(kGroups, q_), BasisCoefficients::Zero(kGroups, q_)};
@@ -263,20 +280,28 @@ class Evidence::Weighing {
 
   /// E step: delta, and its expected squares in units of D, given the posterior of the regressors.
   void expect_squares(ScaledEvidence& w) const {
-    const MatrixXd spread = w.posterior.covariance.llt().matrixL();
+    const Index width = padded(k_ + 1);
+    WideMatrix spread = WideMatrix::Zero(width, width);  // without the residual, which is no regressor
+    if (k_ > 0) spread.topLeftCorner(k_, k_) = w.posterior.covariance.llt().matrixL();
     io::parallel_for(seen_.size(), e_.threads_, [&](std::size_t n) {
       const Half& h = halves_[n];
-      const VectorXd z = h.llt.matrixU().solve(h.half.col(k_) - h.half.leftCols(k_) * w.posterior.mean);
-      const MatrixXd inverse = h.llt.matrixU().solve(MatrixXd::Identity(q_, q_));
-      MatrixXd moved;
-      if (k_ > 0)  // Eigen's triangular products and row expressions fail for matrices without columns
-        moved = h.llt.matrixU().solve(h.half.leftCols(k_) * spread.triangularView<Eigen::Lower>());
+      WideMatrix z = WideMatrix::Zero(q_, kColumnStep);
+      z.col(0) = h.half.col(k_) - h.half.leftCols(k_) * w.posterior.mean;
+      kernel_.solve_transposed(h.lower.data(), q_, z.cols(), z.data());
+      // H^-1 = L^-T L^-1; then what regressors that are not known move
+      VectorXd variance = VectorXd::Zero(q_);
+      WideMatrix inverse = WideMatrix::Identity(q_, padded(q_));
+      kernel_.solve_transposed(h.lower.data(), q_, inverse.cols(), inverse.data());
+      kernel_.add_row_squares(inverse.data(), q_, inverse.cols(), variance.data());
+      WideMatrix moved(q_, width);
+      kernel_.times_lower(h.half.data(), spread.data(), q_, width, moved.data());
+      kernel_.solve_transposed(h.lower.data(), q_, width, moved.data());
+      kernel_.add_row_squares(moved.data(), q_, width, variance.data());
       for (Index i = 0; i < q_; ++i) {
         const double d = h.sd[i], share = d > 0 ? 1 - std::pow(h.law_sd[i] / d, 2) : 0;  // delta's share of variance
-        const double square =
-            d * d * (z[i] * z[i] + inverse.row(i).squaredNorm() + (k_ > 0 ? moved.row(i).squaredNorm() : 0.0));
+        const double square = d * d * (z(i, 0) * z(i, 0) + variance[i]);
         const double own = share * share * square + share * h.law_sd[i] * h.law_sd[i];
-        w.delta(seen_[n], i) = z[i];
+        w.delta(seen_[n], i) = z(i, 0);
         w.squares(seen_[n], i) = sums_[n].prior_sd[i] > 0 ? own / (sums_[n].prior_sd[i] * sums_[n].prior_sd[i]) : 0;
       }
     });
@@ -344,6 +369,7 @@ class Evidence::Weighing {
   }
 
   const Evidence& e_;
+  const WideKernel& kernel_ = wide_kernel();
   const Regressors& regressors_;
   const BasisCoefficients& law_sd_;
   std::optional<double> unknown_penalty_nats_;

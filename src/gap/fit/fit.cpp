@@ -56,20 +56,25 @@ Directions Fitter::axes(const Hypothesis& hypothesis) {
 }
 
 Fit Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directions directions,
-                      const std::vector<BasisCoefficients>& known) const {
+                      const std::vector<BasisCoefficients>& known, bool rough) const {
   std::vector<VehicleHypothesis> vehicles = {hypothesis.vehicle(at)};
   std::vector<double> spans;
   const auto first = static_cast<Index>(known.size());
+  const std::size_t sides = rough ? 1 : 2;
   for (Index d = first; d < directions.reach.size(); ++d) {
     if (linear_column(hypothesis, d)) continue;
     const VectorXd axis = directions.axes.col(d);
     const VectorXd up = hypothesis.bounded(at + directions.reach[d] * axis);
     const VectorXd down = hypothesis.bounded(at - directions.reach[d] * axis);
-    spans.push_back((up - down).dot(axis));
-    vehicles.push_back(hypothesis.vehicle(up));
-    vehicles.push_back(hypothesis.vehicle(down));
+    // the longer side, where a bound is near
+    const bool upward = std::abs((up - at).dot(axis)) >= std::abs((at - down).dot(axis));
+    const VectorXd &to = !rough || upward ? up : down, &from = rough ? at : down;
+    spans.push_back((to - from).dot(axis));
+    vehicles.push_back(hypothesis.vehicle(to));
+    if (!rough) vehicles.push_back(hypothesis.vehicle(from));
   }
-  const std::vector<VectorXd> shifts = around(hypothesis, at, directions, known, vehicles);
+  const std::vector<VectorXd> shifts =
+      rough ? std::vector<VectorXd>() : around(hypothesis, at, directions, known, vehicles);
   Fit l{at, std::move(directions), {}, {}, known, 1, {}};
   std::vector<std::size_t> flown;
   for (Index d = first; d < l.directions.reach.size(); ++d) {
@@ -77,33 +82,21 @@ Fit Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directio
     if (linear == nullptr) flown.push_back(l.columns.size());
     l.columns.push_back(linear == nullptr ? BasisCoefficients() : *linear);
   }
-  // each residual is reduced as it comes; of two sides of a direction, by the one that comes second
-  struct Sides {
-    Residuals rows[2];
-    std::atomic<int> here = 0;
-  };
-  std::vector<Sides> sides(flown.size());
+  // residuals are reduced as they come
+  std::vector<BasisCoefficients> of_sides(sides * flown.size());
   std::vector<SufficientStatistics> there(shifts.size());
   for_residuals(*flights_, vehicles, threads_, [&](std::size_t i, Residuals rows) {
-    if (i == 0) {
-      l.residual = std::move(rows);
-      return;
-    }
-    const std::size_t n = (i - 1) / 2;
-    if (n >= sides.size()) {
-      if (!rows.empty()) there[i - 1 - 2 * sides.size()] = evidence_->statistics(rows);
-      return;
-    }
-    sides[n].rows[(i - 1) % 2] = std::move(rows);
-    if (sides[n].here.fetch_add(1) == 0) return;
-    Residuals up = std::move(sides[n].rows[0]);
-    const Residuals down = std::move(sides[n].rows[1]);
-    if (up.empty() || down.empty() || !(spans[n] > 0)) return;
-    for (std::size_t f = 0; f < up.size(); ++f)
-      for (std::size_t k = 0; k < up[f].size(); ++k) up[f][k] = (down[f][k] - up[f][k]) / spans[n];
-    l.columns[flown[n]] = evidence_->basis_coefficients(up);
+    if (i == 0) l.residual = std::move(rows);
+    else if (rows.empty()) return;
+    else if (i <= of_sides.size()) of_sides[i - 1] = evidence_->basis_coefficients(rows);
+    else there[i - 1 - of_sides.size()] = evidence_->statistics(rows);
   });
   if (l.residual.empty()) return l;
+  const BasisCoefficients here = rough ? evidence_->basis_coefficients(l.residual) : BasisCoefficients();
+  for (std::size_t n = 0; n < flown.size(); ++n) {
+    const BasisCoefficients &to = of_sides[sides * n], &from = rough ? here : of_sides[sides * n + 1];
+    if (to.size() > 0 && from.size() > 0 && spans[n] != 0) l.columns[flown[n]] = (from - to) / spans[n];
+  }
   l.statistics = evidence_->statistics(l.residual);
   average(std::move(there), shifts, l);
   return l;
@@ -345,14 +338,6 @@ Posterior Fitter::of_directions(const Fit& fit, const Posterior& p) {
 VectorXd Fit::mean() const { return at + directions.axes * posterior.mean; }
 MatrixXd Fit::covariance() const { return directions.axes * posterior.covariance * directions.axes.transpose(); }
 
-double Fitter::cost(const Regressors& nuisances, const MatrixXd& sums, const SufficientStatistics& residual,
-                    const VectorXd& at) const {
-  const Reduced reduced =
-      evidence_->reduce(residual, nuisances.columns, all_flights(), evidence_->discrepancy_sd(scales_), &sums);
-  return 0.5 * at.squaredNorm() -
-         Evidence::posterior(reduced, nuisances.all, nuisances.prior_mean(), false).log_evidence;
-}
-
 Directions Fitter::joint_directions(const Hypothesis& hypothesis, const Fit& parameters) {
   Directions d = axes(hypothesis);
   const Index shared = hypothesis.shared();
@@ -381,8 +366,9 @@ Directions Fitter::principal(const Hypothesis& hypothesis, const Fit& fit) {
 }
 
 Fit Fitter::fit(const Hypothesis& hypothesis, VectorXd start, int max_iterations) const {
-  return improve(hypothesis, linearise(hypothesis, hypothesis.bounded(std::move(start)), axes(hypothesis)),
-                 max_iterations, nullptr, true);
+  const bool rough = max_iterations > 1;
+  return improve(hypothesis, linearise(hypothesis, hypothesis.bounded(std::move(start)), axes(hypothesis), {}, rough),
+                 max_iterations, nullptr, rough ? Columns::rough : Columns::fine);
 }
 
 Fit Fitter::fit_given(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters,
@@ -390,7 +376,7 @@ Fit Fitter::fit_given(const Hypothesis& hypothesis, const VectorXd& start, const
   return improve(hypothesis,
                  linearise(hypothesis, hypothesis.bounded(start), joint_directions(hypothesis, parameters),
                            shared_columns(hypothesis, parameters)),
-                 max_iterations, &parameters, true);
+                 max_iterations, &parameters, Columns::fine);
 }
 
 Fit Fitter::fit_effects(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters) const {
@@ -436,27 +422,27 @@ Fit Fitter::fit_linear(const Hypothesis& hypothesis, const Fit& parameters,
 Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int max_iterations) const {
   Fit result = before;
   result.statistics = evidence_->statistics(before.residual);
-  return improve(hypothesis, std::move(result), max_iterations, nullptr, false);
+  return improve(hypothesis, std::move(result), max_iterations, nullptr, Columns::elsewhere);
 }
 
-/// Gauss-Newton. Columns are kept while steps stay close; the last point gets its own. `columns_are_here`: `fit` has
-/// its own.
+/// Gauss-Newton. Columns are kept while steps stay close; those on the way are rough, and the last point gets fine ones.
+/// `columns`: those that `fit` has.
 Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, const Fit* parameters,
-                    bool columns_are_here) const {
+                    Columns columns) const {
   if (!fit.flown()) return fit;
   VectorXd linearised_at = fit.at;
   std::vector<Index> in_log;
   for (Index i = hypothesis.shared(); i < hypothesis.size(); ++i)
     if (hypothesis.unknowns()[static_cast<std::size_t>(i)].in_log) in_log.push_back(i);
-  const auto linearise_here = [&](const VectorXd& at) {
+  const auto linearise_here = [&](const VectorXd& at, Columns how) {
     Fit next = parameters == nullptr
-                   ? linearise(hypothesis, at, principal(hypothesis, fit))
+                   ? linearise(hypothesis, at, principal(hypothesis, fit), {}, how == Columns::rough)
                    : linearise(hypothesis, at, fit.directions, shared_columns(hypothesis, *parameters));
     if (!next.flown()) return false;
     next.posterior = std::move(fit.posterior);
     fit = std::move(next);
     linearised_at = at;
-    columns_are_here = true;
+    columns = parameters == nullptr ? how : Columns::fine;
     return true;
   };
   for (int n = 1;; ++n) {
@@ -483,43 +469,52 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, c
       std::vector<Residuals> rest = residuals(*flights_, vehicles, threads_);
       rest.push_back(fit.residual);
       tries.push_back(fit.at);
-      std::vector<SufficientStatistics> statistics(rest.size());
-      std::vector<double> costs(rest.size(), std::numeric_limits<double>::infinity());
       Regressors nuisances;
       add_nuisances(true, nuisances);
       const Index others = static_cast<Index>(nuisances.columns.size()),
                   first = static_cast<Index>(r.columns.size()) - others;
       const MatrixXd sums = reduced.sums.block(first, first, others, others);
-      const auto weigh = [&](std::size_t i, const std::vector<Index>& linear) {
+      const BasisCoefficients sd = evidence_->discrepancy_sd(scales_);
+      const auto costs_of = [&](const std::vector<SufficientStatistics>& of, const std::vector<VectorXd>& at) {
+        std::vector<double> costs(of.size(), std::numeric_limits<double>::infinity());
+        const auto all = evidence_->reduce_each(of, nuisances.columns, all_flights(), sd, &sums);
+        io::parallel_for(of.size(), threads_, [&](std::size_t i) {
+          if (all[i])
+            costs[i] = 0.5 * at[i].squaredNorm() -
+                       Evidence::posterior(*all[i], nuisances.all, nuisances.prior_mean(), false).log_evidence;
+        });
+        return costs;
+      };
+      std::vector<SufficientStatistics> statistics(rest.size());
+      io::parallel_for(rest.size(), threads_, [&](std::size_t i) {
         if (rest[i].empty()) return;
         statistics[i] = evidence_->statistics(rest[i]);
-        for (const Index k : linear)
+        for (const Index k : in_log)
           if (const BasisCoefficients& column = fit.columns[static_cast<std::size_t>(k)]; column.size() > 0)
             evidence_->add(fit.at[k] - tries[i][k], column, statistics[i]);
-        costs[i] = cost(nuisances, sums, statistics[i], tries[i]);
-      };
-      io::parallel_for(rest.size(), threads_, [&](std::size_t i) { weigh(i, in_log); });
+      });
+      std::vector<double> costs = costs_of(statistics, tries);
       const auto best = static_cast<std::size_t>(std::ranges::min_element(costs) - costs.begin());
       if (!in_log.empty() && best + 1 < rest.size()) {
         rest[best] = std::move(residuals(*flights_, {hypothesis.vehicle(tries[best])}, threads_)[0]);
-        costs[best] = std::numeric_limits<double>::infinity();
-        weigh(best, {});
+        statistics[best] = rest[best].empty() ? SufficientStatistics{} : evidence_->statistics(rest[best]);
+        costs[best] = costs_of({statistics[best]}, {tries[best]}).front();
       }
       improved = costs.back() - costs[best] >= rules_->min_step_nats();
       if (improved) {
         const VectorXd away = fit.directions.axes.transpose() * (tries[best] - linearised_at);
         if (away.cwiseAbs().cwiseQuotient(fit.directions.reach).maxCoeff() > kMaxDistance) {
-          if (!linearise_here(tries[best])) return fit;
+          if (!linearise_here(tries[best], Columns::rough)) return fit;
         } else {
           fit.at = tries[best];
           fit.residual = std::move(rest[best]);
           fit.statistics = std::move(statistics[best]);
-          columns_are_here = false;
+          columns = Columns::elsewhere;
         }
       }
     }
     if (improved) continue;
-    if (columns_are_here || !linearise_here(fit.at)) return fit;
+    if (columns == Columns::fine || !linearise_here(fit.at, Columns::fine)) return fit;
     max_iterations = n + 1;  // one more iteration, which computes the posterior with the new columns and does not step
   }
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "gap/question/alone.hpp"
 #include "gap/question/changes_seen.hpp"
@@ -112,19 +113,24 @@ bool Contrast::may_be_free(std::size_t block, const RegimeBasis& basis, const Mo
   return block_of_tests(block) && basis.covers(regimes_of_block(block));
 }
 
-/// All scales of the test flights times the power of two with the largest evidence: single steps are short.
+/// All scales of the test flights times the power of two with the largest evidence: single steps are short. First in
+/// steps of four, over the whole range: with deviations of a law the evidence has a valley between two hills.
 Scales Contrast::first_scales(const Scales& given, const std::function<double(const Scales&)>& log_evidence) const {
+  // Factors on the given scales. Choice.
+  constexpr double kFirst[] = {0.25, 4, 16, 64, 256}, kThen[] = {0.5, 2};
   Scales best = given;
   double most = log_evidence(given);
-  for (const double factor : {2.0, 0.5})
-    for (Scales next = best;;) {
+  const auto search = [&](const Scales from, std::span<const double> factors) {
+    for (const double factor : factors) {
+      Scales next = from;
       next.session *= factor;
       for (std::size_t b = 0; b < kBlocks; ++b)
         if (block_of_tests(b) && !next.free[b]) next.blocks[b] *= factor;
-      const double value = log_evidence(next);
-      if (!(value > most)) break;
-      most = value, best = next;
+      if (const double value = log_evidence(next); value > most) most = value, best = next;
     }
+  };
+  search(given, kFirst);
+  search(best, kThen);
   return best;
 }
 
@@ -173,18 +179,17 @@ VectorXd Contrast::next_effects(const Fitter& fitter, const Hypothesis& hypothes
   parameters.directions.axes.conservativeResize(Eigen::NoChange, shared);
   const Regressors r = fitter.regressors(parameters);
   const VectorXd prior_mean = r.prior_mean();
-  const auto reduced_by = [&](const Residuals& residual, const MatrixXd* known) {
-    return fitter.evidence().reduce(fitter.evidence().statistics(residual), r.columns, fitter.all_flights(), sd, known);
-  };
-  const auto k = static_cast<Index>(r.columns.size());
-  const MatrixXd known = reduced_by(fit.residual, nullptr).sums.topLeftCorner(k, k);
-  std::vector<double> values(tries.size(), -std::numeric_limits<double>::infinity());
-  io::parallel_for(tries.size(), fitter.threads(), [&](std::size_t i) {
-    if (rest[i].empty()) return;
-    const Reduced reduced = reduced_by(rest[i], &known);
-    values[i] = Evidence::posterior(reduced, r.all, prior_mean, false).log_evidence -
-                0.5 * tries[i].tail(effects).squaredNorm();
+  std::vector<SufficientStatistics> statistics(rest.size());
+  io::parallel_for(rest.size(), fitter.threads(), [&](std::size_t i) {
+    if (!rest[i].empty()) statistics[i] = fitter.evidence().statistics(rest[i]);
   });
+  const std::vector<std::optional<Reduced>> reduced =
+      fitter.evidence().reduce_each(statistics, r.columns, fitter.all_flights(), sd);
+  std::vector<double> values(tries.size(), -std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < tries.size(); ++i)
+    if (reduced[i])
+      values[i] = Evidence::posterior(*reduced[i], r.all, prior_mean, false).log_evidence -
+                  0.5 * tries[i].tail(effects).squaredNorm();
   return tries[static_cast<std::size_t>(std::ranges::max_element(values) - values.begin())];
 }
 
@@ -312,10 +317,12 @@ std::vector<TestResiduals> Contrast::held_out(const Fitter& fitter, const Flight
 }
 
 /// In none and parameters, nothing that matters changed.
-std::string Contrast::pool(const ScoredHypothesis& hypothesis) const {
+std::string contrast_pool_of(const ScoredHypothesis& hypothesis) {
   if (hypothesis.kind == HypothesisKind::none) return "/" + std::string(name_of(HypothesisKind::parameters));
   return pool_of(hypothesis);
 }
+
+std::string Contrast::pool(const ScoredHypothesis& hypothesis) const { return contrast_pool_of(hypothesis); }
 
 void Contrast::choose_predicting(Inference& d) const { predict_with_the_likeliest(d); }
 

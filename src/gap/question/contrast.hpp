@@ -83,7 +83,7 @@ class Contrast : public Question {
   /// None.
   void refute(const RobotFit& /*robot*/, const Fitter& /*fitter*/, const Flights& /*flights*/,
               const VerdictRule& /*rule*/, Inference& /*d*/) const override {}
-  /// none is in the pool of parameters: in both, nothing that matters changed.
+  /// contrast_pool_of.
   std::string pool(const ScoredHypothesis& hypothesis) const override;
   void choose_predicting(Inference& d) const override;
   /// with_effects, with the parameters moved by as much as sessions differ by.
@@ -103,5 +103,8 @@ class Contrast : public Question {
  private:
   double min_step_nats_;
 };
+
+/// As pool_of, but none is in the pool of parameters: in both, nothing that matters changed.
+std::string contrast_pool_of(const ScoredHypothesis& hypothesis);
 
 }  // namespace flappy::gap

@@ -26,15 +26,19 @@ std::string pool_name(const std::vector<std::string>& effects) {
 }
 
 void exclude_unchanged(Inference& d) {
-  if (std::ranges::none_of(d.seen, [](const SeenQuantity& s) { return std::abs(s.times()) > kPlainTimes; })) return;
+  if (std::ranges::any_of(d.seen, [](const SeenQuantity& s) { return std::abs(s.times()) > kPlainTimes; }))
+    drop_unchanged(d.hypotheses);
+}
+
+void drop_unchanged(std::vector<ScoredHypothesis>& hypotheses) {
   double rest = 0;
-  for (ScoredHypothesis& a : d.hypotheses) {
+  for (ScoredHypothesis& a : hypotheses) {
     if (a.kind == HypothesisKind::none || a.kind == HypothesisKind::parameters) a.probability = 0;
     rest += a.probability;
   }
   if (!(rest > 0)) return;
-  for (ScoredHypothesis& a : d.hypotheses) a.probability /= rest;
-  std::ranges::stable_sort(d.hypotheses, std::greater{}, &ScoredHypothesis::probability);
+  for (ScoredHypothesis& a : hypotheses) a.probability /= rest;
+  std::ranges::stable_sort(hypotheses, std::greater{}, &ScoredHypothesis::probability);
 }
 
 void predict_with_the_likeliest(Inference& d) {

@@ -114,6 +114,8 @@ inline constexpr double kPlainTimes = 7;
 /// Where d.seen has such a quantity, nobody may say "unchanged": takes the probabilities of none and parameters away
 /// and gives them to the others in proportion.
 void exclude_unchanged(Inference& d);
+/// The second half of it. Sorts the hypotheses: the most probable first.
+void drop_unchanged(std::vector<ScoredHypothesis>& hypotheses);
 
 /// Sets predicted_with of the conclusion: to the effects of the likeliest fitted hypothesis that contains the
 /// conclusion's effects, if it is likelier. Its further effects may be due to chance, so they are not named; yet a

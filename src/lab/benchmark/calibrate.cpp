@@ -9,6 +9,8 @@
 #include <set>
 
 #include "gap/answer/verdict.hpp"
+#include "gap/question/alone.hpp"
+#include "gap/question/contrast.hpp"
 #include "io/files.hpp"
 #include "io/program.hpp"
 #include "io/sha256.hpp"
@@ -79,8 +81,10 @@ std::vector<Constant> constants_of(const std::string& file) {
 
 struct Case {
   CaseTruth truth;
+  std::string family;
+  bool contrast = false;
+  bool plain = false;  ///< the change is so plain that no verdict says "unchanged" (gap::exclude_unchanged)
   std::vector<ScoredHypothesis> hypotheses;
-  Claim verdict;  ///< with the probability by evidence and priors
   double weight = 0;
   std::size_t part = 0;
 };
@@ -102,19 +106,16 @@ double moved_prior(const ScoredHypothesis& a, const VerdictRule& from, const Ver
   return 0;
 }
 
-/// InputError if the benchmark in `folder` was scored with other constants than those of `verdict`.
-void check_verdict(const fs::path& folder, const Manifest& manifest, const fs::path& verdict) {
-  const std::string options = io::read_text(folder / "predictions" / "options.txt"), option = "--verdict ";
-  const std::size_t at = options.find(option) + option.size();
-  std::string scored_with = options.substr(at, options.find('\n', at) - at);
-  if (scored_with == "default") {
-    const bool contrast = !manifest.cases.front().references(folder).empty();
-    scored_with =
-        io::sha256(io::read_text(io::config_path(contrast ? "gap/contrast_verdict.toml" : "gap/verdict.toml")));
-  }
-  if (io::sha256(io::read_text(verdict)) != scored_with)
-    throw io::InputError("--verdict " + verdict.string() + ": " + folder.string() +
-                         " was scored with another; accepted: the file that it was scored with");
+/// The rule by which a folder was scored. InputError if it has other constants of the evidence than `start`.
+VerdictRule scored_by(const fs::path& folder, const VerdictRule& start) {
+  const VerdictRule own = gap::read_verdict_rule(verdict_of_predictions(folder));
+  const auto of_evidence = [](const VerdictRule& r) {
+    return std::array{r.unknown.penalty_nats, r.gain.further_screened_nats, r.gain.vanished_magnitude};
+  };
+  if (of_evidence(own) != of_evidence(start))
+    throw io::InputError(folder.string() + ": was scored with another unknown.penalty_nats, gain.further_screened_nats"
+                         " or gain.vanished_magnitude; accepted: those of --verdict");
+  return own;
 }
 
 class Calibration {
@@ -128,7 +129,7 @@ class Calibration {
       families_.insert(manifest.family);
       if (!fs::exists(true_fits(folder)))
         throw io::InputError(folder.string() + ": was not scored; accepted: folders of flappy-blind score");
-      check_verdict(folder, manifest, command.verdict);
+      const VerdictRule own_rule = scored_by(folder, rule_);
       std::map<std::size_t, CaseTruth> truths;
       const Json sealed = open_labels(folder, manifest);
       for (const Json& json : sealed.at("cases")) {
@@ -137,20 +138,21 @@ class Calibration {
       }
       for (const PublicCase& c : manifest.cases) {
         const Prediction p = read_prediction(prediction_file(folder, c.number));
-        Case own{.truth = truths.at(c.number)};
+        Case own{.truth = truths.at(c.number), .family = manifest.family, .contrast = !c.references(folder).empty()};
         for (const gap::RankedHypothesis& h : p.diagnosis.hypotheses) {
           ScoredHypothesis a;
           a.kind = h.kind;
           a.effects = h.effects;
           a.log_evidence = h.log_evidence;
           a.log_prior = h.log_prior;
+          if (h.kind == gap::HypothesisKind::parameters) own.plain = h.probability == 0;
           if (h.remainder) a.unexplained.emplace_back();
+          const double move = moved_prior(a, own_rule, rule_);
+          a.log_prior += move, a.log_evidence += move;
           own.hypotheses.push_back(std::move(a));
         }
         if (own.hypotheses.empty()) continue;  // its data were faulty
         if (!own.truth.counts()) continue;     // as the score does
-        const Answer answer = answer_of(p);
-        own.verdict = {rule_.said.evidence(answer.probability), right(own.truth, answer)};
         own.part = parts.try_emplace(manifest.family + " " + own.truth.part, counts.size()).first->second;
         if (own.part == counts.size()) counts.push_back(0);
         counts[own.part] += 1;
@@ -164,10 +166,11 @@ class Calibration {
   const VerdictRule& start() const { return rule_; }
   const std::vector<Constant>& constants() const { return constants_; }
 
-  /// Weighted mean logarithm of the probability of the right answers.
-  double score(const VerdictRule& rule) const {
+  /// Weighted mean logarithm of the probability of the right answers. `without`: a family that does not count.
+  double score(const VerdictRule& rule, const std::string& without = "") const {
     double sum = 0;
     for (const Case& c : cases_) {
+      if (c.family == without) continue;
       double probability = 0;
       for (const ScoredHypothesis& a : moved(c, rule))
         if (right(c.truth, {.kind = a.has_remainder() ? "remainder" : name_of(a.kind), .effects = a.effects}))
@@ -179,9 +182,9 @@ class Calibration {
 
   /// Maximises the score less the price of what moved along one constant after another, with shrinking steps (Hooke,
   /// Jeeves 1961).
-  VerdictRule best() const {
+  VerdictRule best(const std::string& without = "") const {
     VerdictRule rule = rule_;
-    double value = score(rule);
+    double value = score(rule, without);
     for (double step = 2; step > 0.01; step /= 2)
       for (bool better = true; better;) {
         better = false;
@@ -191,20 +194,31 @@ class Calibration {
             double& x = c.of(there);
             x = c.moved(x, way);
             if (std::ranges::count(shared(there), &x)) share(there, x);
-            const double now = score(there) - price(there);
+            const double now = score(there, without) - price(there);
             if (now > value + 1e-6) rule = there, value = now, better = true;
           }
       }
     return rule;
   }
 
-  /// Slope and offset of what a verdict says, from the verdicts as they were scored.
+  /// Slope and offset of what a verdict says, from the verdicts of each family by what the others taught.
   VerdictRule::Said said() const {
     std::vector<Claim> verdicts;
     std::vector<double> weights;
-    for (const Case& c : cases_) {
-      verdicts.push_back(c.verdict);
-      weights.push_back(c.weight * static_cast<double>(cases_.size()));
+    for (const std::string& family : families_) {
+      VerdictRule rule = families_.size() > 1 ? best(family) : rule_;
+      rule.said = {};
+      for (const Case& c : cases_) {
+        if (c.family != family) continue;
+        gap::Inference d;
+        d.hypotheses = moved(c, rule);
+        gap::conclude(
+            rule, [&](const ScoredHypothesis& a) { return c.contrast ? gap::contrast_pool_of(a) : gap::pool_of(a); }, d);
+        const Answer answer{.kind = d.verdict.remainder ? "remainder" : name_of(d.verdict.kind),
+                            .effects = d.verdict.effects};
+        verdicts.push_back({d.verdict.probability, right(c.truth, answer)});
+        weights.push_back(c.weight * static_cast<double>(cases_.size()));
+      }
     }
     return learn_said(verdicts, weights);
   }
@@ -220,6 +234,7 @@ class Calibration {
       a.log_evidence += move;
     }
     set_probabilities(all, rule);
+    if (c.plain) gap::drop_unchanged(all);
     return all;
   }
 
@@ -288,7 +303,7 @@ void set_said(std::string& text, const VerdictRule::Said& said, const std::strin
   text.erase(std::min(text.find(begin), text.size()));
   text += begin +
           " whose probability by evidence and priors is p: 1 / (1 + exp(-(slope logit(p) + offset))). Learnt:\n"
-          "# flappy-blind calibrate --said, " +
+          "# flappy-blind calibrate, " +
           learnt + ".\n[said]\nslope = " + rounded(said.slope) + "\noffset = " + rounded(said.offset) + "\n";
 }
 
@@ -308,16 +323,6 @@ Json calibrate(const CalibrateCommand& command) {
   const Calibration calibration(command);
   const std::string learnt = std::to_string(calibration.cases()) + " development robots of families " +
                              calibration.families() + ", commit " + io::commit();
-  if (command.said) {
-    std::string text = io::read_text(command.verdict);
-    const VerdictRule::Said said = calibration.said();
-    set_said(text, said, learnt);
-    gap::parse_verdict_rule(text, command.out.string());
-    io::write_atomically(command.out, text);
-    std::printf("a verdict says 1 / (1 + exp(-(%s logit(p) %+.4g))), of %zu cases\n", rounded(said.slope).c_str(),
-                said.offset, calibration.cases());
-    return {{"cases", calibration.cases()}, {"slope", said.slope}, {"offset", said.offset}};
-  }
   VerdictRule before = calibration.start(), after = calibration.best();
   after.prior.none = std::stod(rounded(after.prior.none));
   after.prior.parameters = std::stod(rounded(after.prior.parameters));
@@ -336,6 +341,10 @@ Json calibrate(const CalibrateCommand& command) {
   std::printf("mean log probability of what is right: %.3f, was %.3f, of %zu cases\n", json["score"].get<double>(),
               json["score_before"].get<double>(), calibration.cases());
   set_origin(text, learnt);
+  const VerdictRule::Said said = calibration.said();
+  set_said(text, said, learnt);
+  json["said.slope"] = said.slope, json["said.offset"] = said.offset;
+  std::printf("a verdict says 1 / (1 + exp(-(%s logit(p) %+.4g)))\n", rounded(said.slope).c_str(), said.offset);
   gap::parse_verdict_rule(text, command.out.string());  // a file that no program reads is not written
   io::write_atomically(command.out, text);
   return json;

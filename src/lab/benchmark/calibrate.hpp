@@ -1,6 +1,7 @@
 // flappy-blind calibrate: learns the constants of the verdict (configs/gap/verdict.toml) from robots whose truth is
 // known. They maximise the mean log probability of the right answers, a proper score (Good 1952), in which every part
-// of every family weighs the same.
+// of every family weighs the same. What a verdict says of its probability (VerdictRule::Said) is learnt from robots of
+// each family in turn, judged by constants that the others taught, or it would seem too sure.
 #pragma once
 
 #include <filesystem>
@@ -17,12 +18,10 @@ struct CalibrateCommand {
   std::vector<std::filesystem::path> folders;                           ///< scored benchmarks
   std::filesystem::path verdict = io::config_path("gap/verdict.toml");  ///< constants to start from
   std::filesystem::path out;
-  /// Learns only what verdicts say (VerdictRule::Said), from verdicts as they were scored: of robots that taught none of
-  /// the constants, or they would seem too sure.
-  bool said = false;
 };
 
-/// Writes the verdict file to `out`, and prints new and old values. InputError if a folder was not scored.
+/// Writes the verdict file to `out`, and prints new and old values. InputError if a folder was not scored, or with
+/// another evidence than by `verdict`.
 nlohmann::ordered_json calibrate(const CalibrateCommand& command);
 
 /// By logistic regression of whether claims are right (Platt 1999), with Newton's method; without claims, what the evidence says.

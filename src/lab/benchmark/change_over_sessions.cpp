@@ -219,19 +219,23 @@ std::vector<WindowedChannel> windowed_channels(const FlightLog& log) {
 
 namespace {
 
-/// <e, d_s> / |e| of each session, and |e|.
+/// What sessions change along the change by an effect, in one channel.
 struct Projected {
   std::string channel;
-  double square = 0;             // |e|^2
-  std::vector<double> products;  // <e, d_s>
+  std::vector<double> sizes;  ///< [flight] |e_f|
+  std::vector<double> along;  ///< [session] x_s
 
-  double size() const { return std::sqrt(square); }
+  double size() const {
+    double sum = 0, squares = 0;
+    for (const double e : sizes) sum += e, squares += e * e;
+    return sum > 0 ? squares / sum : 0;
+  }
   /// Variance among the sessions `from`, `from` + 2, ..., or all with a stride of 1.
   double variance(std::size_t from, std::size_t stride) const {
     double sum = 0, squares = 0, count = 0;
-    for (std::size_t s = from; s < products.size(); s += stride) sum += products[s], ++count;
-    for (std::size_t s = from; s < products.size(); s += stride) squares += std::pow(products[s] - sum / count, 2);
-    return squares / (count - 1) / square;
+    for (std::size_t s = from; s < along.size(); s += stride) sum += along[s], ++count;
+    for (std::size_t s = from; s < along.size(); s += stride) squares += std::pow(along[s] - sum / count, 2);
+    return squares / (count - 1);
   }
 };
 
@@ -247,29 +251,35 @@ const Projected* largest(const std::vector<Projected>& channels, std::size_t fro
 }  // namespace
 
 OverSessions over_sessions(const std::vector<std::pair<FlightLog, FlightLog>>& change,
-                           const std::vector<std::vector<FlightLog>>& sessions) {
+                           const std::vector<OtherSession>& sessions) {
   std::vector<Projected> channels;
   for (std::size_t flight = 0; flight < change.size(); ++flight) {
     const auto with = windowed_channels(change[flight].first), without = windowed_channels(change[flight].second);
-    std::vector<std::vector<WindowedChannel>> others;
-    for (const std::vector<FlightLog>& s : sessions) others.push_back(windowed_channels(s[flight]));
     for (std::size_t c = 0; c < without.size(); ++c) {
-      if (flight == 0) channels.push_back({without[c].name, 0, std::vector<double>(sessions.size())});
+      if (flight == 0) channels.push_back({without[c].name, {}, std::vector<double>(sessions.size())});
+      double square = 0;
       for (std::size_t i = 0; i < std::min(with[c].values.size(), without[c].values.size()); ++i) {
         const double before = without[c].values[i], e = with[c].values[i] - before;
-        const auto known = [&](const auto& of) { return i < of[c].values.size() && std::isfinite(of[c].values[i]); };
-        if (!std::isfinite(e) || !std::ranges::all_of(others, known)) continue;
-        channels[c].square += e * e;
-        for (std::size_t s = 0; s < others.size(); ++s)
-          channels[c].products[s] += e * (others[s][c].values[i] - before);
+        const auto known = [&](const OtherSession& s) {
+          return s.flight != flight || (i < s.channels[c].values.size() && std::isfinite(s.channels[c].values[i]));
+        };
+        if (!std::isfinite(e) || !std::ranges::all_of(sessions, known)) continue;
+        square += e * e;
+        for (std::size_t s = 0; s < sessions.size(); ++s)
+          if (sessions[s].flight == flight)
+            channels[c].along[s] += e * (sessions[s].channels[c].values[i] - before);
       }
+      channels[c].sizes.push_back(std::sqrt(square));
+      for (std::size_t s = 0; s < sessions.size() && square > 0; ++s)
+        if (sessions[s].flight == flight) channels[c].along[s] /= std::sqrt(square);
     }
   }
-  std::erase_if(channels, [](const Projected& c) { return !(c.square > 0) || !(c.variance(0, 1) > 0); });
+  std::erase_if(channels, [](const Projected& c) { return !(c.size() > 0) || !(c.variance(0, 1) > 0); });
   const Projected *even = largest(channels, 0), *odd = largest(channels, 1);
   if (!even || !odd) return {};
   // each half of the sessions judges the channel that the other half chose
-  const double of_even = even->variance(1, 2) / even->square, of_odd = odd->variance(0, 2) / odd->square;
+  const double of_even = even->variance(1, 2) / std::pow(even->size(), 2),
+               of_odd = odd->variance(0, 2) / std::pow(odd->size(), 2);
   return {even->channel, std::sqrt(2 / (of_even + of_odd))};
 }
 
@@ -279,20 +289,13 @@ std::vector<OverSessions> change_over_sessions(const blind::Family& family, cons
   blind::Assignment other = robot;
   other.effects.clear();
   other.programme_of = robot.programme_of.value_or(robot.session);
-  const auto fly = [&](const blind::Assignment& a) {
-    std::vector<FlightLog> logs;
-    for (std::size_t k = 0; k < flown.size(); ++k) {
-      blind::FamilyFlight f = family.fly(a, k);
-      if (f.crashed) return std::vector<FlightLog>{};
-      logs.push_back(std::move(f.log));
-    }
-    return logs;
-  };
-  std::vector<std::vector<FlightLog>> sessions;
+  std::vector<OtherSession> sessions;
   // a session in which the robot crashes is replaced by the next
   for (std::size_t s = 0; sessions.size() < other_sessions && s < 2 * other_sessions; ++s) {
     other.session = kFirstOther + s;
-    if (std::vector<FlightLog> logs = fly(other); !logs.empty()) sessions.push_back(std::move(logs));
+    const std::size_t flight = sessions.size() % flown.size();
+    if (const blind::FamilyFlight f = family.fly(other, flight); !f.crashed)
+      sessions.push_back({flight, windowed_channels(f.log)});
   }
   std::vector<OverSessions> all;
   if (sessions.size() < kMinSessions) return all;
@@ -300,10 +303,13 @@ std::vector<OverSessions> change_over_sessions(const blind::Family& family, cons
     blind::Assignment without = robot;
     std::erase_if(without.effects, [&](const auto& e) { return e.first == id; });
     std::vector<std::pair<FlightLog, FlightLog>> change;
-    const std::vector<FlightLog> before = fly(without);
-    for (std::size_t k = 0; k < before.size(); ++k) change.emplace_back(flown[k], before[k]);
+    for (std::size_t k = 0; k < flown.size(); ++k) {
+      blind::FamilyFlight f = family.fly(without, k);
+      if (f.crashed) break;
+      change.emplace_back(flown[k], std::move(f.log));
+    }
     // a robot that flies with its effect alone has changed as much as a robot can
-    all.push_back(before.empty() ? OverSessions{"crash", 1e9} : over_sessions(change, sessions));
+    all.push_back(change.size() < flown.size() ? OverSessions{"crash", 1e9} : over_sessions(change, sessions));
   }
   return all;
 }

@@ -25,21 +25,27 @@ struct OverSessions {
   double ratio = 0;
 };
 
-/// `change[flight]`: logs with the effect and without it, of one session, programme and noise. `sessions[s][flight]`:
-/// without it, the same programme in other sessions, of which there are at least four. In each channel,
+/// Another session, in which a robot without the effect flew one of the tests' flights again.
+struct OtherSession {
+  std::size_t flight;  ///< of which its programme is
+  std::vector<WindowedChannel> channels;
+};
+
+/// `change[flight]`: logs with the effect and without it, of one session, programme and noise. `sessions`: at least four.
+/// In each channel, over all windows of flight f,
 ///
-///   e = with - without     x_s = <e, session s - without> / |e|     ratio = |e| / (standard deviation of x_s)
+///   e_f = with - without   x_s = <e_f, session s - without> / |e_f|   ratio = sum |e_f|^2 / sum |e_f| / sd of x_s
 ///
-/// over all windows of all flights: how many standard deviations of a session, with its noise, a matched filter for the
-/// change sees it high (Kay, Fundamentals of Statistical Signal Processing II, 1998, ch. 4). The largest ratio of some
-/// forty channels would be large by chance: every second session chooses the channel, and the others give its variance;
-/// then the other way round, and the mean of both variances counts. No channel: the effect changes nothing.
+/// how many standard deviations of a session, with its noise, a matched filter for the change sees it high (Kay,
+/// Fundamentals of Statistical Signal Processing II, 1998, ch. 4), if a session differs alike in all flights. The largest
+/// ratio of some forty channels would be large by chance: every second session chooses the channel, and the others give
+/// its variance; then the other way round, and the mean of both variances counts. No channel: the effect changes nothing.
 OverSessions over_sessions(const std::vector<std::pair<flightlog::FlightLog, flightlog::FlightLog>>& change,
-                           const std::vector<std::vector<flightlog::FlightLog>>& sessions);
+                           const std::vector<OtherSession>& sessions);
 
 /// From here on an effect counts. Fixed before any robot was judged by it.
 inline constexpr double kCounts = 3;
-/// Other sessions that a robot flies for it.
+/// Other sessions that a robot flies for it, one flight each.
 inline constexpr std::size_t kOtherSessions = 6;
 
 /// Flies what is needed in addition to what `robot` has `flown`, and compares each of its effects. Empty, so not known, with

@@ -87,6 +87,10 @@ Manifest read_manifest(const std::filesystem::path& folder) {
   }
 }
 
+std::filesystem::path verdict_of_predictions(const std::filesystem::path& folder) {
+  return folder / "predictions" / "verdict.toml";
+}
+
 std::filesystem::path prediction_file(const std::filesystem::path& folder, std::size_t number) {
   return folder / "predictions" / (number_text(number) + ".json");
 }

@@ -44,6 +44,8 @@ Manifest read_manifest(const std::filesystem::path& folder);
 
 /// Hashes of all predictions, in sha256sum's format: written once all are made, and seals them.
 inline constexpr const char* kSums = "predictions.sha256";
+/// The verdict file by which they were made.
+std::filesystem::path verdict_of_predictions(const std::filesystem::path& folder);
 std::filesystem::path prediction_file(const std::filesystem::path& folder, std::size_t number);
 std::string sum_line(const std::filesystem::path& folder, std::size_t number);
 /// InputError if the predictions are not sealed, or if one has changed since.

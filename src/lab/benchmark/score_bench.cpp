@@ -69,6 +69,7 @@ class Predictions {
       if (const std::string other = command_.other_option(options); !other.empty())
         throw io::InputError(folder_.string() + ": its predictions were begun with another " + other +
                              "; accepted: the same options, or a new benchmark");
+    if (io::writes(command_.ranks)) io::write_atomically(verdict_of_predictions(folder_), io::read_text(verdict()));
     std::vector<const PublicCase*> open;
     for (const PublicCase& c : manifest_.cases)
       if (!fs::exists(prediction_file(folder_, c.number))) open.push_back(&c);
@@ -87,6 +88,11 @@ class Predictions {
   }
 
   const fs::path& vehicle() const { return vehicle_; }
+  fs::path verdict() const {
+    if (!command_.verdict.empty()) return command_.verdict;
+    const bool contrast = !manifest_.cases.empty() && !manifest_.cases.front().references(folder_).empty();
+    return io::config_path(contrast ? "gap/contrast_verdict.toml" : "gap/verdict.toml");
+  }
   Json read(std::size_t number) const { return read_json(prediction_file(folder_, number)); }
 
   Question question(const PublicCase& c, const std::vector<std::string>& withheld) const {

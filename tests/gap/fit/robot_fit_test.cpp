@@ -183,7 +183,7 @@ TEST(Contrast, TellsWhatAppearedFromWhatWasAlwaysOff) {
     const auto made = flown(appears);
     const Flights flights = as_flights(made, 2), references{flights.references, {}};
     ModelDiscrepancy discrepancy = read_model_discrepancy();
-    discrepancy.session = read_session_variation();
+    discrepancy.session = fixed_session_variation();
     const RobotFit robot(question_of(flights),
                          RobotFit::of_references(question_of(references), references, priors, discrepancy, {}, 2),
                          flights);
@@ -212,8 +212,9 @@ TEST(Contrast, NamesNoEffectForWhatOnlyItsLawExplains) {
   }
   const Flights flights = as_flights(made, 2), references{flights.references, {}};
   ModelDiscrepancy discrepancy = read_model_discrepancy();
-  discrepancy.session = read_session_variation();
-  discrepancy.session.own_scale_sd = 0.1;  // else sessions may differ by as much
+  discrepancy.session = fixed_session_variation();
+  discrepancy.session.scale_sd = discrepancy.session.own_scale_sd = 0.1;  // else sessions may differ by as much
+  discrepancy.session.law_error.fill(1);
   const RobotFit robot(question_of(flights),
                        RobotFit::of_references(question_of(references), references, priors, discrepancy, {}, 2),
                        flights);
@@ -246,7 +247,7 @@ TEST(Contrast, MeasuresAChangeByTheRobotsOwnSessions) {
       made[f]->add_measured(kSpecificForceZ, 0, 0.03 * SyntheticFlight::kSignal * made[f]->velocity);
     const Flights flights = as_flights(made, 3), references{flights.references, {}};
     ModelDiscrepancy discrepancy = read_model_discrepancy();
-    discrepancy.session = read_session_variation();
+    discrepancy.session = fixed_session_variation();
     const RobotFit robot(question_of(flights),
                          RobotFit::of_references(question_of(references), references, priors, discrepancy, {}, 2),
                          flights);
@@ -275,7 +276,7 @@ TEST(Contrast, LearnsFromItsSessionsWhatChangesHarmlessly) {
     }
     const Flights flights = as_flights(made, winds.size() - 1), references{flights.references, {}};
     ModelDiscrepancy discrepancy = read_model_discrepancy();
-    discrepancy.session = read_session_variation();
+    discrepancy.session = fixed_session_variation();
     const RobotFit robot(question_of(flights),
                          RobotFit::of_references(question_of(references), references, priors, discrepancy, {}, 2),
                          flights);
@@ -301,7 +302,7 @@ TEST(Contrast, CallsUnknownOnlyWhatReferencesWouldHaveShown) {
     }
     const Flights flights = as_flights(made, 2), references{flights.references, {}};
     ModelDiscrepancy discrepancy = read_model_discrepancy();
-    discrepancy.session = read_session_variation();
+    discrepancy.session = fixed_session_variation();
     const RobotFit robot(question_of(flights),
                          RobotFit::of_references(question_of(references), references, priors, discrepancy, {}, 2),
                          flights);

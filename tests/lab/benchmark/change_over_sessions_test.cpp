@@ -78,9 +78,14 @@ FlightLog shifted(double accel_z, double gyro_x = 0) {
 
 TEST(OverSessions, IsTheChangeOverTheirStandardDeviation) {
   // x_s = d_s sqrt(W): even sessions +-0.3 (variance 0.18), odd ones +-0.1 (0.02); the mean of both is 0.1
-  const auto of = [](double change) {
+  const auto others = [](const std::vector<FlightLog>& logs) {
+    std::vector<OtherSession> sessions;
+    for (const FlightLog& log : logs) sessions.push_back({0, windowed_channels(log)});
+    return sessions;
+  };
+  const auto of = [&](double change) {
     return over_sessions({{shifted(change), shifted(0)}},
-                         {{shifted(0.3)}, {shifted(0.1)}, {shifted(-0.3)}, {shifted(-0.1)}});
+                         others({shifted(0.3), shifted(0.1), shifted(-0.3), shifted(-0.1)}));
   };
   EXPECT_NEAR(of(0.5).ratio, 0.5 / std::sqrt(0.1), 1e-6);
   EXPECT_TRUE(of(0.5).channel == "accel_z mean" || of(0.5).channel.starts_with("acceleration")) << of(0.5).channel;
@@ -88,8 +93,19 @@ TEST(OverSessions, IsTheChangeOverTheirStandardDeviation) {
   // what all sessions have alike hides nothing, as references have it, too; nor does what another channel has
   const OverSessions beside =
       over_sessions({{shifted(0, 0.5), shifted(0)}},
-                    {{shifted(5, 0.11)}, {shifted(-5, 0.11)}, {shifted(-5, 0.09)}, {shifted(5, 0.09)}});
+                    others({shifted(5, 0.11), shifted(-5, 0.11), shifted(-5, 0.09), shifted(5, 0.09)}));
   EXPECT_GE(beside.ratio, 0.5 / std::sqrt(2e-4) - 1e-3) << "by gyro_x; a turn less the gyro's shows it, too";
+}
+
+TEST(OverSessions, WeighsFlightsByTheirChange) {
+  // the first flight has no change: it neither adds to the size nor hides it; sessions are as far off in the second
+  const FlightLog same = shifted(0);
+  std::vector<OtherSession> sessions;
+  for (const double x : {0.3, 0.1, -0.3, -0.1})
+    sessions.push_back({1, windowed_channels(shifted(x))});
+  EXPECT_NEAR(over_sessions({{same, same}, {shifted(0.5), same}}, sessions).ratio, 0.5 / std::sqrt(0.1), 1e-6);
+  EXPECT_NEAR(over_sessions({{shifted(1), same}, {shifted(2), same}}, sessions).ratio, (1 + 4) / 3. / std::sqrt(0.1),
+              1e-6);
 }
 
 /// A robot whose sessions shift its accelerometer, and whose effect shifts it more; it crashes in one session.
