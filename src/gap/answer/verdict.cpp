@@ -52,13 +52,17 @@ void conclude_by_evidence(const VerdictRule& rule, const PoolOf& pool_of_each, I
     for (const std::string& e : a.effects) groups.insert(pool_name({e}));
     return groups;
   };
+  // where nobody may say "unchanged", the question is only what it was
+  const bool changed = std::ranges::all_of(all, [](const ScoredHypothesis& a) {
+    return (a.kind != HypothesisKind::none && a.kind != HypothesisKind::parameters) || a.probability == 0;
+  });
   const auto counted = [&](const auto& named) {
     const auto& [own_name, own] = named;
     if (own_name.starts_with('/')) return own.probability;
     double present = 0;
     for (const ScoredHypothesis& a : all)
       if (std::ranges::includes(groups_of(a), groups_of(all[own.best]))) present += a.probability;
-    return present >= rule.naming.least ? own.probability : 0;
+    return changed || present >= rule.naming.least ? own.probability : 0;
   };
   const auto& [name, pool] = *std::ranges::max_element(pools, {}, counted);
   const ScoredHypothesis& best = all[pool.best];

@@ -166,6 +166,12 @@ TEST(Verdict, NamesOfAContrastWhatIsMoreProbableThanNot) {
                   hypothesis(0.29, HypothesisKind::parameters), hypothesis(0.16, {"com_offset"})};
   gap::conclude(rule, pool_in_contrast, d);
   EXPECT_EQ(d.verdict.effects, std::vector<std::string>{"wind"});
+  // where the change is plain, the likeliest cause is named, and its probability tells how sure that is
+  d.hypotheses = {hypothesis(0.4, {"wind"}), hypothesis(0.35, {"com_offset"}), hypothesis(0.25, HypothesisKind::unknown),
+                  hypothesis(0, HypothesisKind::parameters), hypothesis(0, HypothesisKind::none)};
+  gap::conclude(rule, pool_in_contrast, d);
+  EXPECT_EQ(d.verdict.effects, std::vector<std::string>{"wind"});
+  EXPECT_DOUBLE_EQ(d.verdict.probability, 0.4);
 }
 
 TEST(Verdict, PoolsRivals) {
