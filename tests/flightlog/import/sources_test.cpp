@@ -150,6 +150,10 @@ TEST(Sources, SayWhatOtherFilesAre) {
   EXPECT_EQ(refusal("flight.bbl", "H Product:Blackbox flight data recorder by Nicholas Sherlock\nH Data version:2\n"),
             ": is a blackbox log of Betaflight or INAV" + accepted +
                 ", as made by: blackbox_decode FILE, of that firmware's blackbox-tools");
+  EXPECT_EQ(refusal("bench.tdms", "TDSm\x0e"),
+            ": is a TDMS file of LabVIEW" + accepted +
+                ", as made by: nptdms.TdmsFile.read(FILE)[GROUP].as_dataframe(time_index=True).to_csv(\"forces.csv\", "
+                "index_label=\"time\")");
   EXPECT_EQ(refusal("take.mat.gz", gzipped("MATLAB 5.0 MAT-file, Platform: GLNXA64")),
             ": is a MATLAB file compressed by gzip" + accepted + ", as made by: gunzip FILE");
   // one variable "t" of 1 x 1: kind, rows, columns, whether complex, letters of the name
