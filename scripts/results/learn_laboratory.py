@@ -5,7 +5,7 @@
 
 Robots are flown with seeds that no benchmark uses, but for the last step, whose robots are development robots, and kept in OUT. After any
 stop, the same command goes on. In the end configs/lab and configs/gap hold what was learnt: for each family from the other two, starting
-from the file for this family, and for users from all three. The last step learns what verdicts say. A build of no commit is refused.
+from the file for this family, and for users from all three. The last step learns the constants of the verdict. A build of no commit is refused.
 """
 import argparse
 import os
@@ -117,11 +117,12 @@ def main():
             # judged as reported robots are: by what has not seen their family
             run(folder / "cases.jsonl", blind, "score", folder, "--discrepancy", LAB / "discrepancy" / f"without_{f}.toml",
                 "--sessions", LAB / "sessions" / f"without_{f}.toml", "--verdict", LAB / "sessions" / f"verdict_without_{f}.toml")
-        start = CONFIGS / "gap" / "contrast_verdict.toml"
-        shutil.copyfile(start, o.out / "verdict_start.toml")
         for family in [*FAMILIES, ""]:
-            shipped, output = LAB / "sessions" / f"verdict_without_{family}.toml" if family else start, o.out / f"verdict_without_{family or 'none'}.toml"
-            run(output, blind, "calibrate", *[o.out / f"cases_{f}" for f in others(family)], "--verdict", o.out / "verdict_start.toml", "--out", output)
+            shipped = LAB / "sessions" / f"verdict_without_{family}.toml" if family else CONFIGS / "gap" / "contrast_verdict.toml"
+            start, output = (o.out / f"verdict_{which}{family or 'none'}.toml" for which in ("before_", "without_"))
+            if not start.exists():
+                shutil.copyfile(shipped, start)
+            run(output, blind, "calibrate", *[o.out / f"cases_{f}" for f in others(family)], "--verdict", start, "--out", output)
             shutil.copyfile(output, shipped)
 
 

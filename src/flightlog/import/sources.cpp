@@ -113,7 +113,7 @@ const OtherKind kOtherKinds[] = {
      {".tdms"},
      "a TDMS file of LabVIEW",
      "nptdms.TdmsFile.read(FILE)[GROUP].as_dataframe(time_index=True).to_csv(\"forces.csv\", index_label=\"time\")"},
-    {"TDSh"sv, 0, {".tdms_index"}, "the index of a TDMS file", "the .tdms file beside it"},
+    {"TDSh"sv, 0, {".tdms_index"}, "the index of a TDMS file", "the same of the .tdms file"},
     {"\xD0\xCF\x11\xE0"sv, 0, {".xls"}, "an Excel file", "export it as CSV"},
     {"\xFF\xFE"sv, 0, {}, "text in UTF-16", "iconv -f UTF-16 -t UTF-8 FILE"},
     {"\xFE\xFF"sv, 0, {}, "text in UTF-16", "iconv -f UTF-16 -t UTF-8 FILE"},

@@ -52,10 +52,8 @@ void conclude_by_evidence(const VerdictRule& rule, const PoolOf& pool_of_each, I
     for (const std::string& e : a.effects) groups.insert(pool_name({e}));
     return groups;
   };
-  // where nobody may say "unchanged", the question is only what it was
-  const bool changed = std::ranges::all_of(all, [](const ScoredHypothesis& a) {
-    return (a.kind != HypothesisKind::none && a.kind != HypothesisKind::parameters) || a.probability == 0;
-  });
+  // where nobody may say "unchanged", the question is only what changed
+  const bool changed = changed_plainly(d.seen);
   const auto counted = [&](const auto& named) {
     const auto& [own_name, own] = named;
     if (own_name.starts_with('/')) return own.probability;
@@ -155,7 +153,7 @@ void decide(const Question& question, const RobotFit& robot, const Fitter& fitte
   if (rule.refutation.min_share > 0) refute(robot.evidence(), flights, rule.refutation.min_share, d);
   question.refute(robot, fitter, flights, rule, d);
   set_probabilities(d.hypotheses, rule);
-  exclude_unchanged(d);
+  if (changed_plainly(d.seen)) exclude_unchanged(d.hypotheses);
   conclude(
       rule, [&](const ScoredHypothesis& a) { return question.pool(a); }, d);
   question.choose_predicting(d);

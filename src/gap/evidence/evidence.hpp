@@ -267,7 +267,7 @@ class Evidence {
   std::vector<Group> groups_;
   bool scales_held_ = false;
   Residuals weights_;
-  std::vector<Eigen::MatrixXd> inverse_;              ///< [channel] inverse of basis x basis, without whitening
+  std::vector<Eigen::MatrixXd> inverse_;  ///< [channel] inverse of basis x basis, without whitening
   std::shared_ptr<const Sums> sums_;
 };
 

@@ -145,8 +145,8 @@ class Evidence::Weighing {
   struct Sums {
     MatrixXd normal, change;  ///< basis x basis; basis x regressors
     WideMatrix all;           ///< normal (change), then basis x residual, then columns of zeros
-    VectorXd prior_sd;             ///< prior standard deviation of delta at scale 1
-    double squares = 0;            ///< sum of squares of the residual
+    VectorXd prior_sd;        ///< prior standard deviation of delta at scale 1
+    double squares = 0;       ///< sum of squares of the residual
   };
   /// A group under given scales.
   struct Half {

@@ -13,8 +13,6 @@ using V = sim::Lanes<double, sim::kWidth<double>>;
 constexpr Size kLanes = sim::kWidth<double>;
 /// Rows, and strips of lanes, that are summed at once in registers.
 constexpr Size kRows = 4, kStrips = 4;
-/// A row of the triangular factor of a product is read from a multiple of this, whatever the width of lanes.
-constexpr Size kPanel = kStrips * kColumnStep;
 
 template <Size strips>
 using Tile = V[kRows][strips];
@@ -53,7 +51,7 @@ FLAPPY_INLINE void accumulate(Tile<strips>& tile, const double* x, Size columns,
     for (Size r = 0; r < kRows; ++r) {
       const V f(factor(r, j));
       for (Size s = 0; s < strips; ++s)
-        tile[r][s] = sign < 0 ? tile[r][s] - V(product(f, at[s])) : tile[r][s] + V(product(f, at[s]));
+        tile[r][s] = sign < 0 ? tile[r][s] - product(f, at[s]) : tile[r][s] + product(f, at[s]);
     }
   }
 }
@@ -128,7 +126,7 @@ void times_lower(const double* x, const double* s, Size rows, Size columns, doub
       const Size here = rows - top < kRows ? rows - top : kRows;
       Tile<strips> tile;
       load<strips>(tile, nullptr, 0, 0);
-      accumulate<1, strips>(tile, s + first, columns, first / kPanel * kPanel, columns,
+      accumulate<1, strips>(tile, s + first, columns, first, columns,
                             [&](Size r, Size j) { return r < here ? x[(top + r) * columns + j] : 0.0; });
       store<strips>(tile, y + top * columns + first, columns, here);
     }
@@ -142,7 +140,7 @@ void add_row_squares(const double* x, Size rows, Size columns, double* squares) 
       V sum(0.0);
       for (Size first = part; first < columns; first += kColumnStep) {
         const V at = V::load(x + i * columns + first);
-        sum = sum + V(product(at, at));
+        sum = sum + product(at, at);
       }
       sum.store(parts + part);
     }

@@ -1,5 +1,5 @@
-// Products and triangular solves with matrices of many columns, row after row. Compiled for each instruction set: lanes are columns, and
-// each number is summed in the same order with lanes of any width.
+// Products and triangular solves with matrices of many columns, row after row. Compiled for each instruction set: lanes
+// are columns, and each number is summed in the same order with lanes of any width.
 #pragma once
 
 #include <cstddef>

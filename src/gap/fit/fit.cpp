@@ -1,7 +1,6 @@
 #include "gap/fit/fit.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -56,11 +55,11 @@ Directions Fitter::axes(const Hypothesis& hypothesis) {
 }
 
 Fit Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directions directions,
-                      const std::vector<BasisCoefficients>& known, bool rough) const {
+                      const std::vector<BasisCoefficients>& known, bool forward) const {
   std::vector<VehicleHypothesis> vehicles = {hypothesis.vehicle(at)};
   std::vector<double> spans;
   const auto first = static_cast<Index>(known.size());
-  const std::size_t sides = rough ? 1 : 2;
+  const std::size_t sides = forward ? 1 : 2;
   for (Index d = first; d < directions.reach.size(); ++d) {
     if (linear_column(hypothesis, d)) continue;
     const VectorXd axis = directions.axes.col(d);
@@ -68,13 +67,13 @@ Fit Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directio
     const VectorXd down = hypothesis.bounded(at - directions.reach[d] * axis);
     // the longer side, where a bound is near
     const bool upward = std::abs((up - at).dot(axis)) >= std::abs((at - down).dot(axis));
-    const VectorXd &to = !rough || upward ? up : down, &from = rough ? at : down;
+    const VectorXd &to = !forward || upward ? up : down, &from = forward ? at : down;
     spans.push_back((to - from).dot(axis));
     vehicles.push_back(hypothesis.vehicle(to));
-    if (!rough) vehicles.push_back(hypothesis.vehicle(from));
+    if (!forward) vehicles.push_back(hypothesis.vehicle(from));
   }
   const std::vector<VectorXd> shifts =
-      rough ? std::vector<VectorXd>() : around(hypothesis, at, directions, known, vehicles);
+      forward ? std::vector<VectorXd>() : around(hypothesis, at, directions, known, vehicles);
   Fit l{at, std::move(directions), {}, {}, known, 1, {}};
   std::vector<std::size_t> flown;
   for (Index d = first; d < l.directions.reach.size(); ++d) {
@@ -92,9 +91,9 @@ Fit Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directio
     else there[i - 1 - of_sides.size()] = evidence_->statistics(rows);
   });
   if (l.residual.empty()) return l;
-  const BasisCoefficients here = rough ? evidence_->basis_coefficients(l.residual) : BasisCoefficients();
+  const BasisCoefficients here = forward ? evidence_->basis_coefficients(l.residual) : BasisCoefficients();
   for (std::size_t n = 0; n < flown.size(); ++n) {
-    const BasisCoefficients &to = of_sides[sides * n], &from = rough ? here : of_sides[sides * n + 1];
+    const BasisCoefficients &to = of_sides[sides * n], &from = forward ? here : of_sides[sides * n + 1];
     if (to.size() > 0 && from.size() > 0 && spans[n] != 0) l.columns[flown[n]] = (from - to) / spans[n];
   }
   l.statistics = evidence_->statistics(l.residual);
@@ -366,9 +365,9 @@ Directions Fitter::principal(const Hypothesis& hypothesis, const Fit& fit) {
 }
 
 Fit Fitter::fit(const Hypothesis& hypothesis, VectorXd start, int max_iterations) const {
-  const bool rough = max_iterations > 1;
-  return improve(hypothesis, linearise(hypothesis, hypothesis.bounded(std::move(start)), axes(hypothesis), {}, rough),
-                 max_iterations, nullptr, rough ? Columns::rough : Columns::fine);
+  const bool forward = max_iterations > 1;
+  return improve(hypothesis, linearise(hypothesis, hypothesis.bounded(std::move(start)), axes(hypothesis), {}, forward),
+                 max_iterations, nullptr, forward ? Columns::forward : Columns::central);
 }
 
 Fit Fitter::fit_given(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters,
@@ -376,7 +375,7 @@ Fit Fitter::fit_given(const Hypothesis& hypothesis, const VectorXd& start, const
   return improve(hypothesis,
                  linearise(hypothesis, hypothesis.bounded(start), joint_directions(hypothesis, parameters),
                            shared_columns(hypothesis, parameters)),
-                 max_iterations, &parameters, Columns::fine);
+                 max_iterations, &parameters, Columns::central);
 }
 
 Fit Fitter::fit_effects(const Hypothesis& hypothesis, const VectorXd& start, const Fit& parameters) const {
@@ -425,7 +424,7 @@ Fit Fitter::refit(const Hypothesis& hypothesis, const Fit& before, int max_itera
   return improve(hypothesis, std::move(result), max_iterations, nullptr, Columns::elsewhere);
 }
 
-/// Gauss-Newton. Columns are kept while steps stay close; those on the way are rough, and the last point gets fine ones.
+/// Gauss-Newton. Columns are kept while steps stay close; on the way they are by forward differences, and the last point gets central ones.
 /// `columns`: those that `fit` has.
 Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, const Fit* parameters,
                     Columns columns) const {
@@ -436,13 +435,13 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, c
     if (hypothesis.unknowns()[static_cast<std::size_t>(i)].in_log) in_log.push_back(i);
   const auto linearise_here = [&](const VectorXd& at, Columns how) {
     Fit next = parameters == nullptr
-                   ? linearise(hypothesis, at, principal(hypothesis, fit), {}, how == Columns::rough)
+                   ? linearise(hypothesis, at, principal(hypothesis, fit), {}, how == Columns::forward)
                    : linearise(hypothesis, at, fit.directions, shared_columns(hypothesis, *parameters));
     if (!next.flown()) return false;
     next.posterior = std::move(fit.posterior);
     fit = std::move(next);
     linearised_at = at;
-    columns = parameters == nullptr ? how : Columns::fine;
+    columns = parameters == nullptr ? how : Columns::central;
     return true;
   };
   for (int n = 1;; ++n) {
@@ -504,7 +503,7 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, c
       if (improved) {
         const VectorXd away = fit.directions.axes.transpose() * (tries[best] - linearised_at);
         if (away.cwiseAbs().cwiseQuotient(fit.directions.reach).maxCoeff() > kMaxDistance) {
-          if (!linearise_here(tries[best], Columns::rough)) return fit;
+          if (!linearise_here(tries[best], Columns::forward)) return fit;
         } else {
           fit.at = tries[best];
           fit.residual = std::move(rest[best]);
@@ -514,7 +513,7 @@ Fit Fitter::improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, c
       }
     }
     if (improved) continue;
-    if (columns == Columns::fine || !linearise_here(fit.at, Columns::fine)) return fit;
+    if (columns == Columns::central || !linearise_here(fit.at, Columns::central)) return fit;
     max_iterations = n + 1;  // one more iteration, which computes the posterior with the new columns and does not step
   }
 }

@@ -28,7 +28,7 @@ namespace flappy::gap {
 /// Orthonormal directions through the coordinates of a hypothesis, in prior standard deviations.
 struct Directions {
   Eigen::MatrixXd axes;   ///< [coordinate][direction]
-  Eigen::VectorXd reach;  ///< [direction] half the step of the difference
+  Eigen::VectorXd reach;  ///< [direction] distance of each side of the difference
 };
 
 /// A hypothesis linearised at given coordinates, and its posterior there.
@@ -143,9 +143,9 @@ class Fitter {
 
   /// A fit without a posterior: simulates `at`, and both sides of each direction. No directions: only the residual.
   /// `known`: columns of the first directions, which are not simulated again. Not flown() if `at` diverges.
-  /// `rough`: simulates one side alone, and no points around, as on the way to where a fit ends.
+  /// `forward`: simulates one side alone, and no points around, as on the way to where a fit ends.
   Fit linearise(const Hypothesis& hypothesis, const Eigen::VectorXd& at, Directions directions,
-                const std::vector<BasisCoefficients>& known = {}, bool rough = false) const;
+                const std::vector<BasisCoefficients>& known = {}, bool forward = false) const;
   /// One direction for each coordinate, with the reach of first differences.
   static Directions axes(const Hypothesis& hypothesis);
   /// Where nothing is known yet. At most `max_iterations` iterations from `start` on, [coordinate]; 0 or 1: no step,
@@ -174,7 +174,7 @@ class Fitter {
   static std::vector<BasisCoefficients> shared_columns(const Hypothesis& hypothesis, const Fit& parameters);
   static Directions principal(const Hypothesis& hypothesis, const Fit& fit);
   /// Whether columns are of a fit's own point, and by which differences.
-  enum class Columns { elsewhere, rough, fine };
+  enum class Columns { elsewhere, forward, central };
   Fit improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, const Fit* parameters, Columns columns) const;
   std::vector<Eigen::VectorXd> around(const Hypothesis& hypothesis, const Eigen::VectorXd& at,
                                       const Directions& directions, const std::vector<BasisCoefficients>& known,
@@ -182,6 +182,7 @@ class Fitter {
   void average(std::vector<SufficientStatistics> around, const std::vector<Eigen::VectorXd>& shifts, Fit& fit) const;
   Reduced reduce(const Fit& fit, const Regressors& regressors) const;
   Posterior solve(const Fit& fit, const Regressors& regressors, Reduced reduced, double damping = 0) const;
+
   struct Nuisance {
     BasisCoefficients column;
     double prior_mean;

@@ -25,12 +25,11 @@ std::string pool_name(const std::vector<std::string>& effects) {
   return name;
 }
 
-void exclude_unchanged(Inference& d) {
-  if (std::ranges::any_of(d.seen, [](const SeenQuantity& s) { return std::abs(s.times()) > kPlainTimes; }))
-    drop_unchanged(d.hypotheses);
+bool changed_plainly(const std::vector<SeenQuantity>& seen) {
+  return std::ranges::any_of(seen, [](const SeenQuantity& s) { return std::abs(s.times()) > kPlainTimes; });
 }
 
-void drop_unchanged(std::vector<ScoredHypothesis>& hypotheses) {
+void exclude_unchanged(std::vector<ScoredHypothesis>& hypotheses) {
   double rest = 0;
   for (ScoredHypothesis& a : hypotheses) {
     if (a.kind == HypothesisKind::none || a.kind == HypothesisKind::parameters) a.probability = 0;

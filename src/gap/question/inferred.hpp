@@ -111,11 +111,11 @@ std::string pool_name(const std::vector<std::string>& effects);
 
 /// A quantity that changed by more times what sessions differ by is a change, whatever its cause. Choice.
 inline constexpr double kPlainTimes = 7;
-/// Where d.seen has such a quantity, nobody may say "unchanged": takes the probabilities of none and parameters away
-/// and gives them to the others in proportion.
-void exclude_unchanged(Inference& d);
-/// The second half of it. Sorts the hypotheses: the most probable first.
-void drop_unchanged(std::vector<ScoredHypothesis>& hypotheses);
+/// Whether one is: then nobody may say "unchanged".
+bool changed_plainly(const std::vector<SeenQuantity>& seen);
+/// Takes the probabilities of none and parameters away and gives them to the others in proportion; sorts: the most
+/// probable first.
+void exclude_unchanged(std::vector<ScoredHypothesis>& hypotheses);
 
 /// Sets predicted_with of the conclusion: to the effects of the likeliest fitted hypothesis that contains the
 /// conclusion's effects, if it is likelier. Its further effects may be due to chance, so they are not named; yet a

@@ -321,7 +321,7 @@ std::optional<Inference> SessionContrast::by_sessions(const Flights& flights, co
   d.nominal = tests_of(flights, residuals(flights, {no_effects.vehicle(no_effects.start())}, options.threads).front());
   d.minors = uncertain.minors();
   for (int g = 0; g < kGroups; ++g) d.noise_sd.push_back(reference.fit.evidence().noise_sd(g));
-  exclude_unchanged(d);
+  if (changed_plainly(d.seen)) exclude_unchanged(d.hypotheses);
   conclude_by_sessions(d);
   choose_predicting(d);
   const ScoredHypothesis& answer = d.predicting();

@@ -64,11 +64,6 @@ double VerdictRule::Said::operator()(double probability) const {
   return 1 / (1 + std::exp(-slope * std::log(probability / (1 - probability)) - offset));
 }
 
-double VerdictRule::Said::evidence(double said) const {
-  if (said <= 0 || said >= 1) return said;
-  return 1 / (1 + std::exp(-(std::log(said / (1 - said)) - offset) / slope));
-}
-
 VerdictRule read_verdict_rule(const std::filesystem::path& path) { return rule_of(io::Config::load(path)); }
 
 VerdictRule parse_verdict_rule(std::string_view text, const std::string& name) {

@@ -51,7 +51,6 @@ struct VerdictRule {
   struct Said {
     double slope = 1, offset = 0;
     double operator()(double probability) const;
-    double evidence(double said) const;  ///< the inverse
   } said{};
 };
 

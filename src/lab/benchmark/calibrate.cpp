@@ -13,7 +13,6 @@
 #include "gap/question/contrast.hpp"
 #include "io/files.hpp"
 #include "io/program.hpp"
-#include "io/sha256.hpp"
 #include "io/text.hpp"
 #include "lab/benchmark/records.hpp"
 
@@ -83,8 +82,8 @@ struct Case {
   CaseTruth truth;
   std::string family;
   bool contrast = false;
-  bool plain = false;  ///< the change is so plain that no verdict says "unchanged" (gap::exclude_unchanged)
   std::vector<ScoredHypothesis> hypotheses;
+  std::vector<gap::SeenQuantity> seen;
   double weight = 0;
   std::size_t part = 0;
 };
@@ -106,15 +105,21 @@ double moved_prior(const ScoredHypothesis& a, const VerdictRule& from, const Ver
   return 0;
 }
 
-/// The rule by which a folder was scored. InputError if it has other constants of the evidence than `start`.
+/// The rule by which a folder was scored. InputError if it differs from `start` in a constant that is not learnt.
 VerdictRule scored_by(const fs::path& folder, const VerdictRule& start) {
-  const VerdictRule own = gap::read_verdict_rule(verdict_of_predictions(folder));
-  const auto of_evidence = [](const VerdictRule& r) {
-    return std::array{r.unknown.penalty_nats, r.gain.further_screened_nats, r.gain.vanished_magnitude};
+  const fs::path file = verdict_of_predictions(folder);
+  if (!fs::exists(file))
+    throw io::InputError(file.string() + ": is missing; accepted: a folder that this version of score has scored");
+  const VerdictRule own = gap::read_verdict_rule(file);
+  const auto others = [](const VerdictRule& r) {
+    return std::array{r.unknown.penalty_nats, r.gain.further_screened_nats, r.gain.vanished_magnitude,
+                      r.prior.further_effect, r.refutation.min_share,       r.naming.least};
   };
-  if (of_evidence(own) != of_evidence(start))
-    throw io::InputError(folder.string() + ": was scored with another unknown.penalty_nats, gain.further_screened_nats"
-                         " or gain.vanished_magnitude; accepted: those of --verdict");
+  if (others(own) != others(start))
+    throw io::InputError(folder.string() +
+                         ": was scored with other constants that calibrate does not learn; accepted: a "
+                         "--verdict that has those of " +
+                         file.string());
   return own;
 }
 
@@ -145,12 +150,12 @@ class Calibration {
           a.effects = h.effects;
           a.log_evidence = h.log_evidence;
           a.log_prior = h.log_prior;
-          if (h.kind == gap::HypothesisKind::parameters) own.plain = h.probability == 0;
           if (h.remainder) a.unexplained.emplace_back();
           const double move = moved_prior(a, own_rule, rule_);
           a.log_prior += move, a.log_evidence += move;
           own.hypotheses.push_back(std::move(a));
         }
+        own.seen = p.diagnosis.seen;
         if (own.hypotheses.empty()) continue;  // its data were faulty
         if (!own.truth.counts()) continue;     // as the score does
         own.part = parts.try_emplace(manifest.family + " " + own.truth.part, counts.size()).first->second;
@@ -168,16 +173,17 @@ class Calibration {
 
   /// Weighted mean logarithm of the probability of the right answers. `without`: a family that does not count.
   double score(const VerdictRule& rule, const std::string& without = "") const {
-    double sum = 0;
+    double sum = 0, weights = 0;
     for (const Case& c : cases_) {
       if (c.family == without) continue;
+      weights += c.weight;
       double probability = 0;
       for (const ScoredHypothesis& a : moved(c, rule))
         if (right(c.truth, {.kind = a.has_remainder() ? "remainder" : name_of(a.kind), .effects = a.effects}))
           probability += a.probability;
       sum += c.weight * std::log(kMinProbability + (1 - kMinProbability) * probability);
     }
-    return sum;
+    return sum / weights;
   }
 
   /// Maximises the score less the price of what moved along one constant after another, with shrinking steps (Hooke,
@@ -212,8 +218,10 @@ class Calibration {
         if (c.family != family) continue;
         gap::Inference d;
         d.hypotheses = moved(c, rule);
+        d.seen = c.seen;
         gap::conclude(
-            rule, [&](const ScoredHypothesis& a) { return c.contrast ? gap::contrast_pool_of(a) : gap::pool_of(a); }, d);
+            rule, [&](const ScoredHypothesis& a) { return c.contrast ? gap::contrast_pool_of(a) : gap::pool_of(a); },
+            d);
         const Answer answer{.kind = d.verdict.remainder ? "remainder" : name_of(d.verdict.kind),
                             .effects = d.verdict.effects};
         verdicts.push_back({d.verdict.probability, right(c.truth, answer)});
@@ -234,7 +242,7 @@ class Calibration {
       a.log_evidence += move;
     }
     set_probabilities(all, rule);
-    if (c.plain) gap::drop_unchanged(all);
+    if (gap::changed_plainly(c.seen)) gap::exclude_unchanged(all);
     return all;
   }
 
@@ -337,7 +345,7 @@ Json calibrate(const CalibrateCommand& command) {
     std::printf("%-12s %-24s %10.4g, was %.4g\n", c.table, c.key, c.of(after), c.of(before));
   }
   for (const auto& [key, value] : {std::pair{"none", after.prior.none}, {"effect", after.prior.effect}})
-    set_number(text, "prior", key, io::shortest_digits(value));
+    set_number(text, "prior", key, io::format("%.6g", value));
   std::printf("mean log probability of what is right: %.3f, was %.3f, of %zu cases\n", json["score"].get<double>(),
               json["score_before"].get<double>(), calibration.cases());
   set_origin(text, learnt);

@@ -20,8 +20,8 @@ struct CalibrateCommand {
   std::filesystem::path out;
 };
 
-/// Writes the verdict file to `out`, and prints new and old values. InputError if a folder was not scored, or with
-/// another evidence than by `verdict`.
+/// Writes the verdict file to `out`, and prints new and old values. InputError if a folder was not scored, or if
+/// constants that are not learnt differ from those of `verdict`.
 nlohmann::ordered_json calibrate(const CalibrateCommand& command);
 
 /// By logistic regression of whether claims are right (Platt 1999), with Newton's method; without claims, what the evidence says.

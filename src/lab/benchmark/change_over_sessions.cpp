@@ -223,28 +223,34 @@ namespace {
 struct Projected {
   std::string channel;
   std::vector<double> sizes;  ///< [flight] |e_f|
-  std::vector<double> along;  ///< [session] x_s
+  std::vector<double> along;  ///< [session] x_s; NaN where the effect does not change its flight
 
   double size() const {
     double sum = 0, squares = 0;
     for (const double e : sizes) sum += e, squares += e * e;
     return sum > 0 ? squares / sum : 0;
   }
-  /// Variance among the sessions `from`, `from` + 2, ..., or all with a stride of 1.
-  double variance(std::size_t from, std::size_t stride) const {
-    double sum = 0, squares = 0, count = 0;
-    for (std::size_t s = from; s < along.size(); s += stride) sum += along[s], ++count;
-    for (std::size_t s = from; s < along.size(); s += stride) squares += std::pow(along[s] - sum / count, 2);
-    return squares / (count - 1);
+  std::size_t pairs() const { return along.size() / 2; }
+  /// Variance by one pair, over the square of the size.
+  double variance(std::size_t pair) const {
+    const double gap = along[2 * pair] - along[2 * pair + 1];
+    return gap * gap / 2 / (size() * size());
+  }
+  /// The mean over all pairs but one. NaN: no other pair is known.
+  double variance_without(std::size_t pair) const {
+    double sum = 0, count = 0;
+    for (std::size_t p = 0; p < pairs(); ++p)
+      if (const double v = variance(p); p != pair && std::isfinite(v)) sum += v, ++count;
+    return sum / count;
   }
 };
 
-/// The channel with the largest ratio, if the sessions `from`, `from` + 2, ... give the variance; null: there is none.
-const Projected* largest(const std::vector<Projected>& channels, std::size_t from) {
+/// The channel with the largest ratio by all pairs but one (one beyond the last: by all); null: there is none.
+const Projected* largest(const std::vector<Projected>& channels, std::size_t without_pair) {
   const Projected* best = nullptr;
-  double most = 0;
+  double least = std::numeric_limits<double>::infinity();
   for (const Projected& c : channels)
-    if (const double ratio = c.size() / std::sqrt(c.variance(from, 2)); ratio > most) best = &c, most = ratio;
+    if (const double variance = c.variance_without(without_pair); variance < least) best = &c, least = variance;
   return best;
 }
 
@@ -266,21 +272,21 @@ OverSessions over_sessions(const std::vector<std::pair<FlightLog, FlightLog>>& c
         if (!std::isfinite(e) || !std::ranges::all_of(sessions, known)) continue;
         square += e * e;
         for (std::size_t s = 0; s < sessions.size(); ++s)
-          if (sessions[s].flight == flight)
-            channels[c].along[s] += e * (sessions[s].channels[c].values[i] - before);
+          if (sessions[s].flight == flight) channels[c].along[s] += e * (sessions[s].channels[c].values[i] - before);
       }
       channels[c].sizes.push_back(std::sqrt(square));
-      for (std::size_t s = 0; s < sessions.size() && square > 0; ++s)
-        if (sessions[s].flight == flight) channels[c].along[s] /= std::sqrt(square);
+      for (std::size_t s = 0; s < sessions.size(); ++s)
+        if (sessions[s].flight == flight) channels[c].along[s] /= std::sqrt(square);  // 0 / 0: not known
     }
   }
-  std::erase_if(channels, [](const Projected& c) { return !(c.size() > 0) || !(c.variance(0, 1) > 0); });
-  const Projected *even = largest(channels, 0), *odd = largest(channels, 1);
-  if (!even || !odd) return {};
-  // each half of the sessions judges the channel that the other half chose
-  const double of_even = even->variance(1, 2) / std::pow(even->size(), 2),
-               of_odd = odd->variance(0, 2) / std::pow(odd->size(), 2);
-  return {even->channel, std::sqrt(2 / (of_even + of_odd))};
+  const std::size_t pairs = sessions.size() / 2;
+  std::erase_if(channels, [&](const Projected& c) { return !(c.size() > 0) || !(c.variance_without(pairs) > 0); });
+  double sum = 0, count = 0;
+  for (std::size_t pair = 0; pair < pairs; ++pair)
+    if (const Projected* chosen = largest(channels, pair))
+      if (const double variance = chosen->variance(pair); std::isfinite(variance)) sum += variance, ++count;
+  if (count == 0) return {};
+  return {largest(channels, pairs)->channel, std::sqrt(count / sum)};
 }
 
 std::vector<OverSessions> change_over_sessions(const blind::Family& family, const blind::Assignment& robot,
@@ -293,7 +299,7 @@ std::vector<OverSessions> change_over_sessions(const blind::Family& family, cons
   // a session in which the robot crashes is replaced by the next
   for (std::size_t s = 0; sessions.size() < other_sessions && s < 2 * other_sessions; ++s) {
     other.session = kFirstOther + s;
-    const std::size_t flight = sessions.size() % flown.size();
+    const std::size_t flight = sessions.size() / 2 % flown.size();
     if (const blind::FamilyFlight f = family.fly(other, flight); !f.crashed)
       sessions.push_back({flight, windowed_channels(f.log)});
   }

@@ -27,19 +27,22 @@ struct OverSessions {
 
 /// Another session, in which a robot without the effect flew one of the tests' flights again.
 struct OtherSession {
-  std::size_t flight;  ///< of which its programme is
+  std::size_t flight;  ///< index in `change` of that flight
   std::vector<WindowedChannel> channels;
 };
 
-/// `change[flight]`: logs with the effect and without it, of one session, programme and noise. `sessions`: at least four.
-/// In each channel, over all windows of flight f,
+/// `change[flight]`: logs with the effect and without it, of one session, programme and noise. `sessions`: the two of a
+/// pair, which follow one another, flew the same flight; at least two pairs. In each channel, over all windows of the
+/// flight f of a session,
 ///
 ///   e_f = with - without   x_s = <e_f, session s - without> / |e_f|   ratio = sum |e_f|^2 / sum |e_f| / sd of x_s
 ///
 /// how many standard deviations of a session, with its noise, a matched filter for the change sees it high (Kay,
-/// Fundamentals of Statistical Signal Processing II, 1998, ch. 4), if a session differs alike in all flights. The largest
-/// ratio of some forty channels would be large by chance: every second session chooses the channel, and the others give
-/// its variance; then the other way round, and the mean of both variances counts. No channel: the effect changes nothing.
+/// Fundamentals of Statistical Signal Processing II, 1998, ch. 4), if a session differs alike in all flights; if it
+/// differs independently, the ratio is too small by up to the root of the number of flights. The variance is half the
+/// mean square of the differences of pairs. The largest ratio of some forty channels would be large by chance: so each
+/// pair gives the variance of the channel that the other pairs chose, and the mean of these counts. No channel: the
+/// effect changes nothing.
 OverSessions over_sessions(const std::vector<std::pair<flightlog::FlightLog, flightlog::FlightLog>>& change,
                            const std::vector<OtherSession>& sessions);
 

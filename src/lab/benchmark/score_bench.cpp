@@ -69,7 +69,7 @@ class Predictions {
       if (const std::string other = command_.other_option(options); !other.empty())
         throw io::InputError(folder_.string() + ": its predictions were begun with another " + other +
                              "; accepted: the same options, or a new benchmark");
-    if (io::writes(command_.ranks)) io::write_atomically(verdict_of_predictions(folder_), io::read_text(verdict()));
+    if (io::writes(command_.ranks)) keep_verdict();
     std::vector<const PublicCase*> open;
     for (const PublicCase& c : manifest_.cases)
       if (!fs::exists(prediction_file(folder_, c.number))) open.push_back(&c);
@@ -103,6 +103,14 @@ class Predictions {
   }
 
  private:
+  void keep_verdict() const {
+    const fs::path kept = verdict_of_predictions(folder_);
+    const std::string now = io::read_text(verdict());
+    if (!fs::exists(kept)) io::write_atomically(kept, now);
+    else if (io::read_text(kept) != now)
+      throw io::InputError(folder_.string() +
+                           ": its predictions were begun with another --verdict; accepted: " + kept.string());
+  }
   void seal() const {
     std::string sums;
     for (const PublicCase& c : manifest_.cases) sums += sum_line(folder_, c.number);

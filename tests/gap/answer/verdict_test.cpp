@@ -49,11 +49,11 @@ TEST(Verdict, IsNotUnchangedWhereAQuantityChangedPlainly) {
   d.hypotheses = {hypothesis(0.6, HypothesisKind::parameters), hypothesis(0.2, HypothesisKind::none),
                   hypothesis(0.05, {"wind"}), hypothesis(0.15, HypothesisKind::unknown)};
   d.seen = {{"mean force along z", "m/s^2", 0, -1.4, 0.21}, {"battery", "V", 0, 0.1, 1}};
-  exclude_unchanged(d);
-  EXPECT_EQ(d.hypotheses[0].probability, 0.6) << "6.7 times";
+  EXPECT_FALSE(changed_plainly(d.seen)) << "6.7 times";
   d.seen[0].scatter = 0.19;
-  exclude_unchanged(d);
-  EXPECT_EQ(d.hypotheses[0].kind, HypothesisKind::unknown) << "7.4 times";
+  EXPECT_TRUE(changed_plainly(d.seen)) << "7.4 times";
+  exclude_unchanged(d.hypotheses);
+  EXPECT_EQ(d.hypotheses[0].kind, HypothesisKind::unknown);
   EXPECT_NEAR(d.hypotheses[0].probability, 0.75, 1e-12);
   EXPECT_NEAR(d.hypotheses[1].probability, 0.25, 1e-12) << "wind";
   EXPECT_EQ(d.hypotheses[3].probability, 0);
@@ -147,7 +147,6 @@ TEST(Verdict, SaysAProbabilityThatRobotsWithKnownFaultsTaught) {
   gap::conclude(rule, pool_in_contrast, d);
   EXPECT_NEAR(d.verdict.probability, 18.0 / 19, 1e-12) << "odds are doubled";
   EXPECT_DOUBLE_EQ(d.hypotheses[0].probability, 0.9) << "evidence stays";
-  EXPECT_NEAR(rule.said.evidence(rule.said(0.3)), 0.3, 1e-12);
   EXPECT_EQ(rule.said(0), 0);
   EXPECT_EQ(rule.said(1), 1);
 }
@@ -167,8 +166,10 @@ TEST(Verdict, NamesOfAContrastWhatIsMoreProbableThanNot) {
   gap::conclude(rule, pool_in_contrast, d);
   EXPECT_EQ(d.verdict.effects, std::vector<std::string>{"wind"});
   // where the change is plain, the likeliest cause is named, and its probability tells how sure that is
-  d.hypotheses = {hypothesis(0.4, {"wind"}), hypothesis(0.35, {"com_offset"}), hypothesis(0.25, HypothesisKind::unknown),
-                  hypothesis(0, HypothesisKind::parameters), hypothesis(0, HypothesisKind::none)};
+  d.hypotheses = {hypothesis(0.4, {"wind"}), hypothesis(0.35, {"com_offset"}),
+                  hypothesis(0.25, HypothesisKind::unknown), hypothesis(0, HypothesisKind::parameters),
+                  hypothesis(0, HypothesisKind::none)};
+  d.seen = {{"mean force along z", "m/s^2", 0, -1.4, 0.19}};
   gap::conclude(rule, pool_in_contrast, d);
   EXPECT_EQ(d.verdict.effects, std::vector<std::string>{"wind"});
   EXPECT_DOUBLE_EQ(d.verdict.probability, 0.4);

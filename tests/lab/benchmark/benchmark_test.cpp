@@ -207,8 +207,9 @@ TEST_F(Benchmark, LearnsWhatANatIsWorth) {
   text.insert(text.find(key) + key.size(), "1");
   io::write_atomically(calibrated.verdict, text);
   EXPECT_EQ(test::refusal([&] { calibrate(calibrated); }),
-            (root_ / "bench").string() + ": was scored with another unknown.penalty_nats, gain.further_screened_nats or "
-                                         "gain.vanished_magnitude; accepted: those of --verdict");
+            (root_ / "bench").string() +
+                ": was scored with another unknown.penalty_nats, gain.further_screened_nats or "
+                "gain.vanished_magnitude; accepted: those of --verdict");
 }
 
 TEST_F(Benchmark, OpensLabelsOnceAllPredictionsAreSealed) {

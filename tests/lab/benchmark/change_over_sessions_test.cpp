@@ -77,7 +77,7 @@ FlightLog shifted(double accel_z, double gyro_x = 0) {
 }
 
 TEST(OverSessions, IsTheChangeOverTheirStandardDeviation) {
-  // x_s = d_s sqrt(W): even sessions +-0.3 (variance 0.18), odd ones +-0.1 (0.02); the mean of both is 0.1
+  // x_s = d_s sqrt(W): pairs differ by 0.6 (variance 0.18) and 0.2 (0.02); the mean of both is 0.1
   const auto others = [](const std::vector<FlightLog>& logs) {
     std::vector<OtherSession> sessions;
     for (const FlightLog& log : logs) sessions.push_back({0, windowed_channels(log)});
@@ -85,7 +85,7 @@ TEST(OverSessions, IsTheChangeOverTheirStandardDeviation) {
   };
   const auto of = [&](double change) {
     return over_sessions({{shifted(change), shifted(0)}},
-                         others({shifted(0.3), shifted(0.1), shifted(-0.3), shifted(-0.1)}));
+                         others({shifted(0.3), shifted(-0.3), shifted(0.1), shifted(-0.1)}));
   };
   EXPECT_NEAR(of(0.5).ratio, 0.5 / std::sqrt(0.1), 1e-6);
   EXPECT_TRUE(of(0.5).channel == "accel_z mean" || of(0.5).channel.starts_with("acceleration")) << of(0.5).channel;
@@ -93,19 +93,24 @@ TEST(OverSessions, IsTheChangeOverTheirStandardDeviation) {
   // what all sessions have alike hides nothing, as references have it, too; nor does what another channel has
   const OverSessions beside =
       over_sessions({{shifted(0, 0.5), shifted(0)}},
-                    others({shifted(5, 0.11), shifted(-5, 0.11), shifted(-5, 0.09), shifted(5, 0.09)}));
+                    others({shifted(5, 0.11), shifted(-5, 0.09), shifted(-5, 0.11), shifted(5, 0.09)}));
   EXPECT_GE(beside.ratio, 0.5 / std::sqrt(2e-4) - 1e-3) << "by gyro_x; a turn less the gyro's shows it, too";
 }
 
 TEST(OverSessions, WeighsFlightsByTheirChange) {
-  // the first flight has no change: it neither adds to the size nor hides it; sessions are as far off in the second
   const FlightLog same = shifted(0);
-  std::vector<OtherSession> sessions;
-  for (const double x : {0.3, 0.1, -0.3, -0.1})
-    sessions.push_back({1, windowed_channels(shifted(x))});
-  EXPECT_NEAR(over_sessions({{same, same}, {shifted(0.5), same}}, sessions).ratio, 0.5 / std::sqrt(0.1), 1e-6);
-  EXPECT_NEAR(over_sessions({{shifted(1), same}, {shifted(2), same}}, sessions).ratio, (1 + 4) / 3. / std::sqrt(0.1),
-              1e-6);
+  const auto pairs = [&](double first_flight) {
+    std::vector<OtherSession> sessions;
+    for (const auto& [flight, x] : {std::pair{0, first_flight}, {1, 0.3}, {1, 0.1}})
+      for (const int sign : {1, -1})
+        sessions.push_back({static_cast<std::size_t>(flight), windowed_channels(shifted(sign * x))});
+    return sessions;
+  };
+  // the first flight has no change: it neither adds to the size, nor do sessions hide the change there
+  EXPECT_NEAR(over_sessions({{same, same}, {shifted(0.5), same}}, pairs(7)).ratio, 0.5 / std::sqrt(0.1), 1e-6);
+  // variances by pairs 0.08, 0.18 and 0.02
+  EXPECT_NEAR(over_sessions({{shifted(1), same}, {shifted(2), same}}, pairs(0.2)).ratio,
+              (1 + 4) / 3. / std::sqrt(0.28 / 3), 1e-6);
 }
 
 /// A robot whose sessions shift its accelerometer, and whose effect shifts it more; it crashes in one session.
@@ -127,14 +132,13 @@ TEST(ChangeOverSessions, FliesTheProgrammeOfTheTestsInOtherSessions) {
   const Shifting family;
   blind::Assignment robot;
   robot.session = 1;
-  robot.effects = {{"wind", 0.5}, {"tether", 0.05}};
+  robot.effects = {{"wind", 0.5}, {"tether", 0.4}};
   const std::vector<OverSessions> found =
       change_over_sessions(family, robot, {family.fly(robot, 0).log, family.fly(robot, 1).log});
-  // sessions 11, 13 to 17: -0.1, -0.1, 0.1, -0.1, 0.1, -0.1; halves 11, 14, 16 and 13, 15, 17
+  // sessions 11, 13 to 17: -0.1, -0.1; 0.1, -0.1; 0.1, -0.1
   ASSERT_EQ(found.size(), 2U);
-  const double even = (0.04 * 2 / 3) / 2, odd = 0;  // variances of -0.1, 0.1, 0.1 and of three equal ones
-  EXPECT_NEAR(found[0].ratio, 0.5 / std::sqrt((even + odd) / 2), 1e-3);
-  EXPECT_NEAR(found[1].ratio, found[0].ratio / 10, 1e-3);
+  EXPECT_NEAR(found[0].ratio, 0.5 / std::sqrt((0 + 0.02 + 0.02) / 3), 1e-3);
+  EXPECT_NEAR(found[1].ratio, 0.8 * found[0].ratio, 1e-3);
   EXPECT_EQ(family.flown_, (std::set<std::size_t>{1, 11, 13, 14, 15, 16, 17}));
   EXPECT_TRUE(change_over_sessions(family, robot, {family.fly(robot, 0).log}, 3).empty()) << "too few to say";
 }
