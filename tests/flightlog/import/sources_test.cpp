@@ -154,6 +154,8 @@ TEST(Sources, SayWhatOtherFilesAre) {
             ": is a TDMS file of LabVIEW" + accepted +
                 ", as made by: nptdms.TdmsFile.read(FILE)[GROUP].as_dataframe(time_index=True).to_csv(\"forces.csv\", "
                 "index_label=\"time\")");
+  EXPECT_EQ(refusal("bench.tdms_index", "TDSh\x0e"),
+            ": is the index of a TDMS file" + accepted + ", as made by: the same of the .tdms file");
   EXPECT_EQ(refusal("take.mat.gz", gzipped("MATLAB 5.0 MAT-file, Platform: GLNXA64")),
             ": is a MATLAB file compressed by gzip" + accepted + ", as made by: gunzip FILE");
   // one variable "t" of 1 x 1: kind, rows, columns, whether complex, letters of the name

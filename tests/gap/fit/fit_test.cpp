@@ -41,6 +41,22 @@ TEST_F(Fits, FindsParametersAndMagnitudes) {
   EXPECT_GT(fit.posterior.log_evidence, without.posterior.log_evidence + 10);
 }
 
+// The law is linear in the mass and the wind, so differences of any kind are the slope; also at a bound of the wind,
+// where the only side is downward.
+TEST_F(Fits, TakesColumnsByForwardDifferences) {
+  const Hypothesis wind(priors_, {"wind"});
+  for (const double far : {0.0, 100.0}) {
+    const Eigen::VectorXd at = wind.bounded(wind.start() + far * Eigen::VectorXd::Unit(wind.size(), 2));
+    const Fit central = fitter_.linearise(wind, at, Fitter::axes(wind)),
+              forward = fitter_.linearise(wind, at, Fitter::axes(wind), {}, true);
+    for (const std::size_t d : {0, 2}) {
+      ASSERT_GT(central.columns[d].norm(), 1e-3);
+      EXPECT_LT((forward.columns[d] - central.columns[d]).norm(), 1e-9 * central.columns[d].norm()) << far << ", " << d;
+    }
+    EXPECT_EQ(forward.residual, central.residual);
+  }
+}
+
 TEST_F(Fits, FitsEffectsWhereTheParametersStay) {
   const Hypothesis none(priors_, {}), wind(priors_, {"wind"});
   const Fit parameters = fitter_.fit(none, none.start(), 4);

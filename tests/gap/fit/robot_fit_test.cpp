@@ -214,7 +214,7 @@ TEST(Contrast, NamesNoEffectForWhatOnlyItsLawExplains) {
   ModelDiscrepancy discrepancy = read_model_discrepancy();
   discrepancy.session = fixed_session_variation();
   discrepancy.session.scale_sd = discrepancy.session.own_scale_sd = 0.1;  // else sessions may differ by as much
-  discrepancy.session.law_error.fill(1);
+  discrepancy.session.law_error.fill(1);  // and laws by as much as the change here is off
   const RobotFit robot(question_of(flights),
                        RobotFit::of_references(question_of(references), references, priors, discrepancy, {}, 2),
                        flights);

@@ -42,6 +42,21 @@ TEST(Question, AContrastAsksWhatChanged) {
 }
 
 // An unknown cause of a contrast is free in blocks of the tests alone, where references show what cancels.
+// Two hills of evidence, of height 1 at the given scales and of 5 at 64 times these, and a valley between.
+TEST(Question, FindsTheHigherOfTwoHillsOfScales) {
+  const auto made = synthetic_flights(4, synthetic_law);
+  const Flights flights = as_flights(made, 2);
+  const auto hill = [](double at, double centre) { return std::exp(-std::pow(std::log2(at / centre), 2)); };
+  Scales given;
+  given.session = 0.5;
+  given.blocks.assign(kBlocks, 1);
+  given.free.assign(kBlocks, 0);
+  const Scales best = question_of(flights).first_scales(
+      given, [&](const Scales& s) { return hill(s.session, 0.5) + 5 * hill(s.session, 32); });
+  EXPECT_EQ(best.session, 32);
+  for (std::size_t b = 0; b < kBlocks; ++b) EXPECT_EQ(best.blocks[b], block_of_tests(b) ? 64 : 1);
+}
+
 TEST(Question, FreesOtherBlocksInAContrast) {
   const auto made = synthetic_flights(4, synthetic_law);
   const Flights alone = as_flights(made), pair = as_flights(made, 2);
