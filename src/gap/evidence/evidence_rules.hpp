@@ -1,5 +1,6 @@
-// What a question changes in the statistics of residuals. The questions are in gap/question/: FitRules derives from
-// this class (gap/fit/fit_rules.hpp), Question from that. Evidence and RegimeBasis call it.
+// What the question of a diagnosis (gap/fit/fit_rules.hpp) changes in the statistics of residuals: what the model lacks,
+// or what changed since the references. FitRules derives from this class, Question from that. Evidence and RegimeBasis
+// call it.
 #pragma once
 
 #include <functional>
@@ -18,15 +19,15 @@ class EvidenceRules {
   virtual ~EvidenceRules() = default;
   /// Indices of the flights that have an offset of their own in the regime basis.
   virtual std::vector<std::size_t> offsets(const Flights& flights) const = 0;
-  /// Indices of the flights for which all functions but offsets follow a second time, as what differs in these flights:
-  /// the tests of a contrast; else none.
+  /// Indices of the flights that get a second copy of each basis function, except offsets. The copy is 0 in all other
+  /// flights and stands for how these differ. In a contrast: the tests; else none.
   virtual std::vector<std::size_t> apart(const Flights& flights) const = 0;
-  /// Whether an excess of a block over its prior is a sign of an unknown cause.
+  /// Whether the scale of this block may leave its prior; if it does, that is a sign of an unknown cause.
   virtual bool may_be_free(std::size_t block, const RegimeBasis& basis, const ModelDiscrepancy& discrepancy) const = 0;
   /// Scales from which expectation-maximisation starts (Evidence::weigh). `given`: those that the caller gave;
-  /// `log_evidence`: of any scales, in nats. Asked only where Scales::session is still the centre of its prior.
+  /// `log_evidence`: of any scales, in nats. Called only while Scales::session has the central value of its prior.
   virtual Scales first_scales(const Scales& given, const std::function<double(const Scales&)>& log_evidence) const = 0;
-  /// How often, at most, an iteration maximises scales of blocks and, in turn, the centres of their priors:
+  /// Largest number of alternations within an iteration between the scales of blocks and the centres of their priors,
   /// Scales::robot and Scales::session.
   virtual int max_passes() const = 0;
 };

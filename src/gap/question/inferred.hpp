@@ -29,16 +29,16 @@ struct ScoredHypothesis : RankedHypothesis {
   ScoredHypothesis() { kind = HypothesisKind::parameters; }
   std::vector<FreeBlock> unexplained;     ///< blocks of an unknown cause, or of a remainder in addition to the effects
   std::vector<std::string> jointly_with;  ///< effects with which these blocks are fitted jointly
-  /// Effects and parameters, of kind effect alone; without a residual if fitted only linearly.
+  /// Only of a hypothesis of kind effect. Without a residual if its effects were fitted only linearly.
   Fit fit;
   /// The largest deviation of an effect from the catalogue's law, in a function of the place. None: the law factor does
   /// not exceed 1.
   std::optional<FreeBlock> other_law;
-  /// Residuals of the fit to the other test flights, a lone flight's by its own fit; in a contrast by sessions, of the
-  /// fit to all test flights. Empty if not fitted by simulation.
+  /// Residuals of each test flight under the fit to the other test flights; of a lone flight under its own fit. In a
+  /// contrast of a beat-averaged vehicle, under the fit to all. Empty if not fitted by simulation.
   TestResiduals held_out;
-  /// Effects of another hypothesis whose fit predicts for this one. They are this one's effects and further ones, whose
-  /// gain may be due to chance. Empty: its own fit predicts.
+  /// If a likelier hypothesis has all effects of this one and more: its effects. Its fit is then used for predictions,
+  /// though the further effects may be due to chance. Empty: its own fit is used.
   std::vector<std::string> predicted_with;
   /// Whether the effects were fitted by simulation.
   bool fitted() const { return fit.flown(); }
@@ -54,9 +54,9 @@ struct CorrectedParameters {
 
 /// Log evidence of a hypothesis that is refuted, or whose vehicle cannot be simulated. Choice: less than any other.
 inline constexpr double kRefuted = -1e9;
-/// Number of effects that are fitted by simulation, of a vehicle with wings. Choice.
+/// For a vehicle with wings, the number of effects that are fitted by simulation. Choice.
 inline constexpr int kMaxFinalists = 8;
-/// Largest number of effects in a hypothesis, of a vehicle with wings. Choice.
+/// For a vehicle with wings, the largest number of effects in a hypothesis. Choice.
 inline constexpr int kMaxEffects = 3;
 
 /// read_request() makes these of the settings of a diagnosis.
@@ -76,12 +76,13 @@ struct Inference {
   bool complete = true;                      ///< false: stopped by `progress`
   std::vector<ScoredHypothesis> hypotheses;  ///< the most probable first
   Verdict verdict;
-  std::size_t concluded = 0;            ///< index of the most probable hypothesis of the verdict
+  std::size_t concluded = 0;  ///< index of the most probable hypothesis among those that the verdict stands for
   std::vector<std::string> untestable;  ///< effects that the logs cannot show
-  Fit parameters;                       ///< the parameters fitted without effects; in a contrast to the references
+  Fit parameters;  ///< the parameters fitted without effects; in a contrast, to the reference flights
   CorrectedParameters corrected;
-  std::vector<double> minors;          ///< variates for sim::Randomisation::set_minors, at which hypotheses are fitted
-  std::vector<SensorFinding> sensors;  ///< lag and errors of declared sensors, given predicting(); none by sessions
+  std::vector<double> minors;  ///< variates for sim::Randomisation::set_minors, at which hypotheses are fitted
+  /// Lag and errors of declared sensors, given predicting(); none in a contrast of a beat-averaged vehicle.
+  std::vector<SensorFinding> sensors;
   std::optional<Validation> validation;  ///< only of a beat-averaged vehicle without references
   TestResiduals nominal;                 ///< of the vehicle file
   /// Without effects, with parameters fitted to the other test flights, a lone flight's to itself; in a contrast, with
@@ -102,19 +103,19 @@ struct ReferenceFit {
   ReferenceFit(const FlightList& references, const sim::Randomisation& uncertain, const InferenceOptions& options);
   Flights flights;  ///< the references, without tests
   RobotFit fit;     ///< as RobotFit::of_references
-  /// For the corrected vehicle; of one with wings, with background magnitudes (corrected_without_effects).
+  /// For the corrected vehicle; if it has wings, with background magnitudes (corrected_without_effects).
   CorrectedParameters corrected;
 };
 
 /// Sorted groups of the effects, joined by +: "body_drag+world_force". An effect without a group is its own group.
 std::string pool_name(const std::vector<std::string>& effects);
 
-/// A quantity that changed by more times what sessions differ by is a change, whatever its cause. Choice.
+/// A quantity that changed by more standard deviations between sessions than this is a change, whatever its cause. Choice.
 inline constexpr double kPlainTimes = 7;
-/// Whether one is: then nobody may say "unchanged".
+/// Whether any quantity changed by more than kPlainTimes; then the verdict may not be "unchanged".
 bool changed_plainly(const std::vector<SeenQuantity>& seen);
-/// Takes the probabilities of none and parameters away and gives them to the others in proportion; sorts: the most
-/// probable first.
+/// Sets the probabilities of the hypotheses none and parameters, which in a contrast mean "unchanged", to 0, and those of
+/// the others in proportion so that they add up to 1; sorts: the most probable first.
 void exclude_unchanged(std::vector<ScoredHypothesis>& hypotheses);
 
 /// Sets predicted_with of the conclusion: to the effects of the likeliest fitted hypothesis that contains the

@@ -1,4 +1,5 @@
-// A hypothesis as a vehicle that may fly next (gap/next/next_experiment.hpp). Question::rival makes it.
+// One explanation of the flights as a vehicle with its uncertainty, to predict what another flight would show if it were
+// true (gap/next/next_experiment.hpp). Question::rival makes it.
 #pragma once
 
 #include <string>
@@ -15,7 +16,8 @@ struct Rival {
   Eigen::VectorXd at;          ///< [coordinate]
   Directions directions;       ///< along which it is uncertain; none: nothing is
   Eigen::MatrixXd covariance;  ///< [direction][direction]
-  bool open;  ///< its effect was fitted only linearly: the vehicle of the parameters, with magnitudes added
+  bool
+      open;  ///< its effect was fitted only linearly; the vehicle has the fitted parameters, and magnitudes in addition
   VehicleHypothesis vehicle() const { return hypothesis.vehicle(at); }
 };
 
@@ -26,8 +28,8 @@ Rival certain_rival(const ScoredHypothesis& hypothesis, const Hypothesis& h, con
 /// A rival with parameters or effects as they were fitted, which may be out of their ranges. A rival that was left open
 /// has the parameters of `d`, and the root mean square of each magnitude under its posterior.
 Rival fitted_rival(const ScoredHypothesis& hypothesis, const Inference& d, const sim::Randomisation& uncertain);
-/// [direction] Columns along the first `shared` of `directions`, combined from those of `l`, which needs no simulation:
-/// both sets of directions span the same coordinates.
+/// [direction] Derivatives of the prediction along the first `shared` of `directions`: linear combinations of those of
+/// `l`, without a simulation, as both sets of directions span the same coordinates.
 std::vector<BasisCoefficients> turned(const Fit& l, const Directions& directions, Eigen::Index shared);
 
 }  // namespace flappy::gap

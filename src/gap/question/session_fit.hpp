@@ -7,14 +7,14 @@
 
 namespace flappy::gap {
 
-/// The effect that may act by one of its magnitudes alone: each is of one actuator.
+/// This effect has one magnitude for each actuator, and may act by one of them alone.
 inline constexpr const char* kActuatorLoss = "actuator_loss";
 
 /// Test flights as one session. Quantities are those of gap/session/quantities.hpp.
 class TestSession {
  public:
-  /// Keeps references to all but `prior` and `robot`. `quantities`: [test flight]; `density`: of the session; `robot`:
-  /// the vehicle of the references.
+  /// `tests`, `quantities` and `density` are not copied and have to outlive it. `quantities`: [test flight]; `density`: of
+  /// the session; `robot`: the vehicle that was fitted to the reference flights.
   TestSession(const FlightList& tests, const std::vector<FlightQuantities>& quantities, const SessionDensity& density,
               const SessionPrior& prior, const VehicleHypothesis& robot);
   const SessionDensity& density() const { return density_; }
@@ -39,9 +39,9 @@ struct EffectFit {
   std::vector<Eigen::Index> free;                               ///< coordinates that were fitted
 };
 
-/// Fits the last effect of `h`, jointly with the ones before it. The effect may act in several ways, which are equally
-/// probable: a loss of actuators by all of them or by each alone, and a damaged actuator may shake, or not. The
-/// evidence is the mean over all ways, the fit that of the most probable way.
+/// Fits all effects of `h` together, the last one in each of its ways, which are equally probable: a loss of actuators
+/// is one of all, or of one of them; a damaged actuator shakes, or does not. The evidence is the mean over all ways, the
+/// fit that of the most probable way.
 /// `law_error`: deviation of the robot's law of the effects from the catalogue's, as a share of what they change.
 /// `robot`: [coordinate] the references' parameters. `first`: a fit of the effects before the last; null: there are
 /// none.

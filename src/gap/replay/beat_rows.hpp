@@ -1,7 +1,7 @@
 // Projection of a signal r(t) onto beats. Near beat j, its mean and first harmonics are
-//   c_jh = (norm) sum_i hat(b_i - j - 1/2) f_h(b_i) r_i      f = 1, cos 2 pi b, sin 2 pi b, cos 4 pi b, ...
-// i: sample. b: time in beats. hat: falls from 1 to 0 over a beat to either side; all hats add up to 1. norm: 1 for f =
-// 1, else 2, over the sum of the hat's weights. The smooth window suppresses differenced noise, which alternates over
+//   c_jk = n_k / W_j sum_i hat(b_i - j - 1/2) f_k(b_i) r_i      f = 1, cos 2 pi b, sin 2 pi b, cos 4 pi b, ...
+// i: sample. b: time in beats. hat: falls from 1 to 0 over a beat to either side; all hats add up to 1. W_j: sum of the
+// hat's weights. n: 1 for the mean, else 2. The smooth window suppresses differenced noise, which alternates over
 // samples. Of each harmonic, rows keep changes slower than a few beats. Vehicles with wings and motors are compared by
 // these rows; of a beat-averaged vehicle the mean alone is used, without a projection.
 #pragma once

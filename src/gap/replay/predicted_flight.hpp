@@ -17,7 +17,7 @@
 namespace flappy::gap {
 
 enum Channel : int {
-  // of vehicles with wings, rows are relative to the recorded angular acceleration, so measured rows are 0
+  // these three, for vehicles with wings: predicted less recorded angular acceleration, so measured rows are 0
   kAngularAccelerationX,
   kAngularAccelerationY,
   kAngularAccelerationZ,  ///< rad/s^2, B
@@ -57,8 +57,8 @@ constexpr std::size_t row_of_mean(std::size_t beat, int channel) {
 /// A vehicle that may have flown a recording, and the errors of its sensors. Hypothesis::vehicle makes it.
 struct VehicleHypothesis {
   model::Vehicle vehicle;  ///< with its effects
-  /// By how much the inputs act later than the log says: a latency of all sensors that their headers do not declare; of
-  /// a beat-averaged vehicle, a delay of the commands.
+  /// By how much inputs act later than the log says, beyond what its header declares. For vehicles with wings: a latency
+  /// of all sensors. For beat-averaged ones: a delay of the commands.
   double lag_s = 0;
   EffectValues sensors;  ///< errors of declared sensors (gap/replay/sensor_correction.hpp); none if beat-averaged
   /// Draws of the vehicle's parameters. Two vehicles of one robot with the same draws differ in effects alone.
@@ -83,7 +83,7 @@ enum class BasisFunction {
   velocity_x,
   velocity_y,
   velocity_z,
-  drag_x,  ///< the velocity along x times its amount; y and z likewise
+  drag_x,  ///< |v| v_x, v: velocity in B; y and z likewise
   drag_y,
   drag_z,
   count
@@ -121,22 +121,21 @@ class PredictedFlight {
   virtual bool covers(std::size_t beat, int channel) const = 0;
   /// Whether a coefficient of a channel is compared at all.
   virtual bool has_rows(int channel, int coefficient) const = 0;
-  /// Whether the noise of a channel is learnt from its whole residual, less the mean of each session: the case for
-  /// moments that an autopilot counteracts.
+  /// Whether the noise of a channel is learnt from its whole residual, less the mean of each session. So for moments that
+  /// an autopilot counteracts.
   virtual bool disturbed(int /*channel*/) const { return false; }
   /// What the sensors measured.
   virtual const Rows& measured() const = 0;
-  /// The signal of each channel, of which the model discrepancy is a share: the measured rows, with exceptions. Of a
-  /// vehicle with wings: the recorded angular acceleration; the battery's voltage less its full voltage; constants for
-  /// path and rotate. Of moments that an autopilot counteracts, which add up to nothing: the root of the sum of the
-  /// squares of the single ones.
+  /// The size of each channel, relative to which the model discrepancy is stated: the measured rows, with exceptions.
+  /// For a vehicle with wings: the recorded angular acceleration; the battery's voltage less its full voltage; constants
+  /// for path and rotate. For moments under an autopilot, whose contributions cancel: the root of the sum of squares of
+  /// the contributions.
   virtual const Rows& signal() const = 0;
-  /// [vehicle] Rows that the sensors of each vehicle would have measured; empty if its simulation diverges. All effects
-  /// of `vehicle` are simulated but, of a vehicle with wings, those of sensors, which are undone in the log instead
-  /// (compare()).
+  /// [vehicle] Rows that the sensors of each vehicle would have measured; empty if its simulation diverges. Simulates
+  /// all effects, except those of sensors of vehicles with wings: compare() undoes these in the log instead.
   virtual std::vector<Rows> predict(const std::vector<const VehicleHypothesis*>& vehicles) const = 0;
-  /// [vehicle] What the flight measured, less what each vehicle predicts; empty if its simulation diverges. Takes as
-  /// many vehicles as predict(). residuals() calls it.
+  /// [vehicle] What the flight measured, less what each vehicle predicts; empty if its simulation diverges.
+  /// residuals() calls it.
   virtual std::vector<Rows> compare(const std::vector<ComparedVehicle>& vehicles) const;
   /// Rows that the declared noise of the sensors alone would give: one realisation for each seed.
   virtual Rows declared_noise(std::uint64_t seed) const = 0;
@@ -144,13 +143,14 @@ class PredictedFlight {
   virtual std::vector<RegimeFunction> functions() const = 0;
   /// Pairs of functions, by name, whose products complete the regime basis.
   virtual std::vector<std::pair<std::string, std::string>> products() const = 0;
-  /// Quantities whose thirds residuals are located by, and inputs that they may be proportional to.
+  /// regimes(): quantities whose range is split into thirds to say where residuals are large. inputs(): those to which
+  /// residuals may be proportional.
   virtual std::vector<RegimeQuantity> regimes() const = 0;
   virtual std::vector<RegimeQuantity> inputs() const = 0;
   /// Logarithm of the rms of the inputs' second differences, in shares of their ranges: how much the controller shakes
   /// while the robot is in the air. None for vehicles with wings, or where inputs do not change.
   virtual std::optional<double> log_input_noise() const { return {}; }
-  /// Whether rows are means over beats alone: of a beat-averaged vehicle.
+  /// Whether rows have means alone, no harmonics: those of a beat-averaged vehicle.
   virtual bool is_averaged() const = 0;
   /// Null for beat-averaged vehicles.
   virtual const Recording* recording() const { return nullptr; }

@@ -2,10 +2,10 @@
 // FOLDER/predicted.csv,
 //   t_s                                      on the clock of command.csv; covers the time common to motion capture and
 //                                            commands, in steps of at most half a period of beat.bandwidth_Hz
-//   force_x_N ... moment_z_Nm                in B, about the torso's origin: all but weight, for recorded inputs,
-//                                            motion, and coefficients of the vehicle file at predicted_at
+//   force_x_N ... moment_z_Nm                in B, about the torso's origin: the sum of all loads but weight, for the
+//                                            recorded inputs and motion, with each coefficient at its predicted_at
 //   d_NAME_force_x_N ... d_NAME_moment_z_Nm  derivatives by the coefficient NAME, per unit of NAME
-// The load is   load + sum d_NAME (NAME - predicted_at).   Missing columns are 0.
+// For other coefficients:   load = column + sum d_NAME (NAME - predicted_at).   Missing columns are 0.
 #pragma once
 
 #include <filesystem>

@@ -2,7 +2,7 @@
 // beat-averaged vehicles.
 //   which  a quantity of the flight against the mean of the others, in standard deviations between sessions
 //   when   the split of a series with the largest difference of means (Page, Biometrika 41, 1954; Hinkley, Biometrika
-//          57, 1970), in standard deviations of that difference, whose noise is autoregressive
+//          57, 1970), over the standard deviation of that difference, given that noise is autocorrelated
 #pragma once
 
 #include "gap/result/diagnosis.hpp"
@@ -15,8 +15,8 @@ namespace flappy::gap {
 std::vector<OddFlight> odd_flights(const std::vector<std::string>& names, const std::vector<FlightQuantities>& flights,
                                    const SessionScatter& scatter, const SessionPrior& prior);
 
-/// A step in the thrust or in a moment of a flight. SessionContrast reports a step
-/// only if it is far clearer than those within the references.
+/// A jump of the thrust or of a torque within a flight. SessionContrast reports it only if it is far clearer than those
+/// within the reference flights.
 struct StepWithin {
   std::string quantity;
   double since_s = 0;  ///< from the begin of the recorded motion on
