@@ -9,13 +9,15 @@
 
 namespace flappy::gap {
 
-/// Throws io::InputError if a stream is in flights of one set and in none of the other: what is not seen before cannot
-/// change. `logs`: so many `references`, then test flights; `folders`: for messages.
+/// Throws io::InputError if a stream is in some references and in no test flight, or the reverse: what was not seen
+/// before cannot change. `logs`: first `references` reference flights, then test flights; `folders`: [log], for
+/// messages.
 void check_same_streams(const std::vector<flightlog::FlightLog>& logs, const std::vector<std::string>& folders,
                         std::size_t references);
 
-/// One line for each thing that makes the answer less sure, with what it costs: another vehicle file, other sensors,
-/// too short flights, references of one session, regimes that the references never have. `headers`: [flight].
+/// Returns a line for each thing that makes the answer less sure, and says in it what that costs: vehicle files or
+/// sensors that differ, flights that are too short, references of one session alone, regimes of the tests that the
+/// references never have. `headers`: [flight].
 std::vector<std::string> contrast_warnings(const std::vector<flightlog::FlightHeader>& headers, const Flights& flights);
 
 }  // namespace flappy::gap

@@ -6,10 +6,11 @@
 
 namespace flappy::gap {
 
-/// The vehicle with the parameters and effects of inference.corrected. Its posterior (model::Posterior) has the
-/// uncertainty of parameters and effects of inference.predicting(); background magnitudes are certain there. Minor
-/// draws of `inference` shift parameters and do not enter the posterior. The conclusion none leaves the vehicle as it
-/// is, except for its name. `vehicle`: the vehicle file; `uncertain`: the same with the priors of its parameters.
+/// Returns the vehicle with the parameters and effects of inference.corrected. Its posterior (model::Posterior) has the
+/// uncertainty of the parameters and effects of inference.predicting(); effects that inference.corrected has in
+/// addition (background magnitudes) count as certain. The minor draws shift parameters and are not in the posterior. If
+/// predicting() is the hypothesis none, only the name changes. `vehicle`: the vehicle file; `uncertain`: the same with
+/// the priors of its parameters.
 model::Vehicle corrected_vehicle(const model::Vehicle& vehicle, const Inference& inference,
                                  sim::Randomisation uncertain);
 

@@ -1,5 +1,5 @@
 // The middle of a diagnosis: effects are screened, fitted, and combined into hypotheses with several effects. infer()
-// calls these functions in the order in which they stand here.
+// calls, in this order: weigh_baselines, screen_catalogue, single_effects, raise_baselines, combine, with_remainders.
 #pragma once
 
 #include "gap/question/question.hpp"
@@ -13,13 +13,14 @@ struct Baselines {
 };
 Baselines weigh_baselines(const Question& question, const RobotFit& robot, const VerdictRule& rule);
 
-/// Raises what has no effect to what deviations from all laws explain (Question::other_laws): the parameters, and with
-/// them effects that are fitted only linearly, by those of harmless changes; an unknown cause, which pays its penalty, by
-/// any. `singles`: each effect alone.
+/// Raises the log evidence of baselines to what deviations from the laws of effects explain without an effect
+/// (Question::other_laws), where that is more. For the parameters, only deviations of harmless changes count; effects
+/// that are fitted only linearly gain as much. For an unknown cause all count, less its penalty. `singles`: each effect
+/// alone; is sorted again.
 void raise_baselines(const Question& question, const RobotFit& robot, const VerdictRule& rule, int threads,
                      std::vector<ScoredHypothesis>& singles, Baselines& baselines);
 
-/// Effects of the catalogue by falling screened gain: the first options.max_finalists, and the others.
+/// Effects of the catalogue, the largest gain in screening first. The first options.max_finalists are finalists.
 struct ScreenedCatalogue {
   std::vector<ScreenedEffect> finalists, others;
   std::vector<std::string> untestable;  ///< effects that cannot show in these logs
@@ -33,21 +34,22 @@ class EffectFits {
   EffectFits(const Question& question, const RobotFit& robot, const Baselines& baselines,
              const InferenceOptions& options, int threads);
 
-  /// A hypothesis for each effect, the one that explains most first. Finalists are fitted by simulation if
-  /// `by_simulation`, and keep a linear fit where the simulated one did not find the effect; others are fitted
+  /// Returns a hypothesis for each effect, the one that explains most first. If `by_simulation`, finalists are fitted
+  /// by simulation; where that fit does not find the effect, the finalist gets a linear fit. All others are fitted
   /// linearly.
   std::vector<ScoredHypothesis> single_effects(const ScreenedCatalogue& catalogue, bool by_simulation) const;
 
   struct Sets {
     std::vector<ScoredHypothesis> hypotheses;  ///< with one effect and with several, the one that explains most first
-    Scales scales;                             ///< scales of the parameters alone, searched from those of the best set
+    Scales scales;                             ///< of the parameters alone; the search began at those of the best set
   };
-  /// Effects join the set that explains most, one after another, as long as a set gains more than by chance. `singles`:
-  /// of single_effects. `progress` returns false to stop.
+  /// Adds effects to the set that explains most, one after another, as long as this gains more than by chance. Returns
+  /// `singles`, of single_effects(), and the larger sets. `progress` returns false to stop.
   Sets combine(std::vector<ScoredHypothesis> singles,
                const std::function<bool(double, const std::string&)>& progress) const;
 
-  /// The few hypotheses that explain most, each once more with a remainder, if one is found. Arguments as in Sets.
+  /// Returns the few hypotheses that explain most, each with a remainder in addition; left out if no remainder is
+  /// found. Arguments: the members of Sets.
   std::vector<ScoredHypothesis> with_remainders(const std::vector<ScoredHypothesis>& hypotheses,
                                                 const Scales& scales) const;
 

@@ -1,7 +1,7 @@
 // The whole of a diagnosis, from flights to the probabilities of all hypotheses. In this order: the robot's parameters
-// (RobotFit); evidence without effects; screening of the catalogue; single effects, then sets and remainders
-// (EffectFits); flights held out; verdict (verdict.hpp); corrected vehicle. What each step does differently in a
-// contrast or of a beat-averaged vehicle is the Question's (gap/question/).
+// (RobotFit); evidence of hypotheses without effects; screening of the catalogue; single effects, then sets and
+// remainders (EffectFits); flights held out; verdict (verdict.hpp); corrected vehicle. What a step does differently in
+// a contrast, or for a beat-averaged vehicle, is in the class Question (gap/question/).
 #pragma once
 
 #include "gap/question/inferred.hpp"

@@ -12,8 +12,9 @@ namespace flappy::gap {
 /// The result for faulty data: the verdict `data`. `folders`: of the logs.
 Diagnosis result_of(const std::vector<std::string>& folders, std::vector<flightlog::DataFault> faults);
 
-/// The result without warnings, references' folders, closed-loop check and proposed flight: diagnose() and its
-/// companions add these. `folders`: [test flight]. `uncertain`: with the minor draws of the inference.
+/// Returns the result without warnings, folders of the references, closed-loop check and proposed flight: diagnose(),
+/// fly_closed_loop() and propose_experiment() add these. `folders`: [test flight]. `uncertain`: with its minor draws at
+/// those of the inference.
 Diagnosis result_of(const std::vector<std::string>& folders, const Flights& flights,
                     const sim::Randomisation& uncertain, const Inference& inference);
 

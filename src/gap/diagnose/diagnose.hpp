@@ -1,5 +1,5 @@
 // A diagnosis from a vehicle file, flight logs and settings: the only entry point for all front ends and the blind
-// benchmark. In this order: read_request, diagnose, then fly_closed_loop and propose_experiment, which may be left out.
+// benchmark. Call, in this order, read_request and diagnose; then, if wanted, fly_closed_loop and propose_experiment.
 #pragma once
 
 #include <functional>
@@ -16,18 +16,18 @@ namespace flappy::gap {
 
 struct DiagnosisSettings {
   std::string vehicle;               ///< the vehicle file
-  std::vector<std::string> flights;  ///< folders of logs, or of a session: a folder with such folders
-  /// Folders of logs of the same robot from before the change that the flights are asked about; empty: no contrast.
-  /// NAME=LOG begins a named set, to which the logs after it belong. The unnamed or first set is the reference; every
-  /// other set is asked about as the flights are.
+  std::vector<std::string> flights;  ///< each the folder of a log, or of a session, which has folders of logs
+  /// Folders as in `flights`, of the same robot's flights before the change in question; empty: no contrast. NAME=LOG
+  /// begins a named set, to which the logs after it belong; logs before the first NAME are an unnamed set. The first
+  /// set is the reference; each other set is compared with it, as `flights` are.
   std::vector<std::string> reference;
-  /// Empty: the files of configs/gap, or of configs/gap/beat_averaged for a beat-averaged vehicle.
+  /// Files; empty: those of configs/gap, or of configs/gap/beat_averaged for a beat-averaged vehicle.
   std::string priors, discrepancy, verdict, sessions;
-  std::vector<std::string> withheld;  ///< effects to leave out of the catalogue, one by one (cf. DiagnoseCommand)
+  std::vector<std::string> withheld;  ///< effects to leave out of the catalogue; not their groups (cf. DiagnoseCommand)
   /// For a beat-averaged vehicle, the only channels that count; empty: all that it compares.
   std::vector<std::string> channels;
-  /// flappy-fly configuration of the flights. Empty: simulations follow the recorded paths with the controller of
-  /// fly/hover.toml.
+  /// flappy-fly configuration by which the flights were flown, for the closed-loop check. Empty: simulations follow the
+  /// recorded paths with the controller of fly/hover.toml.
   std::string manoeuvre;
   std::string experiments;  ///< folder of manoeuvres, one of which may be proposed; empty: configs/gap/experiments
   int threads = 0;          ///< 0: one for each processor
@@ -39,15 +39,15 @@ struct NamedFlights {
   std::vector<std::string> flights;  ///< folders
 };
 
-/// Splits DiagnosisSettings::reference into its sets; the first one is the reference. io::InputError for NAME=LOG whose
-/// name is none.
+/// Splits DiagnosisSettings::reference into its sets; the first one is the reference. io::InputError if NAME is empty,
+/// or has a space, a dot or a slash.
 std::vector<NamedFlights> sets_of(const std::vector<std::string>& reference);
 
-/// Settings with all files but the logs read.
+/// The settings, and the contents of all files that they name, except the logs.
 struct DiagnosisRequest {
   DiagnosisSettings settings;  ///< folders of sessions replaced by those of their logs; `reference`: the first set
   std::vector<NamedFlights> others;  ///< the other sets of `reference`
-  /// By the folder of a log: the folder of a session in which it was given.
+  /// [folder of a log] The folder of the session in which it was given.
   std::map<std::string, std::string> sessions;
   model::Vehicle vehicle;
   sim::Randomisation uncertain;  ///< the vehicle with the priors of its parameters
@@ -68,11 +68,11 @@ struct Diagnosed {
   std::optional<sim::Randomisation> uncertain;  ///< with the minor draws at their estimates
   Inference inference;
 };
-/// Diagnoses the flights, then each other set. Flights with faulty data are left out while half of their set or more is
-/// sound, flights that are too short while others remain; warnings say so. With fewer sound flights nothing is
-/// diagnosed, and the verdict is `data`. `progress` returns false to stop before the next effect is fitted.
-/// io::InputError for a log that cannot be read, or that the vehicle cannot have flown; in a contrast for logs with
-/// different streams; for too few rows of a beat-averaged vehicle.
+/// Diagnoses the flights, then each other set. Leaves out flights with faulty data if half of their set or more is
+/// sound; else nothing is diagnosed, and the verdict is `data`. Leaves out flights that are too short if others remain.
+/// Warnings name what was left out. `progress` returns false to stop before the next effect is fitted. io::InputError
+/// if a log cannot be read, or the vehicle cannot have flown it; if streams differ in a contrast; if flights of a
+/// beat-averaged vehicle have too few rows.
 Diagnosed diagnose(const DiagnosisRequest& request,
                    const std::function<bool(double share, const std::string& what)>& progress = {});
 

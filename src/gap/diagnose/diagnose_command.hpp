@@ -1,5 +1,5 @@
-// flappy-gap diagnose: a diagnosis (diagnose.hpp) with its progress line, its files and its summary. The program, which
-// jobs of the server run, and the Python module call it; the blind benchmark calls diagnose() itself.
+// flappy-gap diagnose: a diagnosis (diagnose.hpp) with its progress line, its files and its summary. The program (also
+// in jobs of the server) and the Python module call it; the blind benchmark calls diagnose() itself.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -10,8 +10,8 @@ namespace flappy::gap {
 
 struct DiagnoseCommand {
   DiagnosisSettings settings;  ///< each withheld effect withholds its whole group of the catalogue
-  /// Folder for diagnosis.json, log.txt and, unless the data are at fault or it was stopped, vehicle_corrected.toml;
-  /// those of an earlier diagnosis are removed. Empty: no files are written.
+  /// Folder for diagnosis.json, log.txt and vehicle_corrected.toml; the last is not written if the data are faulty or
+  /// the diagnosis was stopped. Files of an earlier diagnosis are removed. Empty: no files are written.
   std::string out;
   bool quiet = false;  ///< prints no summary
 };

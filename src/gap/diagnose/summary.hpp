@@ -11,7 +11,7 @@ namespace flappy::gap {
 /// Largest number of lines. Size: of what is printed.
 inline constexpr std::size_t kSummaryLines = 30;
 
-/// The summary for a person, line by line. It has kSummaryLines or fewer, but for long lists of warnings or sets.
+/// Returns the lines of the summary for a person. They are kSummaryLines or fewer, unless warnings or sets are many.
 /// `out`: folder of the files, which the last line names; empty: none were written.
 std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::string& out);
 

@@ -1,5 +1,5 @@
-// Prior standard deviations of the coefficients of a regime basis, as shares of the signal of their channel. The model
-// discrepancy has a table of these, and the session variation another.
+// Prior standard deviations of the coefficients of a regime basis, divided by the signal of their channel: shares. The
+// model discrepancy has one table of shares, the session variation another.
 #pragma once
 
 #include <array>
@@ -25,7 +25,7 @@ inline double share_of(const Shares& shares, int channel, int harmonic, BasisFun
 Shares read_shares(const io::Table& root);
 /// The text that read_shares reads.
 std::string shares_text(const Shares& shares);
-/// Comment in files after `other` of the background magnitudes, which learning does not change.
+/// Comment in files after the entry `other` of [background_sd]. Learning does not change that entry.
 inline constexpr const char* kOthers = "  # Of effects that are not listed. Choice.";
 
 }  // namespace flappy::gap

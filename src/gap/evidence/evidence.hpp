@@ -4,8 +4,8 @@
 //   theta  unknowns of the hypothesis, standard normal a priori, shared by all groups
 //   delta  model discrepancy: what every model gets wrong, a smooth function of input and motion (RegimeBasis),
 //          N(0, (share x signal)^2); an effect has to explain more than this
-//   noise  first-order autoregressive over beats; standard deviation and autocorrelation of each group, learnt from
-//          what the whole basis leaves; heavy-tailed: rows far off count less (Student t)
+//   noise  first-order autoregressive over beats; each group has a standard deviation and an autocorrelation, learnt
+//          from what a fit of the whole basis leaves; heavy-tailed: rows far off count less (Student t)
 // theta and delta are integrated out (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, ch. 2.7):
 //   log p(residual) = -1/2 r^T K^-1 r - 1/2 log det K + const
 #pragma once
@@ -28,9 +28,10 @@ namespace flappy::gap {
 /// Number of groups; [group] is channel x kCoefficients + coefficient.
 inline constexpr int kGroups = kChannels * kCoefficients;
 
-/// Smooth functions of the regime; [basis] is an index of them. The first is the constant; over all flights each other
-/// one has mean 0 and rms 1. One that never changes is left out. In a contrast, each function but the offsets of
-/// flights follows a second time, as what differs in the test flights: 0 in the references, as it is in the tests.
+/// Smooth functions of the regime; [basis] is the index of a function. The first is the constant; each other one has
+/// mean 0 and rms 1 over all flights. Functions that never change are left out. In a contrast, copies of all functions
+/// except the offsets of flights follow: a copy is 0 in the references and equal to the function in the tests, for what
+/// differs there.
 class RegimeBasis {
  public:
   /// io::InputError if flights have different functions.
@@ -39,15 +40,15 @@ class RegimeBasis {
   const std::string& name(int i) const { return function(i).name; }
   const std::string& quantity(int i) const { return function(i).quantity; }
   BasisFunction kind(int i) const { return function(i).kind; }
-  /// Whether a function is 0 in the references. These functions come last; none without references.
+  /// Whether a function is such a copy, so 0 in the references. Copies come last; there are none without references.
   bool of_tests(int i) const { return function(i).of_tests; }
-  /// [group][basis] The same change in the test flights alone. `coefficients`: [group][basis] of a change in all
-  /// flights. Only in a contrast, as in_all().
+  /// [group][basis] Coefficients of a change that acts in the test flights alone. `coefficients`: [group][basis] of the
+  /// same change in all flights. in_tests() and in_all() are for contrasts only.
   Eigen::MatrixXd in_tests(const Eigen::MatrixXd& coefficients) const { return coefficients * in_tests_; }
-  /// [group][basis] A change of the test flights alone, as it would be in all flights.
+  /// The reverse: from a change in the test flights alone to the same in all flights.
   Eigen::MatrixXd in_all(const Eigen::MatrixXd& coefficients) const { return coefficients * in_all_; }
-  /// [function][function] Takes the values of a reference flight to those that it would have as one of the tests
-  /// (`as_test`) or as a reference, without offsets of flights.
+  /// [function][function] Matrix that turns a reference flight's values of the functions into those that it would have
+  /// as a test (`as_test`) or as a reference, without offsets of flights.
   Eigen::MatrixXd without_offsets(bool as_test) const;
   /// Whether the references vary enough in this class of regimes to tell what differs in the tests.
   bool covers(Regimes regimes) const { return covered_[static_cast<std::size_t>(regimes)]; }
@@ -72,7 +73,7 @@ class RegimeBasis {
   std::array<bool, static_cast<std::size_t>(Regimes::count)> covered_{};
 };
 
-/// The part of rows that is a smooth function of the regime: [group][basis].
+/// The part of rows that is a smooth function of the regime, as coefficients of the basis: [group][basis].
 using BasisCoefficients = Eigen::MatrixXd;
 
 /// Regressors of the residual; the priors of their coefficients are normal with standard deviation 1. All lists are
@@ -87,15 +88,14 @@ struct Regressors {
   void add(const BasisCoefficients& column, double prior_mean, int effect = -1, ScalePrior prior = {});
 };
 
-/// All that evidence needs of a residual: sums over the whitened rows of a group, basis x residual,
-/// [flight][group][basis].
+/// All that evidence needs of a residual: [flight][group][basis] the sum of basis x residual over the whitened rows.
 struct SufficientStatistics {
   std::vector<std::vector<Eigen::VectorXd>> sums;
 };
 
 /// Regressors and residual with delta integrated out.
 struct Reduced {
-  Eigen::MatrixXd sums;  ///< sums of products of the regressors and, last, the residual; square
+  Eigen::MatrixXd sums;  ///< [i][j] sum of products of regressors i and j; the residual counts as the last one
   double log_scale = 0;  ///< contribution of delta to the log evidence: minus half the log determinant of its precision
 };
 
@@ -118,7 +118,7 @@ struct Reduced {
 //     velocity_x   velocity     [ g ]    [ h     h ]  [ i     i ]     what differs in the tests: kClasses.
 //     height       place        [ j ]    [ k     k ]  [ l     l ]
 //
-/// Classes of functions whose coefficients share a scale: Regimes, and again for those of the test flights.
+/// Classes of functions whose coefficients share a scale: Regimes, and once more for the copies in the test flights.
 inline constexpr int kRegimes = static_cast<int>(Regimes::count), kClasses = 2 * kRegimes;
 /// Blocks: [channel][harmonic][class].
 inline constexpr int kBlocks = kChannels * (kHarmonics + 1) * kClasses;
@@ -132,18 +132,18 @@ struct Scales {
   std::vector<double> effects;  ///< scale of the background magnitude of each effect; empty: 1
   std::vector<double> blocks;   ///< [kBlocks] scale of delta; empty: 1
   std::vector<char> free;       ///< [kBlocks] whether an unknown cause lets the block exceed its prior
-  /// The scales of the test flights at the centres of their priors.
+  /// Sets the scales of the test flights to the centres of their priors.
   void centre_tests(const SessionVariation& sessions);
   /// Prior scale of a background magnitude.
   double prior_scale(ScalePrior prior) const { return prior.follows_robot ? robot : prior.centre; }
   double block(std::size_t b) const { return blocks.empty() ? 1 : blocks[b]; }
-  /// Centre of the scales of blocks.
+  /// Scale about which that of block `b` varies.
   double centre(std::size_t b) const { return block_of_tests(b) ? session : robot; }
 };
 
-/// Of coefficients, [regressor], or of a fit's directions (Fit::posterior).
+/// Posterior of coefficients, [regressor], or of distances along a fit's directions (Fit::posterior).
 struct Posterior {
-  double log_evidence = 0;  ///< nats, but for a constant that all hypotheses of a robot share
+  double log_evidence = 0;  ///< nats, up to a constant that all hypotheses of a robot share
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;
 };
@@ -152,9 +152,11 @@ struct Posterior {
 struct ScaledEvidence {
   Posterior posterior;  ///< its evidence includes the prior of the scales
   Scales scales;
-  double law_factor = 1;      ///< as Fit::law_factor
-  BasisCoefficients delta;    ///< posterior mean of delta, with deviations of laws, over its prior standard deviation
-  BasisCoefficients squares;  ///< expected squares of delta over its prior's at scale 1; 0 in groups without rows
+  double law_factor = 1;  ///< as Fit::law_factor
+  /// Posterior mean of delta, including deviations of laws, divided by its prior standard deviation.
+  BasisCoefficients delta;
+  /// Expected squares of delta, divided by its prior variance at scale 1; 0 in groups without rows.
+  BasisCoefficients squares;
 };
 
 /// Rows of flights, whitened by a model of their noise. Immutable: with_... return a changed copy.
@@ -163,39 +165,40 @@ class Evidence {
   /// With the noise that the headers declare. Keeps references to `rules` and `flights`.
   Evidence(const EvidenceRules& rules, const Flights& flights, ModelDiscrepancy discrepancy, int threads);
 
-  /// Learns standard deviation, autocorrelation and weights of outliers from what the whole basis leaves of the
-  /// residual of a good fit. The noise is at least the declared one.
+  /// A copy with the noise learnt: standard deviation, autocorrelation and weights of outliers, from what the whole
+  /// basis leaves of the residual of a good fit. The noise is no less than the declared one.
   Evidence with_noise(const Residuals& residual) const;
-  /// Learns only the weights of outliers: for the residual of the vehicle file, before the first fit.
+  /// A copy with only the weights of outliers learnt, for the residual of the vehicle file, before the first fit.
   Evidence with_weights(const Residuals& residual) const;
-  /// As with_noise, from the whole residual with its smooth part. From then on, scales stay 1 except of free blocks.
+  /// As with_noise, but from the whole residual: its smooth part counts as noise, too. In the copy, scales stay 1,
+  /// except those of free blocks.
   Evidence with_rest_as_noise(const Residuals& residual) const;
   Evidence with_discrepancy(ModelDiscrepancy discrepancy) const;
-  /// As if these flights, which are references, were the tests: a contrast among references. Flights have no offsets.
-  /// `tests`: [flight] whether it is one; `statistics`: of a residual, is changed to those of the contrast.
+  /// A copy for a contrast among references: some of them count as the tests, and flights have no offsets. `tests`:
+  /// [flight] whether it counts as one; `statistics`: those of a residual, which become those of this contrast.
   Evidence with_tests(const std::vector<char>& tests, SufficientStatistics& statistics) const;
 
   const RegimeBasis& basis() const { return *basis_; }
   const ModelDiscrepancy& discrepancy() const { return discrepancy_; }
 
-  /// [group][basis] Coefficients of rows on the basis, by least squares: how all columns are made of simulated
-  /// differences. These are rough, as a small change moves the step in which a wing meets its stop; what is not smooth
-  /// in the regime is noise under every hypothesis.
+  /// [group][basis] Coefficients of the basis that fit rows best, by least squares. All columns are made in this way
+  /// from differences of simulations. The differences are rough, as a small change moves the step in which a wing meets
+  /// its stop; their part that is not smooth in the regime is noise under every hypothesis.
   BasisCoefficients basis_coefficients(const Residuals& rows) const;
-  /// Of a residual that is not empty.
+  /// Statistics of a residual that is not empty.
   SufficientStatistics statistics(const Residuals& residual) const;
-  /// Adds `share` times a smooth change to the residual of `to`.
+  /// Changes `to` as if its residual had `share` times a smooth change in addition.
   void add(double share, const BasisCoefficients& change, SufficientStatistics& to) const;
-  /// The residual of a flight, an index of Flights, less a smooth change.
+  /// Returns the rows `residual` of a flight less a smooth change. `flight`: index in Flights.
   Rows without(std::size_t flight, Rows residual, const BasisCoefficients& change) const;
 
   /// Prior standard deviation of the discrepancy coefficients, [group][basis].
   BasisCoefficients discrepancy_sd(const Scales& scales) const;
-  /// Integrates delta out. `use`: [flight] whether it counts. `discrepancy_sd`: [group][basis].
+  /// Returns sums with delta integrated out. `use`: [flight] whether it counts. `discrepancy_sd`: [group][basis].
   Reduced reduce(const SufficientStatistics& residual, const std::vector<const BasisCoefficients*>& regressors,
                  const std::vector<char>& use, const BasisCoefficients& discrepancy_sd) const;
-  /// The same for several residuals under one prior. Statistics without sums give nothing. `known`: sums of products of
-  /// the regressors from an earlier call; null: computed.
+  /// [residual] The same for several residuals under one prior; none for statistics without sums. `known`: sums of
+  /// products of the regressors from an earlier call; null: to be computed.
   std::vector<std::optional<Reduced>> reduce_each(const std::vector<SufficientStatistics>& residuals,
                                                   const std::vector<const BasisCoefficients*>& regressors,
                                                   const std::vector<char>& use, const BasisCoefficients& discrepancy_sd,
@@ -208,22 +211,22 @@ class Evidence {
   static Posterior posterior(const Reduced& reduced, const std::vector<int>& chosen, const Eigen::VectorXd& prior_mean,
                              bool covariance = true);
 
-  /// Expectation-maximisation over the scales from `start` on (weigh.cpp). `law_sd`: [group][basis] standard deviation
-  /// of the deviations of the effects' laws, which no scale changes; empty: 0. `unknown_penalty_nats`: penalty of each
-  /// free block; none: no block is free.
+  /// Evidence at its maximum over the scales, by expectation-maximisation from `start` on (weigh.cpp). `law_sd`:
+  /// [group][basis] standard deviation of the deviations of the effects' laws, which no scale changes; empty: 0.
+  /// `unknown_penalty_nats`: penalty of each free block; none: no block is free.
   ScaledEvidence weigh(const SufficientStatistics& residual, const Regressors& regressors, const std::vector<char>& use,
                        const BasisCoefficients& law_sd, const Scales& start,
                        std::optional<double> unknown_penalty_nats = {}, int max_iterations = kMaxIterations) const;
   /// Largest number of iterations of a search for scales. Choice.
   static constexpr int kMaxIterations = 40;
-  /// Log-prior cost, in nats, of a background magnitude that is `times` its prior.
+  /// Log-prior cost, in nats, of a background magnitude whose scale is `times`.
   static double scale_cost_nats(double times, ScalePrior prior, const Scales& scales);
   /// Block of a function of the basis in a group.
   int block_of(int group, int function) const;
 
   /// Standard deviation of the noise of a row of a group, in the channel's unit.
   double noise_sd(int group) const;
-  /// Rms of the signal of a group; its mean square is averaged with that of its channel.
+  /// Rms of the signal of a group: the root of the average of its own mean square and its channel's.
   double signal(int group) const { return groups_[static_cast<std::size_t>(group)].signal; }
 
  private:

@@ -13,13 +13,14 @@
 
 namespace flappy::gap {
 
-/// Classes of kinds of functions; those of a class share a scale in each channel and harmonic.
+/// Classes of basis functions. The coefficients of a class share a scale in each channel and harmonic.
 enum class Regimes { always, inputs, velocity, place, count };
 Regimes regimes_of(BasisFunction function);
 
 struct ModelDiscrepancy {
-  /// Priors of how far models of one robot are off: log robot ~ N(0, robot_sd^2); (block / robot)^2 ~ inverse gamma for
-  /// each class of regimes in a channel and harmonic: heavy tails.
+  /// Priors of the scales by which models of one robot are off (Scales). The robot's: log robot ~ N(0, robot_sd^2).
+  /// That of each block: (block / robot)^2 ~ inverse gamma, which has heavy tails; ..._freedom are its degrees of
+  /// freedom.
   struct Spread {
     double robot_sd;
     double block_freedom;
@@ -27,7 +28,7 @@ struct ModelDiscrepancy {
     double effect_freedom;  ///< for background magnitudes, except those of effects in `of_models`
     double model_freedom;   ///< for background magnitudes of effects in `of_models`
   } spread{};
-  /// An error of a declared sensor, under every hypothesis, with its prior standard deviation.
+  /// An error of a declared sensor, which every hypothesis includes, with its prior standard deviation.
   struct Nuisance {
     std::string id, value;  ///< error and its parameter, as in gap/replay/sensor_correction.hpp
     double sd;
@@ -44,23 +45,24 @@ struct ModelDiscrepancy {
   double freedom_of(Regimes regimes) const {
     return regimes == Regimes::place ? spread.place_freedom : spread.block_freedom;
   }
-  /// Prior of the scale of a background magnitude: of an effect, perhaps with one of the prefixes or the suffix below.
+  /// Prior of the scale of a background magnitude. `effect`: an effect, perhaps with one of the prefixes or the suffix
+  /// below.
   ScalePrior scale_prior(const std::string& effect) const;
 
   Shares shares{};
   SessionVariation session;                  ///< only used in a contrast
   std::map<std::string, double> background;  ///< background_sd by effect; "other": effects that are not listed
-  /// Effects of wings, hinges and drive, which models describe differently: their background follows the robot
-  /// (model_freedom).
+  /// Effects of wings, hinges and drive, for which each model has other laws: the scale of their background is centred
+  /// on the robot's, with model_freedom.
   std::vector<std::string> of_models;
-  bool beat_averaged = false;  ///< every background magnitude follows the robot, with spread.effect_freedom
+  bool beat_averaged = false;  ///< all scales of backgrounds are centred on the robot's, with effect_freedom
 };
 
-/// Names of what changes between sessions, as background magnitudes: the parameters together, and this prefix of an
+/// Names of background magnitudes for what changes between sessions: of all parameters together; a prefix for an
 /// effect.
 inline constexpr const char *kSessionParameters = "session of parameters", *kSessionOf = "session of ";
 
-/// Prefix of an effect's background magnitude in all flights of a contrast: what the model gets wrong in both sessions.
+/// Prefix of a background magnitude that acts in all flights of a contrast: what the model gets wrong in both sessions.
 inline constexpr const char* kModelOf = "model of ";
 
 /// Suffix of the background magnitude that both wings share, for an effect with a magnitude for each wing.

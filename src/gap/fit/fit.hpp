@@ -13,7 +13,7 @@
 //   fit_given    move        move       Question::refit_jointly of Alone, for the best effects; fit_set of BeatAveraged
 //   joint_fit    linear      linear     after one of these: flights held out, corrected vehicle, changes of sessions
 //
-// "linear": it gets a posterior by the columns, and nothing is simulated there.
+// "linear": their posterior follows from the columns, the derivatives; nothing is simulated for it.
 #pragma once
 
 #include <map>
@@ -28,7 +28,7 @@ namespace flappy::gap {
 /// Orthonormal directions through the coordinates of a hypothesis, in prior standard deviations.
 struct Directions {
   Eigen::MatrixXd axes;   ///< [coordinate][direction]
-  Eigen::VectorXd reach;  ///< [direction] distance of each side of the difference
+  Eigen::VectorXd reach;  ///< [direction] distance from the point to each side of the difference
 };
 
 /// A hypothesis linearised at given coordinates, and its posterior there.
@@ -37,7 +37,8 @@ struct Fit {
   Directions directions;
   Residuals residual;               ///< [flight] measured less predicted at `at`; empty: not simulated, or it diverged
   SufficientStatistics statistics;  ///< statistics of the residual, averaged over points around `at`
-  /// [direction][group][basis] change of the prediction per unit along it; empty if the simulation diverges there.
+  /// [direction][group][basis] change of the prediction per unit along the direction; empty if the simulation diverges
+  /// there.
   std::vector<BasisCoefficients> columns;
   double law_factor = 1;  ///< factor on how far the laws of its effects may deviate from the catalogue's (law_sd)
   Posterior posterior;    ///< [direction], relative to `at`; its log evidence is with the fitter's scales, in nats
@@ -47,11 +48,11 @@ struct Fit {
   Eigen::MatrixXd covariance() const;
 };
 
-/// Background magnitude of an effect: a regressor whose coefficient is standard normal a priori, times a scale
-/// (Scales::effects). In a contrast also what sessions differ by.
+/// Background magnitude of an effect, as a regressor. A priori its coefficient is standard normal, times a scale
+/// (Scales::effects). In a contrast also a change between sessions (RobotFit::session_changes).
 struct Background {
-  /// An unknown of an effect ("": of those that all hypotheses share), by index, and by how much the column moves its
-  /// coordinate.
+  /// By how much the column moves the coordinate of an unknown. `unknown`: index among the unknowns of `effect`; if
+  /// that is "", among those that all hypotheses share.
   struct Move {
     std::string effect;
     Eigen::Index unknown;
@@ -59,22 +60,23 @@ struct Background {
   };
   std::string effect;            ///< name of its scale: an effect, perhaps with kOfBoth, kModelOf or kSessionOf
   BasisCoefficients column;      ///< [group][basis]
-  std::vector<Move> moves = {};  ///< empty: the column is no vehicle's, as that of a shape
+  std::vector<Move> moves = {};  ///< empty: the column belongs to no unknown, as that of a shape or sensor
 };
 
 /// Fits hypotheses, given evidence, nuisance regressors and scales. Immutable: with_... return a changed copy.
 class Fitter {
  public:
-  /// Columns of magnitudes, change per prior standard deviation, by [effect, name].
+  /// [effect, name] Columns of magnitudes: change of the prediction per prior standard deviation.
   using LinearMagnitudes = std::map<std::pair<std::string, std::string>, BasisCoefficients>;
 
   /// Without nuisance regressors; scales are 1. Keeps references to `rules` and `flights`.
   Fitter(const FitRules& rules, const Flights& flights, std::shared_ptr<const Evidence> evidence, int threads);
   Fitter with_evidence(std::shared_ptr<const Evidence> evidence) const;
-  /// Fits `nuisances`, then `background`, jointly with every hypothesis. A hypothesis keeps the background of effects
-  /// that it names. Leaves out regressors on which the flights have no information, given `fit`.
+  /// A fitter that fits `nuisances` and `background`, in this order, jointly with every hypothesis, even the background
+  /// of effects that the hypothesis has. It leaves out regressors on which the flights have no information, given
+  /// `fit`.
   Fitter with_nuisances(const Regressors& nuisances, const std::vector<Background>& background, const Fit& fit) const;
-  /// Columns of magnitudes that act linearly and need not be simulated.
+  /// A fitter with these columns of magnitudes, which act linearly and are not simulated.
   Fitter with_linear_magnitudes(LinearMagnitudes magnitudes) const;
   Fitter with_scales(Scales scales) const;
   Fitter without_background() const;
@@ -84,14 +86,14 @@ class Fitter {
   int threads() const { return threads_; }
   const Evidence& evidence() const { return *evidence_; }
   const Scales& scales() const { return scales_; }
-  /// Names of Scales::effects.
+  /// [index in Scales::effects] Names.
   const std::vector<std::string>& effects() const { return effects_; }
   /// Index of a name in effects(), so in Scales::effects; -1: none.
   int place_of(const std::string& effect) const;
   std::vector<char> all_flights() const { return std::vector<char>(flights_->size(), 1); }
 
   struct NuisanceMean {
-    std::size_t place;  ///< index in `nuisances` of with_nuisances; then in `background`
+    std::size_t place;  ///< index in `nuisances` of with_nuisances, followed by `background`
     double mean;        ///< posterior mean of the coefficient of the column given to with_nuisances
   };
   /// Posterior of a nuisance regressor, given a fit.
@@ -103,29 +105,30 @@ class Fitter {
 
   /// The columns of a fit, without empty ones.
   static Regressors own_regressors(const Fit& fit);
-  /// The part of a posterior of own_regressors() and others that is of the fit's directions; those without a column
-  /// keep their prior.
+  /// The posterior along the fit's directions, out of `posterior`, which is of own_regressors() and then others.
+  /// Directions without a column keep their prior.
   static Posterior of_directions(const Fit& fit, const Posterior& posterior);
-  /// The columns of a fit, then nuisances and background magnitudes with the robot's scales. A named effect keeps its
-  /// background, as the model may have errors along it.
+  /// The columns of a fit, then nuisances and background magnitudes with the fitter's scales. An effect of the
+  /// hypothesis keeps its background, as the model may have errors that look like the effect.
   Regressors regressors(const Fit& fit) const;
   /// As regressors(), with scales of 1.
   Regressors unscaled_regressors(const Fit& fit) const;
 
   /// Posterior along all directions of a fit, from some flights alone. `use`: [flight] whether it counts.
   Posterior posterior(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
-  /// After a fit, by its columns: the most probable coordinates from the flights in `use` alone, and the part of the
-  /// residual that nuisances then explain. All flights are used for the corrected vehicle and, in a contrast, for what
-  /// changed.
+  /// What follows from the columns of a fit without a simulation: the most probable coordinates given the flights in
+  /// `use` alone, and the part of the residual that nuisances then explain. Callers use all flights for the corrected
+  /// vehicle and, in a contrast, for what changed.
   struct JointFit {
     Eigen::VectorXd at;               ///< [coordinate] within the accepted ranges
     BasisCoefficients nuisances;      ///< [group][basis]
     std::vector<NuisanceMean> means;  ///< left out: regressors that the flights have no information on
   };
   JointFit joint_fit(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
-  /// [group][basis] The part of a fit's residual that everything explains by linear columns, learnt from some flights
-  /// alone: in a contrast, changes of the parameters, and what the model gets wrong in both sessions or sessions differ
-  /// by. Effects follow the laws of the catalogue. Contrast predicts flights held out with it.
+  /// [group][basis] The part of a fit's residual that all regressors and delta together explain, learnt from the
+  /// flights in `use` alone. In a contrast it contains changes of the parameters, errors of the model in both sessions,
+  /// and differences between sessions. Effects follow the laws of the catalogue. Contrast predicts flights held out
+  /// with it.
   BasisCoefficients explained(const Fit& fit, const std::vector<char>& use) const;
   /// Standard deviation, [group][basis], of the deviations of effects from the catalogue's laws.
   BasisCoefficients law_sd(const Hypothesis& hypothesis, const Fit& fit) const {
@@ -136,33 +139,34 @@ class Fitter {
   BasisCoefficients law_sd_of(const std::string& effect, const BasisCoefficients& change, double law_factor) const {
     return rules_->law_sd(*evidence_, effect, change, law_factor);
   }
-  /// Whether the law of an effect may deviate at all.
+  /// Whether the law of any effect of the hypothesis may deviate.
   bool law_may_deviate(const Hypothesis& hypothesis, const Fit& fit) const;
-  /// That of the model, with the fitter's scales, and of the laws of the effects.
+  /// Standard deviation, [group][basis], of delta, with the fitter's scales, and deviations of laws together.
   BasisCoefficients discrepancy_sd(const Hypothesis& hypothesis, const Fit& fit) const;
 
-  /// A fit without a posterior: simulates `at`, and both sides of each direction. No directions: only the residual.
-  /// `known`: columns of the first directions, which are not simulated again. Not flown() if `at` diverges.
-  /// `forward`: simulates one side alone, and no points around, as on the way to where a fit ends.
+  /// Returns a fit without a posterior: simulates the vehicle at `at` and at both sides of each direction. No
+  /// directions: only the residual. `known`: columns of the first directions, which are not simulated again. Not
+  /// flown() if the simulation at `at` diverges. `forward`: simulates one side alone, and no points around `at`; for
+  /// points on the way to the last one of a fit.
   Fit linearise(const Hypothesis& hypothesis, const Eigen::VectorXd& at, Directions directions,
                 const std::vector<BasisCoefficients>& known = {}, bool forward = false) const;
   /// One direction for each coordinate, with the reach of first differences.
   static Directions axes(const Hypothesis& hypothesis);
-  /// Where nothing is known yet. At most `max_iterations` iterations from `start` on, [coordinate]; 0 or 1: no step,
-  /// only a posterior there. Not flown() if the simulation diverges at the start.
+  /// A fit from `start` on, [coordinate], where no columns are known yet. At most `max_iterations` iterations; 0 or 1:
+  /// no step, only a posterior there. Not flown() if the simulation diverges at the start.
   Fit fit(const Hypothesis& hypothesis, Eigen::VectorXd start, int max_iterations) const;
-  /// As fit(), with the directions and columns of the parameters' own fit, `parameters`, of a hypothesis without
-  /// effects: so only the effects' columns are simulated, and fits of all effects are compared with the same others.
+  /// As fit(), but takes directions and columns of the parameters from `parameters`, their fit without effects. So only
+  /// the effects' columns are simulated, and the fits of all effects share those of the parameters.
   Fit fit_given(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters,
                 int max_iterations) const;
-  /// Moves the effects alone, a few steps; the parameters stay at `parameters`, and answer by its columns in the
-  /// posterior. The cheapest fit by simulation: every set of effects gets one.
+  /// Moves the effects alone, a few steps. The parameters stay at those of `parameters`; in the posterior they vary
+  /// along its columns. The cheapest fit by simulation: every set of effects gets one.
   Fit fit_effects(const Hypothesis& hypothesis, const Eigen::VectorXd& start, const Fit& parameters) const;
-  /// Continues another fit, from its point and residual on, with the evidence and nuisances of now. New columns go
-  /// along the principal axes of the posterior so far.
+  /// Continues the fit `before` from its point and residual on, with this fitter's evidence and nuisances. New columns
+  /// go along the principal axes of the posterior so far.
   Fit refit(const Hypothesis& hypothesis, const Fit& before, int max_iterations) const;
-  /// Without a simulation, so without a residual: a posterior around the magnitudes of the vehicle file. `effects`:
-  /// [unknown of the effects] its column, of screening; an unknown with an empty column is not fitted.
+  /// Returns a posterior around the magnitudes of the vehicle file, without a simulation and so without a residual.
+  /// `effects`: [unknown of the effects] its column, from screening; an unknown with an empty column is not fitted.
   Fit fit_linear(const Hypothesis& hypothesis, const Fit& parameters,
                  const std::vector<BasisCoefficients>& effects) const;
 

@@ -28,7 +28,7 @@ struct Unknown {
   std::string name;    ///< path of the parameter, name of the lag, or name of the effect's parameter
   double centre = 0, scale = 1;
   double low = -1e30, high = 1e30;  ///< bounds of the value
-  bool magnitude = false;           ///< of an effect, which vanishes where all of its magnitudes are 0
+  bool magnitude = false;           ///< of an effect: the effect vanishes where all its magnitudes are 0
   bool in_log = false;              ///< it changes the log, not the simulation (gap/replay/sensor_correction.hpp)
   /// Whether the prior is half-normal: a magnitude that cannot be negative.
   bool one_sided() const { return magnitude && low >= 0; }
@@ -48,23 +48,23 @@ class Hypothesis {
   const std::vector<std::string>& effects() const { return effects_; }
   const std::vector<Unknown>& unknowns() const { return unknowns_; }
   Eigen::Index size() const { return static_cast<Eigen::Index>(unknowns_.size()); }
-  /// Order of the unknowns: [0, parameters()) the vehicle's major parameters; lag() the lag of the sensors (of a
-  /// beat-averaged vehicle the delay of the command); [shared(), size()) those of the effects. All before shared() are
+  /// Order of the unknowns: [0, parameters()) the vehicle's major parameters; lag() the lag of the sensors (for a
+  /// beat-averaged vehicle, the delay of the command); [shared(), size()) those of the effects. All before shared() are
   /// the same for every hypothesis of a robot.
   Eigen::Index parameters() const { return static_cast<Eigen::Index>(uncertain_->majors()); }
   Eigen::Index lag() const { return parameters(); }
   Eigen::Index shared() const { return parameters() + 1; }
   /// Index of the first unknown of an effect; size() if the hypothesis lacks it.
   Eigen::Index first_of(const std::string& effect) const;
-  /// Coordinates of `vehicle`, a vehicle with the parameters of the file: those of parameters and lag are 0. Effects
-  /// that the vehicle lacks have magnitudes of 0, and shape parameters in mid-prior.
+  /// Coordinates of `vehicle`, which has the parameters of the file: the coordinates of parameters and lag are 0.
+  /// Effects that it lacks have magnitudes of 0, and shape parameters in mid-prior.
   Eigen::VectorXd start(const model::Vehicle& vehicle) const;
   Eigen::VectorXd start() const { return start(uncertain_->nominal()); }
-  /// The nearest coordinates within the accepted ranges; of a parameter, within a few prior standard deviations.
+  /// The nearest coordinates within the accepted ranges; for a parameter, the range is a few prior standard deviations.
   Eigen::VectorXd bounded(Eigen::VectorXd coordinates) const;
 
-  /// The vehicle at these coordinates, as replay takes it, with the minor draws of `uncertain`. `minor`: index of one
-  /// of these among all draws, and by how many standard deviations it is moved.
+  /// The vehicle at these coordinates, as replay takes it, with the minor draws of `uncertain`. `minor`: a minor draw
+  /// to move: its index among all draws, and by how many standard deviations.
   VehicleHypothesis vehicle(const Eigen::VectorXd& coordinates,
                             std::optional<std::pair<std::size_t, double>> minor = {}) const;
 
@@ -74,7 +74,8 @@ class Hypothesis {
   std::vector<Unknown> unknowns_;
 };
 
-/// Unknowns of an effect of the catalogue: its magnitudes, then its shape parameters, without those that are known.
+/// Unknowns of an effect of the catalogue: its magnitudes, then its shape parameters, without those whose prior is a
+/// single value.
 std::vector<Unknown> unknowns_of(const model::CatalogueEffect& effect);
 /// Unknowns of an effect of vehicles with wings and motors, by its identifier.
 std::vector<Unknown> unknowns_of(const std::string& effect);

@@ -15,9 +15,9 @@ struct OneSided {
   Eigen::VectorXd mean;   ///< [coordinate] posterior mean
 };
 
-/// Conditions on one magnitude after another, keeping the posterior normal; that which is positive with the smallest
-/// probability comes first (Mendell and Elston, Biometrics 30, 1974, 41-57).
-/// `mean`, `covariance`: of the hypothesis' coordinates, with normal priors.
+/// Conditions the posterior on each one-sided magnitude being positive, one after another, and keeps it normal. The
+/// magnitude that is positive with the smallest probability comes first (Mendell and Elston, Biometrics 30, 1974,
+/// 41-57). `mean`, `covariance`: of the hypothesis' coordinates, with normal priors.
 OneSided one_sided(const Hypothesis& hypothesis, Eigen::VectorXd mean, Eigen::MatrixXd covariance);
 
 }  // namespace flappy::gap

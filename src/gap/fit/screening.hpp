@@ -1,6 +1,7 @@
-// Screening: the evidence that each effect of the catalogue would gain jointly with a fit, by linear models. It finds
-// which effects are worth a fit by simulation (answer/effect_fits.cpp), and what a plan expects (next/separation.cpp).
-// Only the vehicles of magnitude_steps() are simulated, once for each robot (RobotFit).
+// Screening estimates by linear models how much evidence each effect of the catalogue would gain, fitted jointly with
+// the regressors of a fit. It tells which effects are worth a fit by simulation (answer/effect_fits.cpp), and what a
+// plan expects (next/separation.cpp). Only the vehicles of magnitude_steps() are simulated, once for each robot
+// (RobotFit).
 #pragma once
 
 #include "gap/fit/fit.hpp"
@@ -19,8 +20,8 @@ struct MagnitudeStep : Magnitude {
   VehicleHypothesis vehicle;               ///< one step, kMagnitudeReach, above the vehicle file's value
   std::vector<VehicleHypothesis> shaped;   ///< the same, each with one shape parameter a standard deviation up
   std::vector<VehicleHypothesis> further;  ///< two to kMaxSteps steps away; only if one_sided
-  double near_reach;                       ///< two standard deviations of the background, from 0.05 to kMagnitudeReach
-  std::vector<VehicleHypothesis> near;     ///< near_reach away: above and, unless one_sided, below; NearSteps
+  double near_reach;                       ///< two standard deviations of the background, 0.05 to kMagnitudeReach
+  std::vector<VehicleHypothesis> near;     ///< near_reach above and, unless one_sided, below `from` (NearSteps)
 };
 /// Number of steps along a magnitude that cannot be negative. Choice.
 inline constexpr std::size_t kMaxSteps = 5;
@@ -37,14 +38,14 @@ std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, 
 /// How a magnitude changes the prediction, per unit of its coordinate; [group][basis] each. RobotFit makes it of a
 /// MagnitudeStep.
 struct MagnitudeColumn : Magnitude {
-  BasisCoefficients change;  ///< mean over the first step from the value in the vehicle file
-  /// At background magnitudes, above and, if there is a step, below: small magnitudes may act differently. At least
-  /// one: `change` where nothing was simulated.
+  BasisCoefficients change;  ///< mean slope over the first step from the value in the vehicle file
+  /// The same over the steps MagnitudeStep::near, above and perhaps below: small magnitudes, as of a background, may
+  /// act differently. Never empty: `change` where nothing was simulated.
   std::vector<BasisCoefficients> near;
   /// At large magnitudes, where the effect is not linear: a delay of a third of a beat acts unlike a small one.
   struct Large {
     double at;                        ///< coordinate less that of the vehicle file
-    BasisCoefficients chord, change;  ///< per unit: mean on the way to `at`; local at `at`
+    BasisCoefficients chord, change;  ///< mean slope from the vehicle file's value to `at`; slope at `at`
   };
   std::vector<Large> large;
 };
@@ -56,9 +57,9 @@ struct ScreenedEffect {
   Eigen::VectorXd coordinates;  ///< [unknown of the effect]
 };
 
-/// Screens each effect that has columns, each alone, jointly with the regressors of `fit`; the largest gain first. The
-/// columns of one effect have to be consecutive. `law_sd`: [group][basis] standard deviation of what the law of the
-/// robot's effect deviates by; empty: 0.
+/// Screens each effect of `columns` alone, jointly with the regressors of `fit`. Returns them with the largest gain
+/// first. The columns of one effect have to be consecutive. `law_sd`: [group][basis] standard deviation of the
+/// deviations of the law of the robot's effect; empty: 0.
 std::vector<ScreenedEffect> screen(const Fitter& fitter, const Fit& fit, const std::vector<MagnitudeColumn>& columns,
                                    const BasisCoefficients& law_sd = {});
 

@@ -9,12 +9,12 @@
 
 namespace flappy::gap {
 
-/// Finds the prior standard deviations that make the residuals of all robots most probable: of coefficients, by
-/// channel, harmonic and kind of function, and of background magnitudes. Each robot is fitted, then
-/// expectation-maximisation runs from `start`, whose other parameters stay, as do standard deviations of which no
-/// flight tells. Estimates are shrunk towards like ones, as each rests on few coefficients. `flights`: [robot], test
-/// flights alone. `uncertain`: the vehicle file of all robots with the priors of its parameters. io::InputError after
-/// Ctrl-C, and as from RobotFit.
+/// Finds the prior standard deviations that make the residuals of all robots most probable: those of coefficients (by
+/// channel, harmonic and kind of function) and those of background magnitudes. Fits each robot, then runs
+/// expectation-maximisation from `start`. All else in `start` stays, and so do standard deviations on which the flights
+/// have no information. Estimates are shrunk towards those of like channels or effects, as each rests on few
+/// coefficients. `flights`: [robot], test flights alone. `uncertain`: the vehicle file of all robots with the priors of
+/// its parameters. io::InputError after Ctrl-C, and as from RobotFit.
 ModelDiscrepancy learn_discrepancy(const std::vector<Flights>& flights, const sim::Randomisation& uncertain,
                                    const ModelDiscrepancy& start, int threads);
 
@@ -24,9 +24,9 @@ struct SessionPair {
   std::string effect;  ///< effect of the catalogue that appeared before the tests; empty: none
 };
 
-/// Learns what differs between sessions from pairs without an effect. Then, from pairs with one, how far laws of one
-/// cause differ. What too few pairs tell of stays as in `start.session`. io::InputError after Ctrl-C, as from RobotFit,
-/// and if all pairs have an effect but too few tell of its law.
+/// Learns from pairs without an effect what differs between sessions; then, from pairs with an effect, how far its law
+/// deviates from the catalogue's. What too few pairs show stays as in `start.session`. io::InputError after Ctrl-C, as
+/// from RobotFit, and if all pairs have an effect but too few tell of its law.
 SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim::Randomisation& uncertain,
                                 const ModelDiscrepancy& start, int threads);
 

@@ -23,14 +23,14 @@ struct Losses {
   std::vector<double> sum, count;      ///< [block of consecutive beats] sum and number; empty if a simulation diverged
   std::optional<double> mean() const;  ///< none: no losses
 };
-/// `around`: of the test flights. Empty also if the residual of any flight is.
+/// The losses of a residual; empty if that of any flight is empty. `around`: of the test flights.
 Losses losses_of(const RowContext& around, const TestResiduals& residual);
-/// Standard deviation of the difference of two mean losses of the same flights, from its scatter over blocks; 0 if one
-/// is empty.
+/// Standard deviation of the difference of two mean losses of the same flights, from the scatter of the difference over
+/// blocks; 0 if one of the losses is empty.
 double sd_of_difference(const Losses& a, const Losses& b);
 
-/// The closure with its 90 % interval by resampled blocks. None if E_refit is less than two of its standard deviations
-/// above `floor`, huber_floor(), or one of the losses is empty.
+/// The closure with its 90 % interval by resampled blocks. None if one of the losses is empty, or if E_refit is less
+/// than two of its standard deviations above the floor. `floor`: huber_floor().
 std::optional<Closure> closure_of(const Losses& refit, const Losses& effect, double floor);
 
 }  // namespace flappy::gap

@@ -1,7 +1,7 @@
-// Where a vehicle leaves a robot with wings, in the order of causes: drive and hinges move the wings, the air at this
-// motion makes forces, forces move the body, sensors measure it. An error on one rung shows on all that follow, so the
-// first rung with an error is the place to look at. The ladder of validation of Fei et al. 2019 (film, force map, open
-// loop, closed loop). Controller and software come last: flappy-gap check --flown compares them.
+// Shows where a vehicle deviates from its robot with wings, in the order of causes: drive and hinges move the wings, at
+// this motion the air exerts forces, forces move the body, sensors measure this. An error on one rung shows on all that
+// follow, so the first rung with an error is the place to look at. This is the ladder of validation of Fei et al. 2019
+// (film, force map, open loop, closed loop). Controller and software come last: flappy-gap check --flown compares them.
 #pragma once
 
 #include <vector>
@@ -13,8 +13,8 @@ namespace flappy::gap {
 /// Index in ladder_of() of the rung where an effect acts.
 std::size_t rung_of_effect(const std::string& effect);
 
-/// Three rungs. `nominal`, `refit`, `effect`: residuals as Diagnosis::nominal_loss and so on, [flight of `around`];
-/// null: not fitted. `hypotheses`: with their probabilities.
+/// The three rungs below. `nominal`, `refit`, `effect`: [flight of `around`] residuals of the vehicle file, of the
+/// fitted parameters, and with effects as well (Fitted); null: not fitted. `hypotheses`: with their probabilities.
 ///   drive and hinges   stroke angles, currents, battery of all flights
 ///   air                forces and moments of clamped robots
 ///   body and sensors   forces, angular accelerations and motion of robots that fly

@@ -1,5 +1,5 @@
-// Tests of whether residuals could be noise alone, for where.hpp. Noise is correlated over beats, so only sums over
-// blocks of beats count as independent, except those of neighbouring blocks.
+// Tests of whether residuals could be noise alone, for where.hpp. Noise is correlated over beats. The tests therefore
+// take sums over blocks of beats as independent, except those of neighbouring blocks.
 #pragma once
 
 #include <cstddef>
@@ -8,19 +8,20 @@
 
 namespace flappy::gap {
 
-/// Block number of each beat, all flights in a row. `beats`: [flight] number of beats; `length`: beats in a block.
-/// Numbers are consecutive in time; those of different flights are more than kWhitenessLags apart, so none are
-/// neighbours.
+/// [beat] Number of the beat's block, one flight after another. `beats`: [flight] number of beats; `length`: beats in a
+/// block. Numbers are consecutive in time. Those of different flights differ by more than kWhitenessLags, so blocks of
+/// different flights are never neighbours.
 std::vector<int> blocks_of(const std::vector<std::size_t>& beats, int length);
 
 struct FittedSlope {
   double slope = 0, p_value = 1;
 };
-/// Least squares of y = slope x, and a t test of slope 0. Variance: sums of x (y - slope x) over blocks, plus the full
-/// covariance of neighbours where positive (Hansen and Hodrick 1980; Newey and West 1987: half); correlation far beyond
-/// a block makes it too small. Effective blocks: 1 / sum of squared shares of x^2 (Carter, Schnepel, Steigerwald 2017);
-/// none below five, or if x is 0. With x = 1 in some beats, else 0, tests the mean of y there. `x`, `y`, `block`:
-/// [beat].
+/// Least squares of y = slope x, and a t test of whether the slope is 0. The variance of the slope comes from the sums
+/// of x (y - slope x) over blocks, plus the full covariance of neighbouring blocks if that is positive (Hansen and
+/// Hodrick 1980; Newey and West 1987 take half). It is too small if the correlation reaches far beyond a block. The
+/// number of effective blocks is 1 / sum of the squared shares that blocks have in x^2 (Carter, Schnepel, Steigerwald
+/// 2017); none if it is below five, or if x is 0. If x is 1 in some beats and else 0, this tests the mean of y in these
+/// beats. `x`, `y`, `block`: [beat].
 std::optional<FittedSlope> slope_test(const std::vector<double>& x, const std::vector<double>& y,
                                       const std::vector<int>& block);
 
@@ -41,8 +42,8 @@ struct Bands {
 /// row.
 void add_bands(const std::vector<double>& y, double beats_Hz, const std::vector<double>& ends_Hz, Bands& to);
 
-/// [test] Whether it is a discovery, if at most a share `rate` of all discoveries may be false (Benjamini and Hochberg
-/// 1995).
+/// [test] Whether its p value is a discovery. Of all discoveries, at most the share `rate` is expected to be false
+/// (Benjamini and Hochberg 1995).
 std::vector<char> discoveries(const std::vector<double>& p_values, double rate);
 
 }  // namespace flappy::gap

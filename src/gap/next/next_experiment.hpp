@@ -1,17 +1,18 @@
-// The next flight: the manoeuvre that best tells apart the rivals, the hypotheses that are still probable.
+// Proposes the next flight: the manoeuvre that best tells apart the rivals, which are the hypotheses that are still
+// probable.
 //
-// The most probable vehicle flies each manoeuvre in our simulator; each rival predicts the log as fitted so far. What
-// the flight would bring follows from how their predictions differ (expected_nats.hpp):
+// The vehicle of the most probable rival flies each manoeuvre in our simulator. Each rival predicts this log, as fitted
+// so far. The differences of the predictions say what the flight would bring (expected_nats.hpp):
 //   nats(A, B) = 1/2 Delta^T K^-1 Delta      K: covariance of noise, model discrepancy (evidence.hpp), deviations of
 //                                            the laws of their effects, and what is still uncertain of B
-// So B may adapt to the new flight as far as the flights so far allow. The correlation of B's errors in old and new
-// flights is neglected, which makes the nats small. For an effect that was fitted only linearly, the magnitude is the
-// root mean square of its posterior. The strongest rival of a hypothesis is the most probable one (of the most probable
-// one: the next). The manoeuvre of the largest expected information is proposed.
+// By this K, B may adapt to the new flight as far as the flights so far allow. The correlation of B's errors in old and
+// new flights is neglected, which makes the nats too small. If an effect was fitted only linearly, its magnitude is the
+// root mean square under its posterior. The strongest rival of a hypothesis is the most probable other one. The
+// manoeuvre with the largest expected information is proposed.
 //
-// In a contrast the new flight is a further test flight. All rivals have the parameters of the reference, so they
+// In a contrast the new flight is a further test flight. All rivals have the parameters of the references, so they
 // differ by their effects alone. The references stay among the flights: in the regimes that they visit, the model
-// discrepancy cancels, and K has the differences between sessions. Only for vehicles with wings.
+// discrepancy cancels, and K includes what sessions differ by. All this is only for vehicles with wings.
 #pragma once
 
 #include <filesystem>
@@ -48,10 +49,10 @@ struct NextOptions {
   VerdictRule rule;
 };
 
-/// The most informative manoeuvre first; empty with fewer than two rivals. Hypotheses with an unknown cause or a
-/// remainder are no rivals: no vehicle simulates them. Leaves out manoeuvres in which one of the four most probable
-/// rivals crashes, or which the two most probable ones cannot predict. `uncertain`: with the minor draws of the
-/// inference.
+/// The manoeuvres, the most informative one first; empty with fewer than two rivals. Hypotheses with an unknown cause
+/// or a remainder are no rivals, as no vehicle simulates them. Leaves out manoeuvres in which one of the four most
+/// probable rivals crashes, or for which the prediction of one of the two most probable ones diverges. `uncertain`:
+/// with the minor draws of `inference`.
 std::vector<NextExperiment> rank_experiments(const Inference& inference, const sim::Randomisation& uncertain,
                                              const std::vector<Manoeuvre>& manoeuvres, const NextOptions& options);
 

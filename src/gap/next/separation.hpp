@@ -1,8 +1,9 @@
-// Which effects planned flights would tell apart (plan.hpp). If the robot has effect T, its rows change by c. A
-// hypothesis R, with the magnitudes of its effect, parameters, errors of sensors, model discrepancy and noise
-// integrated out (gap/evidence/evidence.hpp), gains over the parameters alone
+// Finds which effects planned flights would tell apart (plan.hpp). If the robot has effect T, its rows change by c. The
+// gain of a hypothesis R over the parameters alone is then
 //   G_R(c) = log p(c | R) - log p(c | parameters)
-// as screening finds it (gap/fit/screening.hpp), and expected_nats.hpp makes of it the expected evidence for T over R,
+// p integrates out the magnitudes of R's effect, parameters, errors of sensors, model discrepancy and noise
+// (gap/evidence/evidence.hpp). Screening finds the gains (gap/fit/screening.hpp). The expected evidence for T over R
+// (expected_nats.hpp) is
 //   nats(T, R) = G_T(c) - G_R(c).
 // The discrepancy includes how far the robot's law of T deviates from the catalogue's. What noise adds on average, at
 // most half a nat for each magnitude, is left out.
@@ -18,13 +19,13 @@
 namespace flappy::gap {
 
 struct Separation {
-  std::vector<std::string> effects;  ///< those asked about; without any that change no row, or diverge
-  std::vector<std::string> rivals;   ///< all effects that change a row, then "parameters": none
+  std::vector<std::string> effects;  ///< those asked about, except those that change no row or diverge
+  std::vector<std::string> rivals;   ///< all effects that change a row, then "parameters": no effect
   Eigen::MatrixXd nats;              ///< [effect][rival] expected evidence for the effect over the rival
   /// [effect] How probable a diagnosis finds the effect, if the robot has it.
   std::vector<double> probability;
-  /// [effect] Factor on the magnitude from which on that probability is kSure, 1 / kMaxFactor or more. None: not up to
-  /// kMaxFactor, largest_factor() or a simulation that diverges; or not asked.
+  /// [effect] Factor on the magnitude from which on `probability` is kSure; at least 1 / kMaxFactor. None: it is not
+  /// reached up to kMaxFactor, largest_factor() or a simulation that diverges; or it was not asked for.
   std::vector<std::optional<double>> sure_from;
 };
 /// A probability that counts as sure. Choice.

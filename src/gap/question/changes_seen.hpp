@@ -1,6 +1,6 @@
-// What changed in flights of a robot with wings since the references, whatever the cause: means of forces and moments,
-// drag and thrust per input, and what sensors show, as coefficients of the regime basis in the test flights, measured
-// by what sessions of the robot differ by.
+// Finds what changed in flights of a robot with wings since the references, whatever the cause: means of forces and
+// moments, drag, thrust per input, and what sensors show. These are coefficients of the regime basis in the test
+// flights. Each is compared with what sessions of the robot differ by.
 #pragma once
 
 #include <vector>
@@ -10,9 +10,9 @@
 
 namespace flappy::gap {
 
-/// `robot`: of a contrast. SeenQuantity::reference is 0, and tests is by how much the test flights differ from what the
-/// vehicle of the references would have shown there: a mean, or the change per standard deviation that amplitude or
-/// velocity have over all flights. Without quantities whose stream is not logged.
+/// SeenQuantity::reference is 0. SeenQuantity::tests is by how much the test flights differ from what the vehicle of
+/// the references would have shown in them: in a mean, or in the slope per standard deviation of amplitude or velocity
+/// over all flights. Quantities whose stream is not logged are left out. `robot`: the fit of a contrast.
 std::vector<SeenQuantity> changes_seen(const RobotFit& robot);
 
 }  // namespace flappy::gap

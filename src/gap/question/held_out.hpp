@@ -18,9 +18,9 @@ struct FittedHypothesis {
 /// there is only one fold, its fit uses all flights.
 std::vector<std::vector<char>> others_of(const Flights& flights, const std::vector<int>& fold);
 
-/// As Question::held_out, for flights without references: each fit is adapted to the other folds by its columns
-/// (Fitter::joint_fit), and the vehicle there is simulated. A flight is empty if that diverges. `less_nuisances`: less
-/// what nuisance regressors explain, by the same fit.
+/// [fit] Question::held_out for flights without references. For each fold, each fit is adapted to the other folds by
+/// its columns (Fitter::joint_fit), and the vehicle at the result is simulated. The residual of a flight is empty if
+/// that simulation diverges. `less_nuisances`: whether to subtract what nuisance regressors explain in the adapted fit.
 std::vector<TestResiduals> held_out_by_simulation(const Fitter& fitter, const Flights& flights,
                                                   const std::vector<FittedHypothesis>& fits,
                                                   const std::vector<int>& fold, bool less_nuisances, int threads);

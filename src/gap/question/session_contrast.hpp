@@ -1,10 +1,10 @@
-// The question what changed in a beat-averaged vehicle since the references. Flights are compared by a few numbers
-// each, the quantities y (gap/session/quantities.hpp). The robot's own reference sessions say how much quantities
-// differ while nothing is done to the robot (gap/session/session_scatter.hpp). A hypothesis shifts them by what its
-// effects change in the rows:
+// Answers the question: what changed in a beat-averaged vehicle since the references? Each flight is compared by a few
+// numbers, the quantities y (gap/session/quantities.hpp). The robot's own reference sessions say how much quantities
+// differ while nothing is done to the robot, by a density t (gap/session/session_scatter.hpp). A hypothesis shifts the
+// quantities by what its effects change in the rows:
 //   p(y | effects) = integral of t(y - shift(z)) N(z; 0, 1) dz
-// with z the unknowns of the effects, by Laplace's method around the most probable z (MacKay, Information Theory,
-// Inference, and Learning Algorithms, 2003, ch. 27).
+// z are the unknowns of the effects. Laplace's method computes the integral around the most probable z (MacKay,
+// Information Theory, Inference, and Learning Algorithms, 2003, ch. 27).
 #pragma once
 
 #include "gap/question/contrast.hpp"

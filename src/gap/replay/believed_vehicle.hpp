@@ -1,4 +1,4 @@
-// Reads the vehicle as it was believed to be, about which a diagnosis or a plan asks.
+// Reads the vehicle file that a diagnosis or a plan asks about: the robot as it is believed to be.
 #pragma once
 
 #include <string>
@@ -7,9 +7,10 @@
 
 namespace flappy::gap {
 
-/// A beat-averaged vehicle, which may have effects, or one with wings and motors without effects. io::InputError for a
-/// file that is no vehicle, or one whose wing angles are driven. Of vehicles with wings also if it has effects, if the
-/// driver's hold time is no multiple of kHoldStep_s, or if this step is too coarse for it.
+/// Returns a beat-averaged vehicle, with or without effects, or a vehicle with wings and motors, without effects.
+/// io::InputError for a file that is no vehicle, or one with articulated wings. For a vehicle with wings and motors
+/// also if it has effects, if the driver's hold time is no multiple of kHoldStep_s, or if a step of kHoldStep_s is too
+/// coarse.
 model::Vehicle read_believed_vehicle(const std::string& file);
 /// io::InputError if the vehicle's catalogue lacks the effect `id`. `option`: the option that names it, for the
 /// message.

@@ -1,5 +1,5 @@
-// Makes a recorded flight one that vehicles of its kind can predict: ResetPrediction for vehicles with wings and
-// motors, BeatAveragedPrediction for beat-averaged ones.
+// Prepares a recorded flight for predictions by vehicles of one kind: ResetPrediction for vehicles with wings and
+// motors, BeatAveragedPrediction for beat-averaged vehicles.
 #pragma once
 
 #include <filesystem>
@@ -10,10 +10,10 @@
 
 namespace flappy::gap {
 
-/// `vehicle`: the one that is believed to have flown. `folder`: of the log. `channels`: of a beat-averaged vehicle, the
-/// only ones with rows; empty: all that it compares; not used for one with wings. io::InputError as from the classes:
-/// for a log that the vehicle cannot have flown; of a beat-averaged vehicle flightlog::TooLittleSeen for too short a
-/// flight.
+/// `vehicle`: the vehicle that is believed to have flown. `folder`: folder of the log. `channels`: for a beat-averaged
+/// vehicle, the only channels that get rows; empty: all that it compares. Not used for a vehicle with wings. Errors are
+/// those of the two classes: io::InputError for a log that the vehicle cannot have flown; for a beat-averaged vehicle
+/// also flightlog::TooLittleSeen if the flight is too short.
 std::shared_ptr<PredictedFlight> prediction_of(const model::Vehicle& vehicle, const std::filesystem::path& folder,
                                                flightlog::FlightLog log, const std::vector<int>& channels = {});
 

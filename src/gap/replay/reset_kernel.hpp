@@ -1,6 +1,6 @@
-// The reset at the end of an IMU interval, for a block of vehicles that replay one flight (reset_prediction.hpp). Each
-// has a recorded motion of its own, as errors of sensors that are undone in a log differ. Compiled for each instruction
-// set. A lane is one vehicle of the block.
+// The reset at the end of an IMU interval, for a block of vehicles that replay one flight (reset_prediction.hpp). The
+// recorded motion may differ from vehicle to vehicle, because different errors of sensors may be undone in the log.
+// Compiled for each instruction set. A lane is one vehicle of the block.
 #pragma once
 
 #include "sim/block.hpp"
@@ -42,22 +42,23 @@ struct ResetBlockState {
 };
 
 /// Computes the rows of the interval from `from` to `to`, then resets every torso to the recorded motion at `to`; wings
-/// keep their state. The body rate is not set to the recorded one: the mean rate is added by which the simulated
-/// rotation fell short of the recorded attitude at `to`.
+/// keep their state. The body rate is not set to the recorded rate. Instead, the rotation from the simulated to the
+/// recorded attitude at `to`, divided by the interval, is added to the rate.
 /// `from` null: the start of a flight; no rows, and the body rate is the recorded one. `imu_position_m`: [axis][lane].
 using ResetBlock = void (*)(sim::Block<Flown>& block, const TorsoRows* from, const TorsoRows& to, double interval_s,
                             const Flown (*imu_position_m)[kVehicles], double gravity_m_s2, ResetBlockState& kept);
 
-/// Loads of the wings on a held torso since the last call, and the momentum that its wings had then.
+/// Momentum that the wings had at the last call, for a torso that is held.
 struct ClampedBlockState {
   alignas(64) Flown momentum_kg_m_s[3][kVehicles];           ///< [axis][lane] of the wings, in B
   alignas(64) Flown angular_momentum_kg_m2_s[3][kVehicles];  ///< about the torso origin
 };
 
-/// Computes the rows of an interval of vehicles that are welded to a stand: the mean force and moment of the wings on
-/// the torso, N and Nm in B about the torso origin, in the places of specific force and angular acceleration, and the
-/// angles of the wings. By momentum: what the air gave to the wings less what they gained. Weights are left out: a sensor is zeroed at
-/// rest, and a wing's weight moves its moment by 1e-5 Nm. `interval_s` 0: the start, without rows.
+/// Computes the rows of an interval for vehicles that are welded to a stand. kSpecificForce and kAngularAcceleration
+/// hold the mean force and moment of the wings on the torso, N and Nm in B about the torso origin: (impulse of the air
+/// on the wings less their gain of momentum) / interval, likewise for the moment. The other rows hold the wings'
+/// angles. Weights are left out: the sensor is zeroed at rest, and the weight of a moving wing changes the moment by
+/// 1e-5 Nm only. `interval_s` 0: the start, without rows.
 using ClampedBlock = void (*)(sim::Block<Flown>& block, double interval_s, ClampedBlockState& kept,
                               ResetBlockState& rows);
 

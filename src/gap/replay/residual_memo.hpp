@@ -1,5 +1,5 @@
-// Residuals of one reference flight that were computed before (residuals.cpp). In references, vehicles have the effects
-// of their file alone, so hypotheses that differ only in effects share them.
+// Cache of the residuals of one reference flight (residuals.cpp). In reference flights a vehicle has only the effects
+// of its file, so hypotheses that differ only in effects have the same residuals.
 #pragma once
 
 #include <deque>
@@ -25,7 +25,7 @@ class ResidualMemo {
     const auto at = known_.find(key);
     return at == known_.end() ? nullptr : at->second;
   }
-  /// Forgets the oldest of more than kMaxKept.
+  /// Stores rows; forgets the oldest of more than kMaxKept.
   void keep(const Key& key, Known rows) {
     const std::scoped_lock lock(mutex_);
     if (!known_.insert_or_assign(key, std::move(rows)).second) return;
@@ -41,8 +41,8 @@ class ResidualMemo {
   }
 
  private:
-  /// Half a megabyte each for a flight of 10 s. The fits of effects ask again for the parameters and the points around
-  /// them, nine in all. Size: of a cache.
+  /// Half a megabyte each for a flight of 10 s. Fits of effects ask again for the fitted parameters and the points
+  /// around them, nine in all. Size: of a cache.
   static constexpr std::size_t kMaxKept = 32;
   mutable std::mutex mutex_;
   std::map<Key, Known> known_;

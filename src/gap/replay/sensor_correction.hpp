@@ -1,5 +1,5 @@
-// Undoes effects of sensors in a log, so that one simulation serves all of them; effects of the vehicle are simulated.
-// Only for vehicles with wings and motors: beat-averaged ones predict their effects of sensors.
+// Undoes effects of sensors in a log, so that they need not be simulated; effects of the vehicle are simulated. Only
+// for vehicles with wings and motors: beat-averaged vehicles predict effects of sensors.
 //
 //   gyro_bias                   gyro - drift (1 - exp(-t / warm_up)), t since the log began; the drift's mean is kept
 //   accelerometer_misalignment  specific force rotated back by a small rotation vector
@@ -8,7 +8,7 @@
 //   marker_offset               measured point - R offset
 //   mocap_delay                 poses earlier by the delay that the header does not declare
 //
-// Likewise, errors of declared sensors, which are no effects: every laboratory has them, and they are small:
+// Errors of declared sensors are undone likewise. They are no effects, as every laboratory has them and they are small:
 //   imu_mounting                gyro and specific force rotated back by a small rotation vector
 //   imu_place                   position of the IMU in B corrected
 //   power_delay                 samples of power.csv earlier by the delay that the header does not declare
@@ -28,8 +28,8 @@ using EffectValues = std::map<std::string, std::map<std::string, double>>;
 /// Those of `effects` that are effects of sensors.
 EffectValues sensor_effects(const EffectValues& effects);
 
-/// `log` with the given effects and errors of sensors undone, the last that the sensor makes first; other effects are
-/// ignored. Each that is given has all of its parameters (std::out_of_range).
+/// Returns `log` with the given effects and errors of sensors undone, in reverse of the order in which the sensor makes
+/// them; other effects are ignored. std::out_of_range if one of them lacks a parameter.
 flightlog::FlightLog without(const EffectValues& effects, flightlog::FlightLog log);
 
 }  // namespace flappy::gap

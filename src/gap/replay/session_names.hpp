@@ -11,8 +11,8 @@ namespace flappy::gap {
 /// PredictedFlight::session() of each flight.
 std::vector<std::string> session_names(const FlightList& flights);
 
-/// Which session each flight is of, from 0 on: flights that name the same session are one, those without a name are
-/// each their own.
+/// [flight] Number of its session, from 0 on. Flights that name the same session share a number; each flight without a
+/// name is a session of its own.
 std::vector<int> session_numbers(const std::vector<std::string>& names);
 
 }  // namespace flappy::gap

@@ -1,9 +1,10 @@
-// Motion capture against the IMU's dead reckoning, without a vehicle model. Reckoning drifts, but over a few beats its
-// curvature and rate must agree. Differences show errors of sensors:
-//   path    second difference over kSpan beats of (measured - reckoned) origin / span^2, in W: tilted vertical, marker
-//           off the origin, late poses, misaligned or biased accelerometer
-//   rotate  central difference over 2 kSpan beats of the rotation from reckoned to measured attitude / (2 span), taken
-//           in W, in B, less its mean over the flight: changing gyro bias, late poses
+// Compares motion capture with the IMU's dead reckoning, without a vehicle model. Reckoning drifts, but over a few
+// beats the curvature of its path and its angular rate must agree with motion capture. Differences show errors of
+// sensors. span: duration of kSpan beats.
+//   path    second difference over kSpan beats of (measured - reckoned) origin / span^2, in W. Shows a tilted vertical,
+//           a marker off the origin, late poses, a misaligned or biased accelerometer
+//   rotate  central difference over 2 kSpan beats of the rotation vector from reckoned to measured attitude in W
+//           / (2 span), rotated to B, less its mean over the flight. Shows a changing gyro bias, late poses
 #pragma once
 
 #include <vector>
@@ -19,9 +20,9 @@ struct StreamRow {
   bool valid = false;  ///< false: motion capture lacks one of the kSpan beats to either side; the rows are 0
 };
 
-/// [beat].
+/// [beat] Rows of path and rotate.
 std::vector<StreamRow> stream_rows(const Recording& recording);
-/// [beat] Rows that the declared noise would give: of IMU and motion capture, or of motion capture alone.
+/// [beat] Rows that the declared noise of IMU and motion capture would give; `mocap_alone`: of motion capture alone.
 std::vector<StreamRow> stream_noise(const Recording& recording, std::uint64_t seed, bool mocap_alone);
 
 }  // namespace flappy::gap

@@ -1,4 +1,4 @@
-// Writes plan.json and matrix.csv of a plan, as text (docs/reference/plan.md).
+// Makes the contents of plan.json and matrix.csv from a plan (docs/reference/plan.md).
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@ inline constexpr const char* kPlanFile = "plan.json";
 inline constexpr const char* kMatrixFile = "matrix.csv";
 
 nlohmann::ordered_json to_json(const Plan& plan);
-/// A row for each effect, a column for each rival: expected nats, with one digit. The cell of an effect over itself is
+/// Expected nats with one decimal: a row for each effect, a column for each rival. The cell of an effect over itself is
 /// empty.
 std::string matrix_csv(const Plan& plan);
 

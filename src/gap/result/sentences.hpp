@@ -1,13 +1,12 @@
-// What is said of a diagnosis, in one place for the printed summary (gap/diagnose/summary.hpp) and the page of the
-// report (src/view). Sentences begin with a small letter where they may stand within a line. Comments below show
-// examples.
+// Texts about a diagnosis that the printed summary (gap/diagnose/summary.hpp) and the page of the report (src/view)
+// share. Texts begin with a small letter where they may stand within a line. Comments below show examples of results.
 #pragma once
 
 #include "gap/result/diagnosis.hpp"
 
 namespace flappy::gap {
 
-/// How the name of an effect is shown: as it is, or in words, as a page does.
+/// Turns the name of an effect into what is shown: the name as it is, or words, as on a page.
 using Spoken = std::string (*)(std::string name);
 inline std::string as_it_is(std::string name) { return name; }
 
@@ -29,15 +28,15 @@ std::string verdict_words(const Verdict& verdict, bool contrast, Spoken spoken);
 std::string probability_words(double probability);
 /// "wind and tether and more", "parameters alone".
 std::string hypothesis_words(const RankedHypothesis& hypothesis, Spoken spoken);
-/// The same of a name as in NextExperiment::separates: "wind+tether", "parameters".
+/// The same for a name from NextExperiment::separates, such as "wind+tether" or "parameters".
 std::string hypothesis_words(const std::string& name, Spoken spoken);
 /// "if an effect is missing, then most probably wind 0.40 (closes 30 %) or tether 0.20".
 std::string suspects_words(const std::vector<Suspect>& suspects, Spoken spoken);
-/// A quantity is told beyond so many times what sessions differ by. Choice: of twenty quantities one goes so far by
-/// chance.
+/// A quantity is reported if it changed by more standard deviations between sessions than this. Choice: of twenty
+/// quantities one goes so far by chance.
 inline constexpr double kTold = 2;
-/// Quantities that changed by more than kTold, whatever the cause, one line each, the largest first: "thrust of rotor_3
-/// -9.4 %, 6.1 times what sessions differ by".
+/// A line for each quantity that changed by more than kTold, whatever the cause; the largest change first: "thrust of
+/// rotor_3 -9.4 %, 6.1 times what sessions differ by".
 std::vector<std::string> seen_words(const std::vector<SeenQuantity>& seen, Spoken spoken);
 /// A value of a quantity in the unit that people use: shares in %, metres in mm, seconds in ms. `sign`: with + or -.
 std::string seen_value(const SeenQuantity& quantity, double value, bool sign);
