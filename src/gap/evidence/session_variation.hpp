@@ -22,7 +22,7 @@ namespace flappy::gap {
 struct ScalePrior {
   double freedom = 0;  ///< degrees of freedom
   bool follows_robot = false;
-  double centre = 1;
+  double centre = 1;  ///< not used if follows_robot
 };
 
 /// What the robot's own reference sessions say, each contrasted with the others (gap/fit/own_sessions.hpp).

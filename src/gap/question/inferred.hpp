@@ -107,7 +107,8 @@ struct ReferenceFit {
   CorrectedParameters corrected;
 };
 
-/// Sorted groups of the effects, joined by +: "body_drag+world_force". An effect without a group is its own group.
+/// Key under which a verdict adds up the probabilities of hypotheses that flights often cannot tell apart: the sorted
+/// groups of the effects, joined by +: "body_drag+world_force". An effect without a group is its own group.
 std::string pool_name(const std::vector<std::string>& effects);
 
 /// A quantity that changed by more standard deviations between sessions than this is a change, whatever its cause. Choice.

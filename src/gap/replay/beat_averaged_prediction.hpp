@@ -52,7 +52,7 @@ class BeatAveragedPrediction final : public PredictedFlight {
   bool covers(std::size_t beat, int channel) const override {
     return has_rows(channel, 0) && motion_.seen[rows_[beat]] != 0 && (!disturbed(channel) || is_trim_[beat] != 0);
   }
-  /// Yes for the angular accelerations, with beat.trims.
+  /// Whether an autopilot counteracts a channel: with beat.trims, the angular accelerations.
   bool disturbed(int channel) const override {
     return nominal_.beat_averaged->trims && channel <= kAngularAccelerationZ;
   }
@@ -71,6 +71,8 @@ class BeatAveragedPrediction final : public PredictedFlight {
   std::vector<std::pair<std::string, std::string>> products() const override { return {}; }
   std::vector<RegimeQuantity> regimes() const override;
   std::vector<RegimeQuantity> inputs() const override;
+  /// How much the controller shakes: logarithm of the rms of the inputs' second differences in the air, in shares of
+  /// their ranges. None: no input changes.
   std::optional<double> log_input_noise() const override;
   bool is_averaged() const override { return true; }
 
