@@ -74,20 +74,20 @@ def main():
         if code != 0:
             sys.exit(f"{name}: rc {code}; the same command goes on")
 
-    for kind in o.kinds:
-        for family in o.families:
-            if kind == "bench" and family == "a":
-                continue  # its robots cannot be clamped
-            folder = o.out / f"{family}.{kind}"
-            if (folder / "cases.jsonl").exists():
-                continue
+    # robots of A cannot be clamped
+    parts = [(kind, family) for kind in o.kinds for family in o.families if (kind, family) != ("bench", "a")]
+    options = {part: learnt(*part) for part in parts}
+    for kind, family in parts:
+        folder = o.out / f"{family}.{kind}"
+        if (folder / "cases.jsonl").exists():
+            continue
+        if not (folder / "manifest.json").exists():
+            run(f"make {folder.name}", "make", "--family", family, "--set", o.set, *KINDS[kind], "--cases", o.cases, "--out", folder)
             if not (folder / "manifest.json").exists():
-                run(f"make {folder.name}", "make", "--family", family, "--set", o.set, *KINDS[kind], "--cases", o.cases, "--out", folder)
-                if not (folder / "manifest.json").exists():
-                    sys.exit(f"{folder}: stopped; the same command goes on")
-            run(f"score {folder.name}", "score", folder, *learnt(kind, family))
-            if not (folder / "cases.jsonl").exists():
                 sys.exit(f"{folder}: stopped; the same command goes on")
+        run(f"score {folder.name}", "score", folder, *options[kind, family])
+        if not (folder / "cases.jsonl").exists():
+            sys.exit(f"{folder}: stopped; the same command goes on")
     text = f"{version}; {sum(seconds.values()) / 3600:.1f} h on this machine.\n"
     # robots on a bench have tables of their own: their parts are called as those that fly
     for name, kinds in (("flight", ["contrast", "alone"]), ("bench", ["bench"])):
