@@ -41,7 +41,8 @@ class EffectFits {
 
   struct Sets {
     std::vector<ScoredHypothesis> hypotheses;  ///< with one effect and with several, the one that explains most first
-    Scales scales;                             ///< of the parameters alone; the search began at those of the best set
+    /// Scales of the hypothesis without effects. Their search starts from the scales of the best set.
+    Scales scales;
   };
   /// Adds effects to the set that explains most, one after another, as long as this gains more than by chance. Returns
   /// `singles`, of single_effects(), and the larger sets. `progress` returns false to stop.

@@ -306,7 +306,6 @@ class Evidence::GroupSums {
     own_ = MatrixXd::Zero(e.basis().size(), e.basis().size());
     for (std::size_t f = 0; f < use.size(); ++f)
       if (use[f]) own_ += sums_.of_flights[f][g_];
-    own_loose_ = loose_factor(own_);
   }
   const MatrixXd& normal() const { return own_.size() > 0 ? own_ : sums_.all[g_]; }
   bool has_rows() const { return normal()(0, 0) != 0; }
@@ -318,7 +317,7 @@ class Evidence::GroupSums {
   }
   /// Square of the smooth part of a residual.
   double smooth_square(const VectorXd& right) const {
-    return (own_.size() > 0 ? own_loose_ : sums_.loose[g_]).solve(right).dot(right);
+    return own_.size() > 0 ? loose_factor(own_).solve(right).dot(right) : sums_.loose[g_].solve(right).dot(right);
   }
 
  private:
@@ -326,7 +325,6 @@ class Evidence::GroupSums {
   const std::vector<char>& use_;
   std::size_t g_;
   MatrixXd own_;  ///< empty: all flights count
-  Eigen::LDLT<MatrixXd> own_loose_;
 };
 
 Evidence::GroupSum Evidence::sum_of(const SufficientStatistics& residual, const std::vector<char>& use,

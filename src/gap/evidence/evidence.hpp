@@ -250,9 +250,9 @@ class Evidence {
   struct GroupSum {
     Eigen::MatrixXd normal;  ///< basis x basis
     Eigen::VectorXd right;   ///< basis x residual
-    double square = 0;       ///< of the smooth part of the residual
+    double square = 0;       ///< sum of squares of the residual's projection on the basis
   };
-  /// Of the flights that count.
+  /// Sums one group over the flights in `use`.
   GroupSum sum_of(const SufficientStatistics& residual, const std::vector<char>& use, int group) const;
   void learn(const Residuals& residual, Learn what);
   Eigen::VectorXd session_means(const Residuals& residual, int group) const;

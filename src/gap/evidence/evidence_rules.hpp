@@ -1,6 +1,5 @@
-// What the question of a diagnosis (gap/fit/fit_rules.hpp) changes in the statistics of residuals: what the model lacks,
-// or what changed since the references. FitRules derives from this class, Question from that. Evidence and RegimeBasis
-// call it.
+// The part of a question (docs/glossary.md) that Evidence and RegimeBasis call: it selects offsets, blocks and scales in
+// the statistics of residuals. FitRules derives from this class, and Question derives from FitRules.
 #pragma once
 
 #include <functional>

@@ -25,14 +25,15 @@ struct ScalePrior {
   double centre = 1;  ///< not used if follows_robot
 };
 
-/// What the robot's own reference sessions say, each contrasted with the others (gap/fit/own_sessions.hpp).
+/// Scales and changes that own_sessions() (gap/fit/own_sessions.hpp) finds. It contrasts each reference session of the
+/// robot with the other ones.
 struct OwnSessions {
   double count = 0;             ///< K, number of sessions
   double mean_log_scale = 0;    ///< mean of log f_k, the scale of session k against the others
   std::vector<double> squares;  ///< [block] sum of delta^2 / f_k^2 over sessions, in units of the prior
   std::vector<double> known;    ///< [block] number of coefficients that the flights determine
-  /// The same two for changes of magnitudes, by the name of their background (Fitter::effects()): sum of their squares
-  /// in units of the prior, not divided by f_k^2; number of changes that the flights determine.
+  /// For changes of magnitudes. Key: name of the background (Fitter::effects()). Value: sum of the squared changes over
+  /// sessions, in units of the prior and not divided by f_k^2; number of changes that the flights determine.
   std::map<std::string, std::pair<double, double>> magnitudes;
   /// Correction of the log scale: session k is compared with K - 1 others, whose mean varies more than that of all K.
   double from_fewer() const { return 0.5 * std::log(1 - 1 / (count * count)); }

@@ -72,9 +72,9 @@ class Fitter {
   /// Without nuisance regressors; scales are 1. Keeps references to `rules` and `flights`.
   Fitter(const FitRules& rules, const Flights& flights, std::shared_ptr<const Evidence> evidence, int threads);
   Fitter with_evidence(std::shared_ptr<const Evidence> evidence) const;
-  /// A fitter that fits `nuisances` and `background`, in this order, jointly with every hypothesis, even the background
-  /// of effects that the hypothesis has. It leaves out regressors on which the flights have no information, given
-  /// `fit`.
+  /// A fitter that fits `nuisances` and `background`, in this order, jointly with every hypothesis. A hypothesis keeps
+  /// the background of its own effects, too. The fitter leaves out a regressor if the flights carry no information on
+  /// it, by the columns of `fit`.
   Fitter with_nuisances(const Regressors& nuisances, const std::vector<Background>& background, const Fit& fit) const;
   /// A fitter with these columns of magnitudes, which act linearly and are not simulated.
   Fitter with_linear_magnitudes(LinearMagnitudes magnitudes) const;
@@ -116,9 +116,8 @@ class Fitter {
 
   /// Posterior along all directions of a fit, from some flights alone. `use`: [flight] whether it counts.
   Posterior posterior(const Hypothesis& hypothesis, const Fit& fit, const std::vector<char>& use) const;
-  /// What follows from the columns of a fit without a simulation: the most probable coordinates given the flights in
-  /// `use` alone, and the part of the residual that nuisances then explain. Callers use all flights for the corrected
-  /// vehicle and, in a contrast, for what changed.
+  /// Result of joint_fit(), which solves the linear model of a fit and simulates nothing. The flights in `use` determine
+  /// the coordinates and the nuisances. The corrected vehicle, and the changes of a contrast, use all flights.
   struct JointFit {
     Eigen::VectorXd at;               ///< [coordinate] within the accepted ranges
     BasisCoefficients nuisances;      ///< [group][basis]

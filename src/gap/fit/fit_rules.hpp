@@ -1,6 +1,6 @@
-// What the question of a diagnosis changes in fits of vehicles. A question is what is asked of the flights: what the
-// model lacks (Alone), or what changed since the references (Contrast). The questions are in gap/question/, which
-// implement this class; Fitter and RobotFit call it.
+// The part of a question (docs/glossary.md) that Fitter and RobotFit call: priors of laws, steps of fits, backgrounds.
+// Alone asks what the model lacks, Contrast asks what changed since the references. Both are in gap/question/ and
+// implement this class.
 #pragma once
 
 #include <Eigen/Dense>

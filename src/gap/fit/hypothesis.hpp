@@ -28,7 +28,7 @@ struct Unknown {
   std::string name;    ///< path of the parameter, name of the lag, or name of the effect's parameter
   double centre = 0, scale = 1;
   double low = -1e30, high = 1e30;  ///< bounds of the value
-  bool magnitude = false;           ///< of an effect: the effect vanishes where all its magnitudes are 0
+  bool magnitude = false;           ///< an effect vanishes if all its magnitudes are 0
   bool in_log = false;              ///< it changes the log, not the simulation (gap/replay/sensor_correction.hpp)
   /// Whether the prior is half-normal: a magnitude that cannot be negative.
   bool one_sided() const { return magnitude && low >= 0; }

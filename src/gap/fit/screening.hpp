@@ -39,8 +39,9 @@ std::vector<MagnitudeStep> magnitude_steps(const sim::Randomisation& uncertain, 
 /// MagnitudeStep.
 struct MagnitudeColumn : Magnitude {
   BasisCoefficients change;  ///< mean slope over the first step from the value in the vehicle file
-  /// The same over the steps MagnitudeStep::near, above and perhaps below: small magnitudes, as of a background, may
-  /// act differently. Never empty: `change` where nothing was simulated.
+  /// Mean slopes over the small steps MagnitudeStep::near: the one above the file's value, then the one below it, if
+  /// that was simulated. A small magnitude, such as that of a background, may have another slope than a large one.
+  /// Contains `change` alone if no small step was simulated.
   std::vector<BasisCoefficients> near;
   /// At large magnitudes, where the effect is not linear: a delay of a third of a beat acts unlike a small one.
   struct Large {

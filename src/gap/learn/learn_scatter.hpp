@@ -36,7 +36,7 @@ SessionPrior learn_scatter(const std::vector<RobotSessions>& robots, const Sessi
 
 /// How well sessions are foretold by those before them.
 struct Foretold {
-  double number = 0;     ///< of foretold values: quantities of sessions
+  double number = 0;     ///< how many values were foretold: one for each quantity of each session
   double outside = 0;    ///< how many of them are outside of the interval that should hold kInside of them
   double log_score = 0;  ///< sum of log densities under `prior`, less that under `reference`
 };
