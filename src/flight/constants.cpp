@@ -38,6 +38,7 @@ FlightConstants flight_constants(const FleetOptions& options) {
     static_cast<LoopConstants<double>&>(k.controller.of<C>()) = {low_pass_share(c.velocity_low_pass_hz, period_s),
                                                                  low_pass_share(c.body_rate_low_pass_hz, period_s),
                                                                  period_s, 1 / period_s, gravity};
+    if constexpr (requires { C::derive(k.controller.of<C>()); }) C::derive(k.controller.of<C>());
   });
   TaskConstants<double>& task = k.task;
   task.tick_s = period_s;

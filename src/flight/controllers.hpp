@@ -2,7 +2,9 @@
 // it. A table C has
 //   kName                        its name in configurations
 //   Constants<T>, Memory<T>      its constants, beginning with LoopConstants<T>, and its memory; all members are T
-//   fields(constants, add)       add(key, number, range) for each parameter of its configuration
+//   fields(constants, add)       add(key, number, range) for each parameter of its configuration; a fourth argument is the
+//                                value of one that need not be given
+//   derive(constants)            optional: constants that follow from others, once those of the loop are known
 //   start(memory, estimate)      memory, all 0 before, at the start of a flight
 //   update(constants, memory, estimate, set point)    inputs of the wing beat for the next control period
 //   trim(constants, memory)      the inputs that it has learnt to hold; in a settled vehicle, those of hover

@@ -3,12 +3,16 @@
 //   v_sp = v_ref + k (p_ref - p)             e = v_sp - v        a_f,l = a_ref + PID(e)       V_z = PID(e_z)
 //   pitch_sp = atan(a_f / g)                 roll_sp = -atan(a_l cos(pitch_sp) / g)
 //   V_d = PID(roll_sp - roll)                V_0 = PID(pitch_sp - pitch)      d_sigma = PID(yaw_ref - yaw)
+//     where P and D pass N
 //   V_amp = V_hover + V_z / (cos roll cos pitch)
+// N: a notch at notch_hz, if any (notch(), below), because what a controller answers to the swing of each wing beat adds to
+// the beat that it commands, or takes from it, by its delay.
 // The derivative of a roll or pitch error is the negative low-passed body rate (yaw: relative to the set point's rate);
 // the derivative of a velocity error comes from the low-passed velocity. Integrators are clamped. They do not move
 // further out while the output that they drive is at its limit (anti-windup).
 #pragma once
 
+#include <numbers>
 #include <string>
 
 #include "flight/controller_loop.hpp"
@@ -32,6 +36,8 @@ struct PidConstants : LoopConstants<T> {
   PidGains<T> roll, pitch, yaw;  // rad -> V, V, split cycle
   T hover_V, lower_V, upper_V;   // V_amp = hover_V + clip(.., lower_V, upper_V)
   T difference_limit_V, bias_limit_V, split_cycle_limit;
+  T notch_hz, notch_quality;  // 0 Hz: no notch
+  T notch_near, notch_far, notch_back;  // its coefficients (PidController::derive())
 };
 
 inline namespace FLAPPY_ISA {
@@ -43,6 +49,7 @@ struct Pid {
   T integral_roll, integral_pitch;        // V
   T integral_yaw;                         // split cycle
   Vec3<T> velocity_m_s, body_rate_rad_s;  // low-passed
+  Vec3<T> notch_next, notch_after;        // memory of the notches of roll, pitch and yaw
 };
 
 template <class T>
@@ -66,6 +73,18 @@ FLAPPY_INLINE T integrated(const T& integral, const T& gain_and_time, const T& e
 template <class T>
 FLAPPY_INLINE T saturation(const T& value, const T& low, const T& high) {
   return where(value > high, T(1), where(value < low, T(-1), T(0)));
+}
+
+/// One step of a second-order notch, in transposed direct form II:
+///   y = n x + a,   a' = f (x - y) + b,   b' = n x - r y
+/// with 1 at 0 Hz and at half of the control rate, 0 at the notch (Bristow-Johnson, Cookbook formulae for audio EQ biquad
+/// filter coefficients, 2021, W3C).
+template <class T>
+FLAPPY_INLINE T notched(const T& near, const T& far, const T& back, const T& x, T& next, T& after) {
+  const T y = near * x + next;
+  next = far * T(x - y) + after;
+  after = near * x - back * y;
+  return y;
 }
 
 /// Table of the controller's functions (controllers.hpp).
@@ -101,6 +120,20 @@ struct PidController {
     add("difference_limit_V", k.difference_limit_V);
     add("bias_limit_V", k.bias_limit_V);
     add("split_cycle_limit", k.split_cycle_limit);
+    add("notch_hz", k.notch_hz);
+    add("notch_near", k.notch_near);
+    add("notch_far", k.notch_far);
+    add("notch_back", k.notch_back);
+  }
+
+  /// Coefficients of the notch: with w = 2 pi notch_hz period_s and alpha = sin w / (2 quality),
+  ///   n = 1 / (1 + alpha),   f = -2 n cos w,   r = n (1 - alpha)
+  static void derive(PidConstants<double>& k) {
+    const auto [sin, cos] = sin_cos(2 * std::numbers::pi * k.notch_hz * k.period_s);
+    const double alpha = sin / (2 * k.notch_quality);
+    k.notch_near = 1 / (1 + alpha);
+    k.notch_far = -2 * k.notch_near * cos;
+    k.notch_back = k.notch_near * (1 - alpha);
   }
 
   template <class T>
@@ -162,6 +195,8 @@ void PidController::fields(PidConstants<double>& k, const auto& add) {
   add("limits.difference_V", k.difference_limit_V, io::positive(18));
   add("limits.bias_V", k.bias_limit_V, io::positive(18));
   add("limits.split_cycle", k.split_cycle_limit, io::positive(0.4));
+  add("notch.frequency_hz", k.notch_hz, io::non_negative(200), 0.0);
+  add("notch.quality", k.notch_quality, io::Range{0.1, 100}, 1.0);
 }
 
 template <class T>
@@ -209,8 +244,16 @@ FLAPPY_INLINE WingBeat<T> PidController::update(const PidConstants<Element<T>>& 
 
   m.body_rate_rad_s = add_scaled(m.body_rate_rad_s, T(k.rate_share), x.body_rate_rad_s - m.body_rate_rad_s);
   const auto attitude = [&](const PidGains<Element<T>>& gain, T& integral, const T& angle_error, const T& rate_error,
-                            auto most) {
-    const T out = T(gain.p) * angle_error + (T(gain.d) * rate_error + integral);
+                            auto most, T Vec3<T>::*axis) {
+    T out;
+    if (k.notch_hz > 0) {
+      const T swinging = T(gain.p) * angle_error + T(gain.d) * rate_error;
+      out = notched(T(k.notch_near), T(k.notch_far), T(k.notch_back), swinging, m.notch_next.*axis,
+                    m.notch_after.*axis) +
+            integral;
+    } else {
+      out = T(gain.p) * angle_error + (T(gain.d) * rate_error + integral);
+    }
     const T top(most);
     integral =
         integrated(integral, T(T(gain.i) * dt), angle_error, T(gain.integral_limit), saturation(out, T(-top), top));
@@ -219,10 +262,10 @@ FLAPPY_INLINE WingBeat<T> PidController::update(const PidConstants<Element<T>>& 
   const Vec3<T>& w = m.body_rate_rad_s;
   const T yaw_reach(k.yaw_error_limit_rad);
   WingBeat<T> u;
-  u.difference_V = attitude(k.roll, m.integral_roll, T(roll_wanted - roll), T(-w.x), k.difference_limit_V);
-  u.bias_V = attitude(k.pitch, m.integral_pitch, T(pitch_wanted - pitch), T(-w.y), k.bias_limit_V);
+  u.difference_V = attitude(k.roll, m.integral_roll, T(roll_wanted - roll), T(-w.x), k.difference_limit_V, &Vec3<T>::x);
+  u.bias_V = attitude(k.pitch, m.integral_pitch, T(pitch_wanted - pitch), T(-w.y), k.bias_limit_V, &Vec3<T>::y);
   u.split_cycle = attitude(k.yaw, m.integral_yaw, clamp(yaw_error, T(-yaw_reach), yaw_reach),
-                           T(ref.heading_rate_rad_s - w.z), k.split_cycle_limit);
+                           T(ref.heading_rate_rad_s - w.z), k.split_cycle_limit, &Vec3<T>::z);
 
   const T climb = T(k.up.p) * error.z + (T(k.up.d) * slope.z + m.integral_z);
   const T lift = climb / max(R.row_z.z, T(0.5));  // cos roll cos pitch

@@ -55,8 +55,8 @@ Sensors read_sensors(const io::Table& table) {
 
 std::vector<ControllerField> fields(Controller& c) {
   std::vector<ControllerField> list;
-  const auto add = [&](const std::string& path, double& value, io::Range range) {
-    list.push_back({path, &value, range});
+  const auto add = [&](const std::string& path, double& value, io::Range range, std::optional<double> otherwise = {}) {
+    list.push_back({path, &value, range, otherwise});
   };
   with_controller(c.kind, [&]<class C>(C) {
     C::fields(c.constants.of<C>(), add);
@@ -79,13 +79,19 @@ int controller_kind(const std::string& name) {
   return kind;
 }
 
-Controller read_controller(const io::Table& table) {
+Controller read_controller(const io::Table& table, double control_hz) {
   table.schema(1);
   std::vector<std::string> names;
   for (int i = kNoController; i < kControllers; ++i) names.push_back(controller_name(i));
   Controller c;
   c.kind = controller_kind(table.choice("kind", names));
-  for (const ControllerField& f : fields(c)) *f.value = table.number(f.path, f.range);
+  for (const ControllerField& f : fields(c))
+    *f.value = f.otherwise ? table.number_or(f.path, *f.otherwise, f.range) : table.number(f.path, f.range);
+  with_controller(c.kind, [&]<class C>(C) {
+    if constexpr (requires { c.constants.of<C>().notch_hz; })
+      if (c.constants.of<C>().notch_hz >= control_hz / 2)
+        table.fail("notch.frequency_hz", "is too high for the control rate", "less than half of flight.control_hz");
+  });
   table.finish();
   return c;
 }

@@ -1,6 +1,7 @@
 // Sensors, estimator and controller as the configuration states them; constants.hpp derives the working numbers.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "flappy/vehicle.hpp"
@@ -57,6 +58,7 @@ struct ControllerField {
   std::string path;
   double* value;
   io::Range range;
+  std::optional<double> otherwise;  ///< value if the configuration does not give one; none: it has to
 };
 
 /// All parameters of a controller of its kind. The pointers are valid as long as the controller.
@@ -68,6 +70,6 @@ int controller_kind(const std::string& name);
 
 /// Both throw io::InputError if a key is missing, unknown or out of range.
 Sensors read_sensors(const io::Table& table);
-Controller read_controller(const io::Table& table);
+Controller read_controller(const io::Table& table, double control_hz);
 
 }  // namespace flappy::flight

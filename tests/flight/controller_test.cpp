@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "flight/arc.hpp"
@@ -293,6 +294,50 @@ TEST(Pid, DampsByTheVelocitysSlope) {
   const U u = PidController::update(k, m, x, here());
   EXPECT_NEAR(u.amplitude_V, 10 - 8 * 0.002 - 0.5, 1e-9);
   EXPECT_NEAR(u.bias_V, -5 * std::atan((3 * 0.002 + 0.4) / kGravity), 1e-9);
+}
+
+/// |H| at 34 Hz is 0, at 0 Hz 1, and else, from the coefficients of PidController::derive() at z = exp(j w),
+///   |cos w - cos w0| / sqrt((cos w - cos w0)^2 + (alpha sin w)^2).
+TEST(Pid, LeavesTheWingBeatAlone) {
+  PidConstants<double> k = pid_constants();
+  k.roll = {0, 0, 0.1, 0}, k.pitch = {0, 0, 0.2, 0}, k.yaw = {0, 0, 0.001, 0};
+  k.notch_hz = 34, k.notch_quality = 2;
+  PidController::derive(k);
+  const double w0 = 2 * std::numbers::pi * 34 * kPeriod_s, alpha = std::sin(w0) / 4;
+  for (const double hz : {0.0, 5.0, 20.0, 30.0, 34.0, 40.0, 100.0, 200.0}) {
+    Pid<double> m{};
+    const double w = 2 * std::numbers::pi * hz * kPeriod_s;
+    double sum[3] = {}, squares[3] = {};
+    constexpr int kBefore = 1000, kSeen = 500;  // 2 s, by which the notch has forgotten the start; 1 s, whole periods
+    for (int i = 0; i < kBefore + kSeen; ++i) {
+      Estimate<double> x = level();
+      const double swing = std::cos(w * i);
+      x.body_rate_rad_s = {swing, swing, swing};
+      const U u = PidController::update(k, m, x, here());
+      if (i < kBefore) continue;
+      const double out[] = {u.difference_V / 0.1, u.bias_V / 0.2, u.split_cycle / 0.001};
+      for (int axis = 0; axis < 3; ++axis) sum[axis] += out[axis], squares[axis] += out[axis] * out[axis];
+    }
+    const double off = std::cos(w) - std::cos(w0);
+    const double wanted = hz == 0 ? 1 : std::abs(off) / std::hypot(off, alpha * std::sin(w));
+    for (int axis = 0; axis < 3; ++axis) {
+      const double got = hz == 0 ? -sum[axis] / kSeen : std::sqrt(2 * squares[axis] / kSeen);
+      EXPECT_NEAR(got, wanted, 1e-9) << hz << " Hz, axis " << axis;
+    }
+  }
+}
+
+TEST(Pid, KeepsItsNotchBelowHalfOfTheControlRate) {
+  EXPECT_NO_THROW(controller("pid_robust", {"notch.frequency_hz=199.0"}));
+  const io::Config slow =
+      io::Config::load(test::source_path("configs/controllers/pid_robust.toml"), {"notch.frequency_hz=50.0"});
+  try {
+    read_controller(slow.root(), 100);
+    FAIL() << "a notch at half of the control rate was accepted";
+  } catch (const io::InputError& e) {
+    EXPECT_NE(std::string(e.what()).find("accepted: less than half of flight.control_hz"), std::string::npos)
+        << e.what();
+  }
 }
 
 /// The body that the adaptive controller believes in.

@@ -301,7 +301,8 @@ Json json_of(const Request& request, const FlyConfig& config, const std::vector<
 /// The controller of this name: that of the configuration where it is of this type, else the shipped one.
 Controller controller_named(const std::string& name, const FlyConfig& config) {
   if (config.fleet.controller.kind == flight::controller_kind(name)) return config.fleet.controller;
-  return flight::read_controller(io::Config::load(io::config_path("controllers/" + name + ".toml")).root());
+  return flight::read_controller(io::Config::load(io::config_path("controllers/" + name + ".toml")).root(),
+                                 config.fleet.control_hz);
 }
 
 /// The configuration with one effect of the catalogue at `magnitude` times its typical magnitudes, clamped to what a vehicle file accepts.

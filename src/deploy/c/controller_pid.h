@@ -19,9 +19,20 @@ static inline float flappy_integrated(float integral, const flappy_gains *k, flo
   return step * blocked_towards > 0.0F ? integral : moved;
 }
 
+/* A step of a second-order notch at the wing beat, in transposed direct form II. */
+static inline float flappy_notched(float x, float *next, float *after) {
+  const flappy_feedback_constants *k = &flappy_controller_k.feedback;
+  const float y = flappy_fma(k->notch_near, x, *next);
+  *next = flappy_fma(k->notch_far, x - y, *after);
+  *after = flappy_difference2(k->notch_near, x, k->notch_back, y);
+  return y;
+}
+
 static inline float flappy_attitude_pid(const flappy_gains *k, float *integral, float error, float rate_error,
-                                        float limit) {
-  const float out = flappy_fma(k->p, error, flappy_fma(k->d, rate_error, *integral));
+                                        float limit, float *next, float *after) {
+  const float out = flappy_controller_k.feedback.notch_hz > 0.0F
+                        ? flappy_notched(flappy_sum2(k->p, error, k->d, rate_error), next, after) + *integral
+                        : flappy_fma(k->p, error, flappy_fma(k->d, rate_error, *integral));
   *integral = flappy_integrated(*integral, k, error, flappy_saturation(out, -limit, limit));
   return flappy_within(out, limit);
 }
@@ -86,10 +97,12 @@ static inline flappy_wing_beat flappy_feedback_update(flappy_feedback *m, const 
   m->body_rate_rad_s = flappy_add_scaled(m->body_rate_rad_s, loop->rate_share,
                                          flappy_minus(x->body_rate_rad_s, m->body_rate_rad_s));
   w = m->body_rate_rad_s;
-  u.difference_V = flappy_attitude_pid(&k->roll, &m->integral_roll, roll_wanted - roll, -w.x, k->difference_limit_V);
-  u.bias_V = flappy_attitude_pid(&k->pitch, &m->integral_pitch, pitch_wanted - pitch, -w.y, k->bias_limit_V);
+  u.difference_V = flappy_attitude_pid(&k->roll, &m->integral_roll, roll_wanted - roll, -w.x, k->difference_limit_V,
+                                       &m->notch_next.x, &m->notch_after.x);
+  u.bias_V = flappy_attitude_pid(&k->pitch, &m->integral_pitch, pitch_wanted - pitch, -w.y, k->bias_limit_V,
+                                 &m->notch_next.y, &m->notch_after.y);
   u.split_cycle = flappy_attitude_pid(&k->yaw, &m->integral_yaw, flappy_within(yaw_error, k->yaw_error_limit_rad),
-                                      ref->heading_rate_rad_s - w.z, k->split_cycle_limit);
+                                      ref->heading_rate_rad_s - w.z, k->split_cycle_limit, &m->notch_next.z, &m->notch_after.z);
 
   /* climb */
   climb = flappy_velocity_pid(&k->up, error.z, slope.z, m->integral_z);
@@ -115,12 +128,15 @@ static inline void flappy_feedback_start(flappy_feedback *m, const flappy_motion
   m->integral_roll = m->integral_pitch = m->integral_yaw = 0.0F;
   m->velocity_m_s = x->velocity_m_s;
   m->body_rate_rad_s = x->body_rate_rad_s;
+  m->notch_next = m->notch_after = flappy_vector_of(0.0F, 0.0F, 0.0F);
 }
 
-/* Takes back what it learnt in the last period, but for its low-passes. */
+/* Takes back what it learnt in the last period, but for its filters. */
 static inline void flappy_feedback_unlearn(const flappy_feedback *before, flappy_feedback *now) {
-  const flappy_feedback low_passed = *now;
+  const flappy_feedback filtered = *now;
   *now = *before;
-  now->velocity_m_s = low_passed.velocity_m_s;
-  now->body_rate_rad_s = low_passed.body_rate_rad_s;
+  now->velocity_m_s = filtered.velocity_m_s;
+  now->body_rate_rad_s = filtered.body_rate_rad_s;
+  now->notch_next = filtered.notch_next;
+  now->notch_after = filtered.notch_after;
 }

@@ -10,10 +10,12 @@ typedef struct {
   flappy_gains roll, pitch, yaw; /* rad to V, V, split cycle */
   float hover_V, lower_V, upper_V;
   float difference_limit_V, bias_limit_V, split_cycle_limit;
+  float notch_hz, notch_near, notch_far, notch_back; /* 0 Hz: no notch */
 } flappy_feedback_constants;
 
 typedef struct {
   float integral_x, integral_y, integral_z;          /* m/s^2, m/s^2 in W; V */
   float integral_roll, integral_pitch, integral_yaw; /* V, V, split cycle */
   flappy_vector velocity_m_s, body_rate_rad_s;       /* low-passed */
+  flappy_vector notch_next, notch_after;             /* memory of the notches of roll, pitch, yaw */
 } flappy_feedback;

@@ -216,6 +216,9 @@ TEST(ControllerHeader, FliesAnEscapeAsTheLanesDo) {
   EXPECT_EQ(seen.updates, flights * 3000);
 }
 
+/// Above a PID with a notch.
+TEST(ControllerHeader, FiltersTheWingBeatAsTheLanesDo) { fly_beside(config_of("escape_robust"), 4, 400, true); }
+
 TEST(ControllerHeader, HandsBackWhereItArrives) {
   // each with limits that decide: some arrive, some are handed back to at the time
   const std::vector<std::string> wide = {"task.hand_back.distance_m=0.3", "task.hand_back.speed_m_s=9.0",
@@ -462,7 +465,7 @@ struct Rest {
     c.tick(c.at(), now_us);
   }
   std::vector<float> estimate() {
-    std::vector<float> estimator(46), estimate(13), pid(12);
+    std::vector<float> estimator(46), estimate(13), pid(18);
     c.state(c.at(), estimator.data(), estimate.data(), pid.data());
     for (const auto* list : {&estimator, &estimate, &pid})
       for (const float x : *list) EXPECT_TRUE(std::isfinite(x));
