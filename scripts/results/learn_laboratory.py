@@ -10,6 +10,7 @@ from the file for this family, and for users from all three. The last step learn
 import argparse
 import os
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -24,6 +25,15 @@ FAMILIES = ["a", "b", "c"]
 ON_BENCH = ["b", "c"]  # those that can be clamped
 STEPS = ["discrepancy", "sessions", "bench", "verdict"]
 FIRST_SEED = 900_000  # below those of benchmarks, beyond those that are spent
+
+
+def with_bench(text, learnt):
+    """A file of what models get wrong with the shares of runs on a bench that another one has learnt."""
+    tables = re.compile(r"^\[bench_share\..*?\n\n", re.S | re.M)
+    commit = re.search(r"commit (\w+)", learnt).group(1)
+    text = re.sub(r" Shares of a bench: commit \w+\.", "", tables.sub("", text))
+    text = re.sub(r"^(# Learnt: .*)$", rf"\1 Shares of a bench: commit {commit}.", text, count=1, flags=re.M)
+    return re.sub(r"^(?=# Priors of the scales)", "".join(tables.findall(learnt)), text, count=1, flags=re.M)
 
 
 def main():
@@ -57,11 +67,12 @@ def main():
         run(output, gap, "learn-discrepancy", "--vehicle", VEHICLE, *command(families), "--out", output)
         shutil.copyfile(output, shipped)
 
-    def robot(family, number):
+    def robot(family, number, bench=False):
         """Flights of a robot as its file, each of another session: what differs between days belongs to what models get wrong."""
-        folder = o.out / "robots" / f"{family}{number}"
-        run(folder / "flight_3", blind, "fly", "--family", family, "--seed", FIRST_SEED + number, "--power", "--reference", folder,
-            "--reference-sessions", 3, "--out", o.out / "later" / f"{family}{number}")
+        name = f"{'bench_' if bench else ''}{family}{number}"
+        folder = o.out / "robots" / name
+        run(folder / "flight_3", blind, "fly", "--family", family, "--seed", FIRST_SEED + number, "--bench" if bench else "--power",
+            "--reference", folder, "--reference-sessions", 3, "--out", o.out / "later" / name)
         return folder
 
     def effects_of(family):
@@ -101,6 +112,14 @@ def main():
             learn(f"sessions_without_{family or 'none'}.toml", others(family), shipped, lambda families: [
                 "--sessions", shipped, "--discrepancy", discrepancy, "--pairs", *[pair(f, n) for f in families for n in range(o.pairs)]])
     if "bench" in o.steps:
+        fly_all(robot, [f for f in ON_BENCH for _ in range(o.robots)], [n for _ in ON_BENCH for n in range(o.robots)],
+                [True] * o.robots * len(ON_BENCH))
+        for family in [*FAMILIES, ""]:
+            shipped = LAB / "discrepancy" / f"without_{family}.toml" if family else CONFIGS / "gap" / "model_discrepancy.toml"
+            output = o.out / f"bench_discrepancy_without_{family or 'none'}.toml"
+            run(output, gap, "learn-discrepancy", "--vehicle", VEHICLE, "--discrepancy", shipped, "--robots",
+                *[robot(f, n, True) for f in ON_BENCH if f != family for n in range(o.robots)], "--out", output)
+            shipped.write_text(with_bench(shipped.read_text(), output.read_text()))
         fly_all(pair, [f for f in ON_BENCH for _ in range(o.pairs)], [n for _ in ON_BENCH for n in range(o.pairs)],
                 [True] * o.pairs * len(ON_BENCH))
         for family in ON_BENCH:

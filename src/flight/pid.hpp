@@ -36,7 +36,7 @@ struct PidConstants : LoopConstants<T> {
   PidGains<T> roll, pitch, yaw;  // rad -> V, V, split cycle
   T hover_V, lower_V, upper_V;   // V_amp = hover_V + clip(.., lower_V, upper_V)
   T difference_limit_V, bias_limit_V, split_cycle_limit;
-  T notch_hz, notch_quality;  // 0 Hz: no notch
+  T notch_hz, notch_quality;            // 0 Hz: no notch
   T notch_near, notch_far, notch_back;  // its coefficients (PidController::derive())
 };
 
@@ -248,9 +248,9 @@ FLAPPY_INLINE WingBeat<T> PidController::update(const PidConstants<Element<T>>& 
     T out;
     if (k.notch_hz > 0) {
       const T swinging = T(gain.p) * angle_error + T(gain.d) * rate_error;
-      out = notched(T(k.notch_near), T(k.notch_far), T(k.notch_back), swinging, m.notch_next.*axis,
-                    m.notch_after.*axis) +
-            integral;
+      out =
+          notched(T(k.notch_near), T(k.notch_far), T(k.notch_back), swinging, m.notch_next.*axis, m.notch_after.*axis) +
+          integral;
     } else {
       out = T(gain.p) * angle_error + (T(gain.d) * rate_error + integral);
     }

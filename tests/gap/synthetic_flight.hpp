@@ -58,7 +58,10 @@ class SyntheticFlight final : public PredictedFlight {
          static_cast<std::size_t>(coefficient)] += values[static_cast<Eigen::Index>(j)];
   }
 
+  bool on_bench = false;
+
   const std::string& name() const override { return name_; }
+  bool clamped() const override { return on_bench; }
   bool has_ground() const override { return true; }
   std::size_t beats() const override { return beats_; }
   double beats_Hz() const override { return 34; }

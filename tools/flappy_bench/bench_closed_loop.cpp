@@ -54,7 +54,7 @@ class Loop {
 flight::FleetOptions hovering(const std::string& configs, const std::string& sensors, const std::string& controller) {
   flight::FleetOptions o;
   o.sensors = flight::read_sensors(table(configs + "/sensors/" + sensors + ".toml"));
-  o.controller = flight::read_controller(table(configs + "/controllers/" + controller + ".toml"), o.control_hz);
+  o.controller = flight::read_controller(table(configs + "/controllers/" + controller + ".toml"), kControl_hz);
   o.task = flight::read_task(table(configs + "/tasks/hover.toml"), 1 / kControl_hz);
   o.control_hz = kControl_hz;
   o.batch.threads = 1;

@@ -34,7 +34,7 @@ std::vector<FreeBlock> free_blocks(const ScaledEvidence& w, const Evidence& evid
   for (std::size_t block = 0; block < w.scales.free.size(); ++block) {
     if (!w.scales.free[block]) continue;
     double sum = 0, most = 0;
-    FreeBlock b{static_cast<int>(block) / kClasses / (kHarmonics + 1),
+    FreeBlock b{static_cast<int>(block) / kClasses / (kHarmonics + 1) % kChannels,
                 static_cast<int>(block) / kClasses % (kHarmonics + 1)};
     for (int g = 0; g < kGroups; ++g)
       for (int i = 0; i < basis.size(); ++i) {
@@ -75,7 +75,7 @@ FreeBlock largest_deviation(const ScaledEvidence& w, const RegimeBasis& basis) {
     for (int i = 0; i < basis.size(); ++i) {
       const double gain = 0.5 * std::pow(w.delta(g, i), 2);
       if (regimes_of(basis.kind(i)) == Regimes::place && gain > most.gain_nats)
-        most = {g / kCoefficients, (g % kCoefficients + 1) / 2, i, w.law_factor, gain};
+        most = {channel_of(g), (g % kCoefficients + 1) / 2, i, w.law_factor, gain};
     }
   return most;
 }

@@ -16,17 +16,19 @@ constexpr const char* kSharesHead =
     R"(# Prior standard deviation of the coefficients of the regime basis, as a share of the channel's signal, for harmonics 0 (the mean) to 4 of the beat.
 # Rows are kinds of functions: constant; the inputs; the rates of the body; products with an input; the place (height, heading, time, nearness of
 # surfaces); an offset of each flight (a warm sensor, another day's battery); the velocity v in B; and |v| v. What no flight shows, as a channel that
-# none has, or an offset of flights of one each, keeps the number from which learning started.
+# none has, or an offset of flights of one each, keeps the number from which learning started. bench_share: of runs on a bench, where it differs.
 )";
 
 }  // namespace
 
 Shares read_shares(const io::Table& root) {
   Shares shares{};
-  for (int channel = 0; channel < kChannels; ++channel) {
-    const io::Table share = root.table("share");
-    const io::Table table =
-        share.table(share.has(channel_name(channel)) || !share.has("all") ? channel_name(channel) : "all");
+  const io::Table air = root.table("share");
+  const std::optional<io::Table> bench = root.optional_table("bench_share");
+  for (int channel = 0; channel < kSettingChannels; ++channel) {
+    const char* name = channel_name(channel % kChannels);
+    const io::Table& share = channel >= kChannels && bench && bench->has(name) ? *bench : air;
+    const io::Table table = share.table(share.has(name) || !share.has("all") ? name : "all");
     for (const auto& [function, key] : kShareKeys) {
       const std::vector<double> by_harmonic = table.numbers(key, kHarmonics + 1, io::positive());
       for (std::size_t h = 0; h <= kHarmonics; ++h)
@@ -38,12 +40,15 @@ Shares read_shares(const io::Table& root) {
 
 std::string shares_text(const Shares& shares) {
   std::string text = kSharesHead;
-  for (int channel = 0; channel < kChannels; ++channel) {
-    text += std::string("[share.") + channel_name(channel) + "]\n";
+  for (std::size_t channel = 0; channel < kSettingChannels; ++channel) {
+    const bool bench = channel >= kChannels;
+    if (bench && shares[channel] == shares[channel - kChannels]) continue;
+    text +=
+        std::string(bench ? "[bench_share." : "[share.") + channel_name(static_cast<int>(channel) % kChannels) + "]\n";
     for (const auto& [function, key] : kShareKeys) {
       text += std::string(key) + " = [";
       for (int h = 0; h <= kHarmonics; ++h)
-        text += (h > 0 ? ", " : "") + io::format("%.4g", share_of(shares, channel, h, function));
+        text += (h > 0 ? ", " : "") + io::format("%.4g", share_of(shares, static_cast<int>(channel), h, function));
       text += "]\n";
     }
     text += "\n";

@@ -31,7 +31,9 @@ constexpr double kRobustSd = 1.4826;
 /// Residuals are clipped at so many robust standard deviations where the memory of the noise is found. Choice.
 constexpr double kClipSd = 3;
 
-std::size_t row_of(std::size_t beat, int group) { return beat * kRowsPerBeat + static_cast<std::size_t>(group); }
+std::size_t row_of(std::size_t beat, int group) {
+  return beat * kRowsPerBeat + static_cast<std::size_t>(column_of(group));
+}
 
 /// For least squares on the whole basis.
 Eigen::LDLT<MatrixXd> loose_factor(MatrixXd normal) {
@@ -73,16 +75,21 @@ Evidence::Evidence(const EvidenceRules& rules, const Flights& flights, ModelDisc
       discrepancy_(std::move(discrepancy)),
       threads_(threads),
       basis_(std::make_shared<const RegimeBasis>(rules, flights)),
-      groups_(kGroups) {
-  for (const auto& f : flights.all()) weights_.emplace_back(f->beats() * kRowsPerBeat, 1.0);
-  for (int channel = 0; channel < kChannels; ++channel) {
+      groups_(kGroups),
+      has_rows_(kGroups, 0) {
+  for (const auto& f : flights.all()) {
+    weights_.emplace_back(f->beats() * kRowsPerBeat, 1.0);
+    for (int g = first_group(f->clamped(), 0), c = 0; c < kChannels * kCoefficients; ++g, ++c)
+      if (f->has_rows(channel_of(g), g % kCoefficients)) has_rows_[static_cast<std::size_t>(g)] = 1;
+  }
+  for (int channel = 0; channel < kSettingChannels; ++channel) {
     double all = 0;
     for (int c = 0; c < kCoefficients; ++c) {
       const int g = channel * kCoefficients + c;
       double sum = 0, n = 0;
       for (const auto& f : flights.all())
         for (std::size_t j = 0; j < f->beats(); ++j)
-          if (f->covers(j, channel) && has_rows(g))
+          if (f->clamped() == of_bench(g) && f->covers(j, channel_of(g)) && has_rows(g))
             sum += f->signal()[row_of(j, g)] * f->signal()[row_of(j, g)], n += 1;
       groups_[static_cast<std::size_t>(g)].signal = n > 0 ? sum / n : 0;
       all += groups_[static_cast<std::size_t>(g)].signal / kCoefficients;
@@ -96,11 +103,11 @@ Evidence::Evidence(const EvidenceRules& rules, const Flights& flights, ModelDisc
   Residuals declared;
   for (std::size_t f = 0; f < flights.size(); ++f) declared.push_back(flight(f).declared_noise(f + 1));
   const Index q = basis().size();
-  for (int channel = 0; channel < kChannels; ++channel) {
+  for (int channel = 0; channel < kSettingChannels; ++channel) {
     MatrixXd normal = MatrixXd::Identity(q, q) * 1e-12;
     double n = 0;
     for (std::size_t f = 0; f < flights.size(); ++f)
-      for_rows(f, channel, [&](std::size_t j, bool) {
+      for_rows(f, channel * kCoefficients, [&](std::size_t j, bool) {
         const auto b = basis().values(f).row(static_cast<Index>(j));
         normal.noalias() += b.transpose() * b;
         n += 1;
@@ -157,7 +164,7 @@ Evidence Evidence::with_tests(const std::vector<char>& tests, SufficientStatisti
 
 Rows Evidence::without(std::size_t flight, Rows residual, const BasisCoefficients& change) const {
   for (int g = 0; g < kGroups; ++g) {
-    if (!has_rows(g)) continue;
+    if (!has_rows(g) || this->flight(flight).clamped() != of_bench(g)) continue;
     const VectorXd smooth = basis().values(flight) * change.row(g).transpose();
     for (std::size_t j = 0; j < this->flight(flight).beats(); ++j)
       residual[row_of(j, g)] -= smooth[static_cast<Index>(j)];
@@ -165,10 +172,12 @@ Rows Evidence::without(std::size_t flight, Rows residual, const BasisCoefficient
   return residual;
 }
 
-/// Calls use(beat, whether the beat before counts) for the beats that a channel covers.
+/// Calls use(beat, whether the beat before counts) for the beats that a group covers.
 template <class Use>
-void Evidence::for_rows(std::size_t flight, int channel, const Use& use) const {
+void Evidence::for_rows(std::size_t flight, int group, const Use& use) const {
   const PredictedFlight& f = this->flight(flight);
+  if (f.clamped() != of_bench(group)) return;
+  const int channel = channel_of(group);
   bool before = false;
   for (std::size_t j = 0; j < f.beats(); ++j) {
     const bool now = f.covers(j, channel);
@@ -183,7 +192,7 @@ VectorXd Evidence::session_means(const Residuals& residual, int group) const {
   const auto mean_of = [&](bool references) {
     double sum = 0, n = 0;
     for (std::size_t f = 0; f < flights_->size(); ++f)
-      for_rows(f, group / kCoefficients, [&](std::size_t j, bool) {
+      for_rows(f, group, [&](std::size_t j, bool) {
         if (flights_->is_reference(f) == references) sum += residual[f][row_of(j, group)], n += 1;
       });
     return n > 0 ? sum / n : 0;
@@ -198,29 +207,28 @@ void Evidence::learn(const Residuals& residual, Learn what) {
   const Index q = basis().size();
   io::parallel_for(static_cast<std::size_t>(kGroups), threads_, [&](std::size_t k) {
     const int g = static_cast<int>(k);
-    const int channel = g / kCoefficients;
     if (!has_rows(g)) return;
     VectorXd right = VectorXd::Zero(q);
     double n = 0;
     for (std::size_t f = 0; f < flights_->size(); ++f)
-      for_rows(f, channel, [&](std::size_t j, bool) {
+      for_rows(f, g, [&](std::size_t j, bool) {
         right += residual[f][row_of(j, g)] * basis().values(f).row(static_cast<Index>(j)).transpose();
         n += 1;
       });
     if (n == 0) return;
     VectorXd delta = VectorXd::Zero(q);
-    if (flight(0).disturbed(channel)) delta = session_means(residual, g);
-    else if (what != Learn::rest_as_noise) delta = inverse_[static_cast<std::size_t>(channel)] * right;
+    if (flight(0).disturbed(channel_of(g))) delta = session_means(residual, g);
+    else if (what != Learn::rest_as_noise) delta = inverse_[static_cast<std::size_t>(g / kCoefficients)] * right;
     const auto rest = [&](std::size_t f, std::size_t j) {
       return residual[f][row_of(j, g)] - basis().values(f).row(static_cast<Index>(j)).dot(delta);
     };
     std::vector<double> sizes;
     for (std::size_t f = 0; f < flights_->size(); ++f)
-      for_rows(f, channel, [&](std::size_t j, bool) { sizes.push_back(std::abs(rest(f, j))); });
+      for_rows(f, g, [&](std::size_t j, bool) { sizes.push_back(std::abs(rest(f, j))); });
     const double clip = kClipSd * kRobustSd * io::upper_median(sizes);
     double product = 0, square = 0;
     for (std::size_t f = 0; f < flights_->size(); ++f)
-      for_rows(f, channel, [&](std::size_t j, bool before) {
+      for_rows(f, g, [&](std::size_t j, bool before) {
         if (!before) return;
         const double a = std::clamp(rest(f, j - 1), -clip, clip), b = std::clamp(rest(f, j), -clip, clip);
         product += a * b;
@@ -234,13 +242,13 @@ void Evidence::learn(const Residuals& residual, Learn what) {
       return before ? rest(f, j) - group.past * rest(f, j - 1) : rest(f, j) * std::sqrt(1 - group.past * group.past);
     };
     for (std::size_t f = 0; f < flights_->size(); ++f)
-      for_rows(f, channel, [&](std::size_t j, bool before) { steps.push_back(std::abs(innovation(f, j, before))); });
+      for_rows(f, g, [&](std::size_t j, bool before) { steps.push_back(std::abs(innovation(f, j, before))); });
     group.sd = std::max({kRobustSd * io::upper_median(steps), group.declared_sd, 1e-9});
     if (what == Learn::declared) group.declared_sd = group.sd;
     if (what != Learn::weights) known = group;
     if (what == Learn::declared) return;  // declared noise has no outliers
     for (std::size_t f = 0; f < flights_->size(); ++f)
-      for_rows(f, channel, [&](std::size_t j, bool before) {
+      for_rows(f, g, [&](std::size_t j, bool before) {
         const double t = innovation(f, j, before) / group.sd;
         weights_[f][row_of(j, g)] = std::min(1.0, (kNoiseFreedom + 1) / (kNoiseFreedom + t * t));
       });
@@ -251,7 +259,7 @@ void Evidence::learn(const Residuals& residual, Learn what) {
 template <class Use>
 void Evidence::for_whitened(std::size_t flight, int group, const Use& use) const {
   const Group& g = groups_[static_cast<std::size_t>(group)];
-  for_rows(flight, group / kCoefficients, [&](std::size_t j, bool before) {
+  for_rows(flight, group, [&](std::size_t j, bool before) {
     const double scale = std::sqrt(weights_[flight][row_of(j, group)]) / g.sd;
     if (before) use(j, scale, scale * g.past);
     else use(j, scale * std::sqrt(1 - g.past * g.past), 0.0);
@@ -260,12 +268,13 @@ void Evidence::for_whitened(std::size_t flight, int group, const Use& use) const
 
 void Evidence::sum_basis() {
   const Index q = basis().size();
-  std::vector<std::vector<MatrixXd>> sums(flights_->size(), std::vector<MatrixXd>(kGroups, MatrixXd::Zero(q, q)));
+  std::vector<std::vector<MatrixXd>> sums(flights_->size(), std::vector<MatrixXd>(kGroups));
   for (std::size_t f = 0; f < flights_->size(); ++f) {
     const MatrixXd& values = basis().values(f);
     io::parallel_for(static_cast<std::size_t>(kGroups), threads_, [&](std::size_t group) {
       const int g = static_cast<int>(group);
       if (!has_rows(g)) return;
+      sums[f][group] = MatrixXd::Zero(q, q);
       MatrixXd rows(static_cast<Index>(flight(f).beats()), q);
       Index n = 0;
       for_whitened(f, g, [&](std::size_t j, double now, double past) {
@@ -289,6 +298,7 @@ void Evidence::take_sums(std::vector<std::vector<MatrixXd>> of_flights) {
   s->all.resize(kGroups);
   s->loose.resize(kGroups);
   io::parallel_for(static_cast<std::size_t>(kGroups), threads_, [&](std::size_t g) {
+    if (!has_rows(static_cast<int>(g))) return;
     MatrixXd& all = s->all[g];
     all = s->of_flights[0][g];
     for (std::size_t f = 1; f < s->of_flights.size(); ++f) all += s->of_flights[f][g];
@@ -301,14 +311,14 @@ void Evidence::take_sums(std::vector<std::vector<MatrixXd>> of_flights) {
 class Evidence::GroupSums {
  public:
   GroupSums(const Evidence& e, const std::vector<char>& use, int group)
-      : sums_(*e.sums_), use_(use), g_(static_cast<std::size_t>(group)) {
-    if (std::ranges::all_of(use, std::identity())) return;
+      : sums_(*e.sums_), use_(use), g_(static_cast<std::size_t>(group)), has_rows_(e.has_rows(group)) {
+    if (!has_rows_ || std::ranges::all_of(use, std::identity())) return;
     own_ = MatrixXd::Zero(e.basis().size(), e.basis().size());
     for (std::size_t f = 0; f < use.size(); ++f)
       if (use[f]) own_ += sums_.of_flights[f][g_];
   }
   const MatrixXd& normal() const { return own_.size() > 0 ? own_ : sums_.all[g_]; }
-  bool has_rows() const { return normal()(0, 0) != 0; }
+  bool has_rows() const { return has_rows_ && normal()(0, 0) != 0; }
   VectorXd right(const SufficientStatistics& residual) const {
     VectorXd sum = VectorXd::Zero(normal().rows());
     for (std::size_t f = 0; f < use_.size(); ++f)
@@ -324,6 +334,7 @@ class Evidence::GroupSums {
   const Sums& sums_;
   const std::vector<char>& use_;
   std::size_t g_;
+  bool has_rows_;
   MatrixXd own_;  ///< empty: all flights count
 };
 
@@ -337,18 +348,19 @@ Evidence::GroupSum Evidence::sum_of(const SufficientStatistics& residual, const 
 BasisCoefficients Evidence::basis_coefficients(const Residuals& rows) const {
   const Index q = basis().size();
   BasisCoefficients result = BasisCoefficients::Zero(kGroups, q);
-  for (int channel = 0; channel < kChannels; ++channel) {
+  for (int channel = 0; channel < kSettingChannels; ++channel) {
+    const int first = channel * kCoefficients;
     MatrixXd right = MatrixXd::Zero(q, kCoefficients);
     for (std::size_t f = 0; f < flights_->size(); ++f) {
+      if (flight(f).clamped() != of_bench(first)) continue;
       MatrixXd counted = MatrixXd::Zero(basis().values(f).rows(), kCoefficients);
-      for_rows(f, channel, [&](std::size_t j, bool) {
+      for_rows(f, first, [&](std::size_t j, bool) {
         counted.row(static_cast<Index>(j)) =
-            Eigen::Map<const Eigen::RowVectorXd>(&rows[f][row_of(j, channel * kCoefficients)], kCoefficients);
+            Eigen::Map<const Eigen::RowVectorXd>(&rows[f][row_of(j, first)], kCoefficients);
       });
       right.noalias() += basis().values(f).transpose() * counted;
     }
-    result.middleRows(Index{channel} * kCoefficients, kCoefficients) =
-        (inverse_[static_cast<std::size_t>(channel)] * right).transpose();
+    result.middleRows(first, kCoefficients) = (inverse_[static_cast<std::size_t>(channel)] * right).transpose();
   }
   return result;
 }
@@ -376,8 +388,9 @@ SufficientStatistics Evidence::statistics(const Residuals& residual) const {
 void Evidence::add(double share, const BasisCoefficients& change, SufficientStatistics& to) const {
   for (std::size_t f = 0; f < flights_->size(); ++f)
     for (int g = 0; g < kGroups; ++g)
-      to.sums[f][static_cast<std::size_t>(g)] +=
-          share * (sums_->of_flights[f][static_cast<std::size_t>(g)] * change.row(g).transpose());
+      if (has_rows(g))
+        to.sums[f][static_cast<std::size_t>(g)] +=
+            share * (sums_->of_flights[f][static_cast<std::size_t>(g)] * change.row(g).transpose());
 }
 
 double Evidence::noise_sd(int group) const {

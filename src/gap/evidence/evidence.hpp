@@ -25,8 +25,15 @@
 
 namespace flappy::gap {
 
-/// Number of groups; [group] is channel x kCoefficients + coefficient.
-inline constexpr int kGroups = kChannels * kCoefficients;
+/// Number of groups; [group] is channel x kCoefficients + coefficient. Runs on a bench have groups of their own, which
+/// follow those of flights in the air.
+inline constexpr int kGroups = kSettingChannels * kCoefficients;
+/// First group of a channel.
+constexpr int first_group(bool on_bench, int channel) { return ((on_bench ? kChannels : 0) + channel) * kCoefficients; }
+constexpr bool of_bench(int group) { return group >= first_group(true, 0); }
+constexpr int channel_of(int group) { return group / kCoefficients % kChannels; }
+/// Column of a group in a beat of Rows.
+constexpr int column_of(int group) { return group % (kChannels * kCoefficients); }
 
 /// Smooth functions of the regime; [basis] is the index of a function. The first is the constant; each other one has
 /// mean 0 and rms 1 over all flights. Functions that never change are left out. In a contrast, copies of all functions
@@ -120,8 +127,8 @@ struct Reduced {
 //
 /// Classes of functions whose coefficients share a scale: Regimes, and once more for the copies in the test flights.
 inline constexpr int kRegimes = static_cast<int>(Regimes::count), kClasses = 2 * kRegimes;
-/// Blocks: [channel][harmonic][class].
-inline constexpr int kBlocks = kChannels * (kHarmonics + 1) * kClasses;
+/// Blocks: [channel of a setting][harmonic][class].
+inline constexpr int kBlocks = kSettingChannels * (kHarmonics + 1) * kClasses;
 constexpr bool block_of_tests(std::size_t block) { return block % kClasses >= static_cast<std::size_t>(kRegimes); }
 constexpr Regimes regimes_of_block(std::size_t block) { return static_cast<Regimes>(block % kRegimes); }
 
@@ -234,7 +241,7 @@ class Evidence {
     double sd = 1, past = 0, signal = 0;
     double declared_sd = 0;
   };
-  /// Basis x basis, summed over whitened rows.
+  /// Basis x basis, summed over whitened rows. Empty in groups without rows.
   struct Sums {
     std::vector<std::vector<Eigen::MatrixXd>> of_flights;  ///< [flight][group]
     std::vector<Eigen::MatrixXd> all;                      ///< [group]
@@ -244,7 +251,7 @@ class Evidence {
   class Weighing;
   enum class Learn { declared, weights, noise, rest_as_noise };
   const PredictedFlight& flight(std::size_t f) const { return *(*flights_)[f]; }
-  bool has_rows(int group) const { return flight(0).has_rows(group / kCoefficients, group % kCoefficients); }
+  bool has_rows(int group) const { return has_rows_[static_cast<std::size_t>(group)] != 0; }
   void sum_basis();
   void take_sums(std::vector<std::vector<Eigen::MatrixXd>> of_flights);
   struct GroupSum {
@@ -257,7 +264,7 @@ class Evidence {
   void learn(const Residuals& residual, Learn what);
   Eigen::VectorXd session_means(const Residuals& residual, int group) const;
   template <class Use>
-  void for_rows(std::size_t flight, int channel, const Use& use) const;
+  void for_rows(std::size_t flight, int group, const Use& use) const;
   template <class Use>
   void for_whitened(std::size_t flight, int group, const Use& use) const;
   Eigen::VectorXd prior_sd(int group) const;
@@ -268,9 +275,10 @@ class Evidence {
   int threads_;
   std::shared_ptr<const RegimeBasis> basis_;
   std::vector<Group> groups_;
+  std::vector<char> has_rows_;  ///< [group] whether a flight of its setting has rows of it
   bool scales_held_ = false;
   Residuals weights_;
-  std::vector<Eigen::MatrixXd> inverse_;  ///< [channel] inverse of basis x basis, without whitening
+  std::vector<Eigen::MatrixXd> inverse_;  ///< [group / kCoefficients] inverse of basis x basis, without whitening
   std::shared_ptr<const Sums> sums_;
 };
 

@@ -171,7 +171,7 @@ class Evidence::Weighing {
   void find_groups(const std::vector<char>& use) {
     for (int g = 0; g < kGroups; ++g)
       for (std::size_t f = 0; f < use.size(); ++f)
-        if (use[f] && e_.sums_->of_flights[f][static_cast<std::size_t>(g)](0, 0) > 0) {
+        if (use[f] && e_.has_rows(g) && e_.sums_->of_flights[f][static_cast<std::size_t>(g)](0, 0) > 0) {
           seen_.push_back(g);
           break;
         }

@@ -152,21 +152,22 @@ std::vector<Background> RobotFit::session_changes(const SessionVariation& sessio
     if (const double sd = session.parameter_sd(n.id + "." + n.value); sd > 0)
       list.push_back({kSessionParameters, sd * basis.in_tests(sensor_errors_[i])});
   }
-  const auto add_level = [&](int channel, double sd) {
+  const auto add_level = [&](std::initializer_list<int> groups, double sd) {
     BasisCoefficients level = BasisCoefficients::Zero(kGroups, basis.size());
-    level(channel * kCoefficients, 0) = sd;
+    for (const int g : groups) level(g, 0) = sd;
     list.push_back({kSessionParameters, basis.in_tests(level)});
   };
   const FlightList all = fitter_.flights().all();
   const auto metered = std::ranges::find_if(
       all, [](const auto& f) { return f->recording() != nullptr && f->recording()->log.header.power.has_value(); });
   if (metered != all.end())
-    add_level(kBattery, kCharged * (*metered)->recording()->log.header.power->battery_nominal_V);
-  if (std::ranges::all_of(all, [](const auto& f) { return f->recording() != nullptr && f->recording()->clamped(); })) {
-    const Recording& r = *all.front()->recording();
+    add_level({first_group(false, kBattery), first_group(true, kBattery)},
+              kCharged * (*metered)->recording()->log.header.power->battery_nominal_V);
+  if (const auto bench = std::ranges::find_if(all, [](const auto& f) { return f->clamped(); }); bench != all.end()) {
+    const Recording& r = *(*bench)->recording();
     for (int i = 0; i < 3; ++i) {
-      add_level(kSpecificForceX + i, kZero_N / r.mass_kg);
-      add_level(kAngularAccelerationX + i, kZero_Nm / r.inertia_kg_m2[i]);
+      add_level({first_group(true, kSpecificForceX + i)}, kZero_N / r.mass_kg);
+      add_level({first_group(true, kAngularAccelerationX + i)}, kZero_Nm / r.inertia_kg_m2[i]);
     }
   }
   for (const MagnitudeColumn& m : magnitudes_) {

@@ -50,7 +50,7 @@ struct Moment {
   double sum = 0, count = 0;
   double root() const { return count > 0 ? std::sqrt(sum / count) : 0; }
 };
-using ShareMoments = std::array<std::array<std::array<Moment, kKinds>, kHarmonics + 1>, kChannels>;
+using ShareMoments = std::array<std::array<std::array<Moment, kKinds>, kHarmonics + 1>, kSettingChannels>;
 
 /// [effect] Scales of a robot's background magnitudes; they make their prior heavy-tailed.
 using Factors = std::map<std::string, double>;
@@ -113,21 +113,22 @@ constexpr std::array<std::pair<int, int>, 8> kAlike = {{{kAngularAccelerationX, 
                                                         {kRotateX, kRotateZ}}};
 
 void shrink(ShareMoments& shares) {
-  for (const auto& [first, last] : kAlike)
-    for (std::size_t h = 0; h <= kHarmonics; ++h)
-      for (std::size_t k = 0; k < kKinds; ++k) {
-        Moment all;
-        for (int c = first; c <= last; ++c) {
-          all.sum += shares[static_cast<std::size_t>(c)][h][k].sum;
-          all.count += shares[static_cast<std::size_t>(c)][h][k].count;
+  for (const int setting : {0, static_cast<int>(kChannels)})
+    for (const auto& [first, last] : kAlike)
+      for (std::size_t h = 0; h <= kHarmonics; ++h)
+        for (std::size_t k = 0; k < kKinds; ++k) {
+          Moment all;
+          for (int c = setting + first; c <= setting + last; ++c) {
+            all.sum += shares[static_cast<std::size_t>(c)][h][k].sum;
+            all.count += shares[static_cast<std::size_t>(c)][h][k].count;
+          }
+          if (all.count == 0) continue;
+          for (int c = setting + first; c <= setting + last; ++c) {
+            Moment& m = shares[static_cast<std::size_t>(c)][h][k];
+            m.sum += kShrink * all.sum / all.count;
+            m.count += kShrink;
+          }
         }
-        if (all.count == 0) continue;
-        for (int c = first; c <= last; ++c) {
-          Moment& m = shares[static_cast<std::size_t>(c)][h][k];
-          m.sum += kShrink * all.sum / all.count;
-          m.count += kShrink;
-        }
-      }
 }
 
 /// The class of regimes in which each effect's background is largest, in units of the model discrepancy.
@@ -159,10 +160,15 @@ void shrink(const std::map<std::string, std::size_t>& classes, std::map<std::str
 
 void take(const ShareMoments& moments, const std::map<std::string, Moment>& backgrounds, Shares& shares,
           std::map<std::string, double>& background) {
-  for (std::size_t c = 0; c < kChannels; ++c)
+  const Shares before = shares;
+  for (std::size_t c = 0; c < kSettingChannels; ++c) {
+    bool seen = false;
     for (std::size_t h = 0; h <= kHarmonics; ++h)
       for (std::size_t k = 0; k < kKinds; ++k)
-        if (moments[c][h][k].count > 0) shares[c][h][k] = std::max(moments[c][h][k].root(), kMinShare);
+        if (moments[c][h][k].count > 0) shares[c][h][k] = std::max(moments[c][h][k].root(), kMinShare), seen = true;
+    // what no run on a bench has ever shown is as in the air
+    if (c >= kChannels && !seen && before[c] == before[c - kChannels]) shares[c] = shares[c - kChannels];
+  }
   for (const auto& [effect, m] : backgrounds) background[effect] = std::max(m.root(), kMinBackground);
 }
 

@@ -51,7 +51,7 @@ Losses losses_of(const RowContext& around, const TestResiduals& residual) {
         for (int c = 0; c < kCoefficients; ++c) {
           if (!around.has_rows(channel, c)) continue;
           const std::size_t g = group_of(channel, c);
-          sum += huber_loss(residual[f][j * kRowsPerBeat + g] / around.noise_sd[g]);
+          sum += huber_loss(residual[f][j * kRowsPerBeat + g] / around.noise_sd_of(around.clamped[f] != 0, channel, c));
           n += 1;
         }
         l.sum.back() += sum / n;

@@ -35,7 +35,7 @@ std::optional<double> error_on(std::size_t rung, const RowContext& around, const
     for (int channel = 0; channel < kChannels; ++channel) {
       if (rung_of_channel(channel, around.clamped[f] != 0) != rung) continue;
       for (int c = 0; c < kCoefficients; ++c) {
-        const double noise = around.noise_sd[group_of(channel, c)];
+        const double noise = around.noise_sd_of(around.clamped[f] != 0, channel, c);
         if (!around.has_rows(channel, c) || !(noise > 0)) continue;
         for (std::size_t beat = 0; beat < around.beats[f]; ++beat)
           if (around.covers(f, beat, channel))

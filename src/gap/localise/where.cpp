@@ -37,13 +37,14 @@ struct TestedBeat {
 
 class ChannelRows {
  public:
-  ChannelRows(const RowContext& around, const TestResiduals& residual, int channel, Fitted fitted)
-      : around_(around), channel_(channel), fitted_(fitted) {
+  /// Of the flights in the air, or of the runs on a bench.
+  ChannelRows(const RowContext& around, const TestResiduals& residual, int channel, bool clamped, Fitted fitted)
+      : around_(around), channel_(channel), clamped_(clamped), fitted_(fitted) {
     const std::vector<int> all = blocks_of(around.beats, kLongBlock), fine = blocks_of(around.beats, kShortBlock);
     std::size_t i = 0;
     for (std::size_t f = 0; f < around.beats.size(); ++f)
       for (std::size_t j = 0; j < around.beats[f]; ++j, ++i)
-        if (!residual[f].empty() && around.covers(f, j, channel)) {
+        if (!residual[f].empty() && (around.clamped[f] != 0) == clamped && around.covers(f, j, channel)) {
           beats_.push_back({f, j});
           block_.push_back(all[i]);
           short_block_.push_back(fine[i]);
@@ -70,7 +71,7 @@ class ChannelRows {
   }
 
  private:
-  double noise_sd(int coefficient) const { return around_.noise_sd[group_of(channel_, coefficient)]; }
+  double noise_sd(int coefficient) const { return around_.noise_sd_of(clamped_, channel_, coefficient); }
   void add(ResidualTest test, Regime regime, double gap, double floor, double p,
            std::vector<ResidualLocation>& places) const {
     places.push_back(
@@ -209,6 +210,7 @@ class ChannelRows {
 
   const RowContext& around_;
   int channel_;
+  bool clamped_;
   Fitted fitted_;
   std::vector<TestedBeat> beats_;
   std::vector<int> block_, short_block_;
@@ -223,13 +225,14 @@ RowContext row_context_of(const FlightList& flights, std::vector<double> noise_s
   for (const auto& f : flights) {
     s.beats.push_back(f->beats());
     s.beats_Hz.push_back(f->beats_Hz());
-    s.clamped.push_back(f->recording() != nullptr && f->recording()->clamped() ? 1 : 0);
+    s.clamped.push_back(f->clamped() ? 1 : 0);
     s.covered.emplace_back();
     for (std::size_t j = 0; j < f->beats(); ++j)
       for (int channel = 0; channel < kChannels; ++channel) s.covered.back().push_back(f->covers(j, channel) ? 1 : 0);
   }
-  for (int g = 0; g < kGroups; ++g)
-    s.rows.push_back(!flights.empty() && flights.front()->has_rows(g / kCoefficients, g % kCoefficients) ? 1 : 0);
+  for (int channel = 0; channel < kChannels; ++channel)
+    for (int c = 0; c < kCoefficients; ++c)
+      s.rows.push_back(std::ranges::any_of(flights, [&](const auto& f) { return f->has_rows(channel, c); }) ? 1 : 0);
   const auto gather = [&](std::vector<RegimeQuantity> (PredictedFlight::*of)() const, std::vector<Quantity>& to) {
     for (const auto& f : flights)
       for (RegimeQuantity& own : ((*f).*of)()) {
@@ -246,7 +249,9 @@ RowContext row_context_of(const FlightList& flights, std::vector<double> noise_s
 
 std::vector<ResidualLocation> locate(const RowContext& around, const TestResiduals& residual, Fitted fitted) {
   std::vector<ResidualLocation> places;
-  for (int channel = 0; channel < kChannels; ++channel) ChannelRows(around, residual, channel, fitted).test_all(places);
+  for (const bool clamped : {false, true})
+    for (int channel = 0; channel < kChannels; ++channel)
+      ChannelRows(around, residual, channel, clamped, fitted).test_all(places);
   std::vector<double> p_values;
   for (const ResidualLocation& p : places) p_values.push_back(p.p_value);
   const std::vector<char> found = discoveries(p_values, kFalseDiscoveries);

@@ -24,7 +24,7 @@ namespace flappy::gap {
 /// False discovery rate among all tests of a stage. Choice.
 inline constexpr double kFalseDiscoveries = 0.05;
 
-/// Index of a coefficient of a channel among the groups (gap/evidence/evidence.hpp).
+/// Index of a coefficient of a channel among the rows of a beat.
 constexpr std::size_t group_of(int channel, int coefficient) {
   return static_cast<std::size_t>(channel) * kCoefficients + static_cast<std::size_t>(coefficient);
 }
@@ -43,9 +43,12 @@ struct RowContext {
   std::vector<char> clamped;               ///< [flight] whether the robot was clamped
   std::vector<std::vector<char>> covered;  ///< [flight][beat x kChannels + channel]
   std::vector<Quantity> regimes, inputs;   ///< those that all flights have
-  std::vector<char> rows;                  ///< [group] whether the group has rows
-  std::vector<double> noise_sd;            ///< [group] standard deviation of a row's noise
+  std::vector<char> rows;                  ///< [row of a beat] whether a flight has it
+  std::vector<double> noise_sd;            ///< [group] standard deviation of a row's noise (gap/evidence/evidence.hpp)
   bool has_rows(int channel, int coefficient) const { return rows[group_of(channel, coefficient)] != 0; }
+  double noise_sd_of(bool on_bench, int channel, int coefficient) const {
+    return noise_sd[(on_bench ? kRowsPerBeat : 0) + group_of(channel, coefficient)];
+  }
   bool covers(std::size_t flight, std::size_t beat, int channel) const {
     return covered[flight][beat * kChannels + static_cast<std::size_t>(channel)] != 0;
   }

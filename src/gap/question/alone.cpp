@@ -142,7 +142,7 @@ BasisCoefficients Alone::law_sd(const Evidence& evidence, const std::string& /*e
   const RegimeBasis& basis = evidence.basis();
   BasisCoefficients sd = BasisCoefficients::Zero(change.rows(), change.cols());
   const auto of_place = [&](int i) { return regimes_of(basis.kind(i)) == Regimes::place; };
-  const auto load = [](int g) { return g / kCoefficients <= kSpecificForceZ; };
+  const auto load = [](int g) { return channel_of(g) <= kSpecificForceZ; };
   VectorXd squares = VectorXd::Zero(change.cols());
   double groups = 0, place = 0, all = 0, most = 0;
   for (int g = 0; g < kGroups; ++g) {

@@ -65,8 +65,10 @@ std::vector<SeenQuantity> changes_seen(const RobotFit& robot) {
   Regressors regressors;
   std::vector<SeenQuantity> seen;
   std::vector<double> widths;
+  const FlightList flights = fitter.flights().all();
+  const bool on_bench = std::ranges::all_of(flights, [](const auto& f) { return f->clamped(); });
   for (const Looked& looked : kLooked) {
-    const int group = looked.channel * kCoefficients, i = function_of(basis, looked);
+    const int group = first_group(on_bench, looked.channel), i = function_of(basis, looked);
     if (i < 0 || !(evidence.signal(group) > 0)) continue;
     const double scatter = std::sqrt(variance(group, i));
     columns.emplace_back(BasisCoefficients::Zero(kGroups, basis.size()))(group, i) = kWide * scatter;

@@ -22,7 +22,7 @@ using Eigen::VectorXd;
 BasisCoefficients spread_of(const Evidence& evidence, const BasisCoefficients& change) {
   const RegimeBasis& basis = evidence.basis();
   const auto kind = [](int g) {
-    const int channel = g / kCoefficients;
+    const int channel = channel_of(g);
     return channel <= kAngularAccelerationZ ? 0 : channel <= kSpecificForceZ ? 1 : 2;
   };
   MatrixXd squares = MatrixXd::Zero(3, basis.size());

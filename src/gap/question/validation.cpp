@@ -236,8 +236,8 @@ TestResiduals smoothed_away(const Evidence& evidence, const Flights& flights, co
 double mean_square(const Evidence& evidence, const FlightList& tests, const TestResiduals& residual) {
   double sum = 0, n = 0;
   for (const int channel : channels_of(tests)) {
-    const double noise = evidence.noise_sd(channel * kCoefficients);
     for_rows(tests, channel, [&](std::size_t f, std::size_t, std::size_t row) {
+      const double noise = evidence.noise_sd(first_group(tests[f]->clamped(), channel));
       if (!residual[f].empty()) sum += std::pow(residual[f][row] / noise, 2), n += 1;
     });
   }

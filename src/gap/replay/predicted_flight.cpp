@@ -50,6 +50,8 @@ std::vector<Rows> PredictedFlight::compare(const std::vector<ComparedVehicle>& v
   return list;
 }
 
+bool PredictedFlight::clamped() const { return recording() != nullptr && recording()->clamped(); }
+
 FlightList Flights::all() const {
   FlightList list = references;
   list.insert(list.end(), tests.begin(), tests.end());

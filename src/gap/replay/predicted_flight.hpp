@@ -49,6 +49,10 @@ const char* channel_unit(int channel);
 using Rows = std::vector<double>;
 inline constexpr std::size_t kRowsPerBeat = static_cast<std::size_t>(kChannels) * kCoefficients;
 
+/// Channels of flights in the air, then those of runs on a bench: what a model gets wrong and the noise of the sensors
+/// differ there.
+inline constexpr int kSettingChannels = 2 * kChannels;
+
 /// Index in Rows of the mean of a channel over a beat.
 constexpr std::size_t row_of_mean(std::size_t beat, int channel) {
   return beat * kRowsPerBeat + static_cast<std::size_t>(channel) * kCoefficients;
@@ -114,6 +118,7 @@ class PredictedFlight {
   virtual const std::string& name() const = 0;
   /// Name of the session; empty: the flight is its own.
   virtual std::string session() const { return {}; }
+  virtual bool clamped() const;           ///< whether it is a run of a robot on a bench
   virtual bool has_ground() const = 0;    ///< whether the log declares a ground
   virtual std::size_t beats() const = 0;  ///< number of beats; of a beat-averaged vehicle, number of rows in time
   virtual double beats_Hz() const = 0;    ///< beats, or these rows, a second

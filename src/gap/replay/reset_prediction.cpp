@@ -297,7 +297,7 @@ void put_torso(const std::vector<const Recording*>& recordings, std::size_t boun
 ResetPrediction::Replay ResetPrediction::replay(const std::vector<Lane>& lanes) const {
   const Recording& r = recording_;
   const ResetBlock reset = *reset_block_kernels[sim::place_of("")];
-  const ClampedBlock clamped = *clamped_block_kernels[sim::place_of("")];
+  const ClampedBlock held = *clamped_block_kernels[sim::place_of("")];
   const auto lane_of = [&](std::size_t i) -> const Lane& { return lanes[std::min(i, lanes.size() - 1)]; };
   const auto driven = [&](std::size_t i) {
     model::Vehicle vehicle = lane_of(i).vehicle->vehicle;
@@ -330,7 +330,7 @@ ResetPrediction::Replay ResetPrediction::replay(const std::vector<Lane>& lanes) 
   TorsoRows torso[2];
   ClampedBlockState momenta;
   put_torso(recordings, 0, torso[0]);
-  if (r.clamped()) clamped(block, 0, momenta, kept);
+  if (r.clamped()) held(block, 0, momenta, kept);
   else reset(block, nullptr, torso[0], 1, imu_m, r.world.gravity_m_s2, kept);
 
   const int longest = *std::ranges::max_element(r.steps);
@@ -351,7 +351,7 @@ ResetPrediction::Replay ResetPrediction::replay(const std::vector<Lane>& lanes) 
     if (r.log.power) in_force.meter = meter.data() + kMeter;
     storage.kernel(block, in_force, plan, 0, r.steps[k], {});
     if (r.clamped()) {
-      clamped(block, r.interval_s(k), momenta, kept);
+      held(block, r.interval_s(k), momenta, kept);
       for (int i = 0; i < 3; ++i)
         for (std::size_t lane = 0; lane < kVehicles; ++lane) {
           kept.rows[kSpecificForce + i][lane] /= static_cast<Flown>(r.mass_kg);

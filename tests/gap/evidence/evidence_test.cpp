@@ -72,6 +72,37 @@ TEST(Evidence, LearnsTheNoise) {
   EXPECT_NEAR(declared.with_noise(nothing).noise_sd(group), declared.noise_sd(group), 0.02 * SyntheticFlight::kNoise);
 }
 
+// Two flights in the air and two runs on a bench, whose noise is five times as large. 240 rows: as in LearnsTheNoise.
+TEST(Evidence, KeepsABenchApartFromTheAir) {
+  const auto made = synthetic_flights(4, synthetic_law);
+  made[1]->on_bench = made[3]->on_bench = true;
+  const Flights flights = as_flights(made);
+  ModelDiscrepancy discrepancy = read_model_discrepancy();
+  for (std::size_t c = kChannels; c < kSettingChannels; ++c)
+    for (auto& of_harmonic : discrepancy.shares[c])
+      for (double& share : of_harmonic) share *= 3;
+  const Evidence declared(question_of(flights), flights, discrepancy, 1);
+  Residuals residual;
+  for (const auto& f : made) residual.push_back(f->noise(77, f->on_bench ? 0.25 : 0.05));
+  const Evidence evidence = declared.with_noise(residual);
+  const int air = first_group(false, kSpecificForceZ), bench = first_group(true, kSpecificForceZ);
+  EXPECT_NEAR(evidence.noise_sd(air), 0.05, 0.2 * 0.05);
+  EXPECT_NEAR(evidence.noise_sd(bench), 0.25, 0.2 * 0.25);
+  const SufficientStatistics s = evidence.statistics(residual);
+  for (std::size_t f = 0; f < made.size(); ++f) {
+    EXPECT_EQ(s.sums[f][static_cast<std::size_t>(air)].norm() > 0, !made[f]->on_bench) << f;
+    EXPECT_EQ(s.sums[f][static_cast<std::size_t>(bench)].norm() > 0, made[f]->on_bench) << f;
+  }
+  const BasisCoefficients sd = evidence.discrepancy_sd({});
+  EXPECT_NEAR(sd(bench, 0) / sd(air, 0), 3, 1e-9) << "signals are equal";
+  // a change on the bench alone is none in the air
+  BasisCoefficients change = BasisCoefficients::Zero(kGroups, evidence.basis().size());
+  change(bench, 0) = 1;
+  EXPECT_EQ(evidence.without(0, residual[0], change), residual[0]);
+  EXPECT_NE(evidence.without(1, residual[1], change), residual[1]);
+  EXPECT_NE(evidence.block_of(air, 0), evidence.block_of(bench, 0));
+}
+
 TEST(Evidence, CountsRowsFarOffForLess) {
   const auto made = synthetic_flights(1, synthetic_law);
   const Flights flights = as_flights(made);

@@ -16,6 +16,19 @@ TEST(ModelDiscrepancy, HasAShareForEachFunctionOfEachChannel) {
             << channel_name(channel) << " " << h << " " << k;
 }
 
+TEST(ModelDiscrepancy, HasSharesOfABenchOfItsOwnOrThoseOfTheAir) {
+  ModelDiscrepancy d = read_model_discrepancy();
+  for (std::size_t c = 0; c < kChannels; ++c) d.shares[c + kChannels] = d.shares[c];
+  d.shares[kChannels + kStrokeLeft][1][0] = 0.125;
+  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "bench.toml";
+  io::write_atomically(file, discrepancy_text(d, "a test"));
+  const Shares read = read_model_discrepancy(file).shares;
+  std::filesystem::remove(file);
+  EXPECT_EQ(share_of(read, kChannels + kStrokeLeft, 1, BasisFunction::constant), 0.125);
+  EXPECT_EQ(read[kChannels + kStrokeRight], read[kStrokeRight]);
+  EXPECT_NE(read[kChannels + kStrokeLeft], read[kStrokeLeft]);
+}
+
 TEST(ModelDiscrepancy, KnowsBackgroundsByEffect) {
   ModelDiscrepancy d = read_model_discrepancy();
   d.background = {{"other", 0.1}, {"wind", 0.3}, {"wing_damage", 0.2}};

@@ -145,12 +145,12 @@ Flown flown(unsigned seed, double past) {
   std::mt19937_64 random(seed);
   Flown f;
   f.around.noise_sd.assign(kGroups, 2);
-  for (int g = 0; g < kGroups; ++g)
+  for (int g = 0; g < static_cast<int>(kRowsPerBeat); ++g)
     f.around.rows.push_back(g / kCoefficients < kPathX || g % kCoefficients == 0 ? 1 : 0);
   Quantity height{"height", "m", {}}, input{"input", "V", {}};
   const auto rows = [&] {
     Rows r(kBeats * kRowsPerBeat, 0);
-    for (int g = 0; g < kGroups; ++g) {
+    for (int g = 0; g < static_cast<int>(kRowsPerBeat); ++g) {
       const std::vector<double> y = remembering(random, kBeats, past);
       for (std::size_t j = 0; j < kBeats; ++j) r[j * kRowsPerBeat + static_cast<std::size_t>(g)] = 2 * y[j];
     }

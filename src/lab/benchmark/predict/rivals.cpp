@@ -16,10 +16,11 @@ std::vector<double> energies(const gap::FlightList& flights, const std::vector<d
     for (std::size_t j = 0; j < flights[f]->beats(); ++j)
       for (int g = 0; g < gap::kGroups; ++g) {
         const auto k = static_cast<std::size_t>(g);
-        if (!flights[f]->has_rows(g / gap::kCoefficients, g % gap::kCoefficients) || !(noise_sd[k] > 0) ||
-            !flights[f]->covers(j, g / gap::kCoefficients))
+        const int channel = gap::channel_of(g);
+        if (flights[f]->clamped() != gap::of_bench(g) || !flights[f]->has_rows(channel, g % gap::kCoefficients) ||
+            !(noise_sd[k] > 0) || !flights[f]->covers(j, channel))
           continue;
-        const double x = residual[f][j * gap::kRowsPerBeat + k] / noise_sd[k];
+        const double x = residual[f][j * gap::kRowsPerBeat + static_cast<std::size_t>(gap::column_of(g))] / noise_sd[k];
         sums[k] += x * x;
       }
   return sums;
