@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The table of the blind benchmark: every part, on new robots, of one commit.
 
-    scripts/results/blind_table.py OUT [--cases 4] [--families a b c] [--kinds contrast alone bench] [--launch "mpirun -n 4"] [--add cases.jsonl ...]
+    scripts/results/blind_table.py OUT [--cases 4] [--families a b c] [--kinds contrast alone bench both] [--launch "mpirun -n 4"] [--add cases.jsonl ...]
 
 Makes and scores the robots of each family, with what is learnt from the other two, and writes OUT/table.md, and score.csv and cases.jsonl
 of robots in flight and on a bench, OUT/flight and OUT/bench. After any stop, the same command goes on. --launch runs the programs on several ranks, which may be on several machines that
@@ -20,9 +20,11 @@ LAB = ROOT / "configs" / "lab"
 #: Faults that a bench can show: those of drive, hinges, stops and wings. Tether, ground, walls, wind and sensors in flight are not among them.
 OF_THE_BENCH = ["spring_hardening", "gear_backlash", "coulomb_friction", "winding_heating", "battery_sag", "driver_dead_zone", "driver_bandwidth",
                 "command_delay", "stop_compliance", "wing_inertia", "wing_flexibility", "wing_damage", "added_mass", "rotational_lift"]
+ALONE = ["singles", "singles_current", "redeclared", "none", "parameters", "own_parameters", "conventions", "withheld", "outside", "pairs", "hover"]
 KINDS = {
     "contrast": ["--contrast"],
-    "alone": [],
+    "alone": ["--part", *ALONE],
+    "both": ["--part", "singles", "singles_bench", "own_parameters_bench"],
     "bench": ["--contrast", "--bench", "--part", "changed", "unchanged", "--effects", *OF_THE_BENCH],
 }
 
@@ -30,7 +32,7 @@ KINDS = {
 def learnt(kind, family):
     """Options for what is learnt from the other two families."""
     options = ["--discrepancy", LAB / "discrepancy" / f"without_{family}.toml"]
-    if kind != "alone":
+    if kind not in ("alone", "both"):
         options += ["--verdict", LAB / "sessions" / f"verdict_without_{family}.toml"]
         sessions = LAB / "sessions" / f"{'bench_' if kind == 'bench' else ''}without_{family}.toml"
         if not sessions.exists():
@@ -40,8 +42,8 @@ def learnt(kind, family):
 
 
 def is_of_bench(cases):
-    """Whether a cases.jsonl is of clamped robots."""
-    return json.loads(cases.read_text().splitlines()[0])["bench"]
+    """Whether a cases.jsonl is of a table with clamped robots."""
+    return any(json.loads(line)["bench"] for line in cases.read_text().splitlines())
 
 
 def main():
@@ -75,7 +77,7 @@ def main():
             sys.exit(f"{name}: rc {code}; the same command goes on")
 
     # robots of A cannot be clamped
-    parts = [(kind, family) for kind in o.kinds for family in o.families if (kind, family) != ("bench", "a")]
+    parts = [(kind, family) for kind in o.kinds for family in o.families if kind not in ("bench", "both") or family != "a"]
     options = {part: learnt(*part) for part in parts}
     for kind, family in parts:
         folder = o.out / f"{family}.{kind}"
@@ -90,7 +92,7 @@ def main():
             sys.exit(f"{folder}: stopped; the same command goes on")
     text = f"{version}; {sum(seconds.values()) / 3600:.1f} h on this machine.\n"
     # robots on a bench have tables of their own: their parts are called as those that fly
-    for name, kinds in (("flight", ["contrast", "alone"]), ("bench", ["bench"])):
+    for name, kinds in (("flight", ["contrast", "alone"]), ("bench", ["bench", "both"])):
         files = [o.out / f"{f}.{k}" / "cases.jsonl" for k in kinds for f in o.families]
         files = [f for f in files if f.exists()] + [a for a in o.add if is_of_bench(a) == (name == "bench")]
         if not files:

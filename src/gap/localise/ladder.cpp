@@ -8,8 +8,6 @@
 namespace flappy::gap {
 namespace {
 
-enum RungIndex : std::size_t { kDriveRung, kAirRung, kBodyRung, kRungs };
-
 std::size_t rung_of_channel(int channel, bool clamped) {
   switch (channel) {
     case kStrokeLeft:

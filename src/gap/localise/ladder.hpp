@@ -10,7 +10,9 @@
 
 namespace flappy::gap {
 
-/// Index in ladder_of() of the rung where an effect acts.
+/// Indices in ladder_of().
+enum RungIndex : std::size_t { kDriveRung, kAirRung, kBodyRung, kRungs };
+/// The rung where an effect acts.
 std::size_t rung_of_effect(const std::string& effect);
 
 /// The three rungs below. `nominal`, `refit`, `effect`: [flight of `around`] residuals of the vehicle file, of the

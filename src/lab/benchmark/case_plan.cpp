@@ -15,6 +15,8 @@ namespace {
 /// and, from each family's first seed, the 120,000 from each of 5,000,000, 5,500,000, ..., 8,500,000 on.
 constexpr std::uint64_t kSeedsOfAFamily = 10'000'000, kReported = 9'000'000, kSeedsOfAPart = 10'000,
                         kSeedsOfSessions = 300'000;
+/// Parts of kParts whose robots are no others': the first ones.
+constexpr std::size_t kOwnRobots = 11;
 /// Least number of cases of most parts; rounded up so that all effects of a part have as many.
 constexpr std::size_t kAtLeast = 100;
 /// Least numbers of cases in parts of a contrast.
@@ -39,6 +41,7 @@ class Planner {
  public:
   Planner(const blind::Family& family, const PlanOptions& options)
       : options_(options),
+        family_(family),
         first_seed_(number_of(family) * kSeedsOfAFamily + (options.reported ? kReported : 0) +
                     (options.contrast ? (options.reference_sessions - 1) * kSeedsOfSessions : 0)),
         random_(first_seed_) {
@@ -100,6 +103,18 @@ class Planner {
       c.effects = {{hidden_[k % hidden_.size()], typical(c.seed)}};
       c.hover = true;
     });
+    if (family_.has_bench()) {
+      part("singles_bench", singles, [&](std::size_t k, PlannedCase& c) {
+        c.seed = seed_of("singles", k);
+        single(k, c);
+        c.bench = true;
+      });
+      part("own_parameters_bench", kAtLeast, [&](std::size_t k, PlannedCase& c) {
+        c.seed = seed_of("own_parameters", k);
+        c.conventions = false;
+        c.bench = true;
+      });
+    }
     number();
     return std::move(cases_);
   }
@@ -112,7 +127,7 @@ class Planner {
   static std::uint64_t index_of(const std::string& part) {
     const auto at = std::ranges::find(kParts, part);
     if (at != std::end(kParts)) return static_cast<std::uint64_t>(at - std::begin(kParts));
-    return std::size(kParts) +
+    return kOwnRobots +
            static_cast<std::uint64_t>(std::ranges::find(kContrastParts, part) - std::begin(kContrastParts));
   }
   std::uint64_t seed_of(const std::string& part, std::size_t k) const {
@@ -209,6 +224,7 @@ class Planner {
   }
 
   const PlanOptions& options_;
+  const blind::Family& family_;
   std::uint64_t first_seed_;
   Ids catalogue_, outside_, hidden_;  ///< hidden_: hover does not show them
   std::mt19937_64 random_;
@@ -221,8 +237,8 @@ blind::Assignment assignment_of(const PlannedCase& planned, const std::filesyste
   blind::Assignment a;
   a.vehicle_file = vehicle;
   for (const blind::BlindEffect& e : planned.effects) a.effects.emplace_back(e.id, e.magnitude);
-  a.hover = planned.hover, a.power = planned.power || planned.bench;
-  a.bench = planned.bench;
+  a.bench = planned.bench && planned.references > 0;
+  a.hover = planned.hover, a.power = planned.power || a.bench;
   a.own_parameters = planned.own_parameters, a.conventions = planned.conventions;
   a.session = planned.references > 0 ? 1 : 0;
   return a;

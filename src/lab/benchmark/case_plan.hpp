@@ -19,7 +19,8 @@ struct PlannedCase {
   std::vector<blind::BlindEffect> effects;
   std::uint64_t seed = 0;
   bool hover = false, power = false;
-  bool bench = false;                                ///< clamped and filmed in place of flights, with currents
+  /// Clamped and filmed, with currents: in a contrast in place of its flights, else in addition to them.
+  bool bench = false;
   bool own_parameters = false, conventions = false;  ///< as in blind::Assignment
   bool published = false;                            ///< its vehicle is drawn from the published randomisation
   /// In a contrast, the robot flies `references` flights without its effects, and then `flights` in another session.

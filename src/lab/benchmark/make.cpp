@@ -105,6 +105,7 @@ class Maker {
       for (std::size_t k = 0; k < p.flights; ++k) logs.push_back(std::move(flown.flights[k].log));
       if (!p.effects.empty())
         label.over_sessions = change_over_sessions(family_, flown.assignment, logs, command_.other_sessions);
+      if (p.bench && p.references == 0) run_on_bench(p, flown.assignment, label.over_sessions);
       json = to_json(label);
     } catch (const blind::NeverFlies&) {
       json = to_json(label);
@@ -112,6 +113,21 @@ class Maker {
     }
     fs::remove_all(drawn);
     io::write_atomically(label_file(p), json.dump(1) + "\n");
+  }
+
+  /// Clamps the robot after its flights. An effect counts if the flights or the bench show it.
+  void run_on_bench(const PlannedCase& p, blind::Assignment a, std::vector<OverSessions>& over_sessions) const {
+    a.bench = a.power = true;
+    std::vector<flightlog::FlightLog> logs;
+    for (std::size_t k = 0; k < blind::Family::kFlights; ++k) {
+      logs.push_back(family_.fly(a, k).log);
+      logs.back().header.session = "session " + std::to_string(a.session);
+      flightlog::write_flight_log(case_folder(p) / (kFlightFolder + std::to_string(p.flights + k + 1)), logs.back());
+    }
+    if (p.effects.empty()) return;
+    const std::vector<OverSessions> shown = change_over_sessions(family_, a, logs, command_.other_sessions);
+    for (std::size_t i = 0; i < shown.size(); ++i)
+      if (shown[i].ratio > over_sessions[i].ratio) over_sessions[i] = shown[i];
   }
 
   void seal() const {

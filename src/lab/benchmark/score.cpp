@@ -5,9 +5,11 @@
 #include <cmath>
 #include <functional>
 #include <iterator>
+#include <map>
 #include <set>
 #include <tuple>
 
+#include "gap/localise/ladder.hpp"
 #include "io/statistics.hpp"
 #include "io/text.hpp"
 #include "lab/benchmark/change_over_sessions.hpp"
@@ -281,6 +283,48 @@ void silence_rivals(std::vector<ScoredCase>& cases) {
   }
 }
 
+/// The rung whose effects are most probable; none: no effect is.
+std::size_t most_probable_rung(const Answer& a) {
+  std::array<double, gap::kRungs> of_rung{};
+  for (const gap::RankedHypothesis& h : a.sets)
+    for (std::size_t rung = 0; rung < gap::kRungs; ++rung)
+      if (std::ranges::any_of(h.effects, [&](const std::string& e) { return gap::rung_of_effect(e) == rung; }))
+        of_rung[rung] += h.probability;
+  const auto most = std::ranges::max_element(of_rung);
+  return *most > 0 ? static_cast<std::size_t>(most - of_rung.begin()) : gap::kRungs;
+}
+
+/// What a bench adds to flights; nothing without robots that had both.
+void add_bench(const std::vector<ScoredCase>& cases, const Cases& singles, std::vector<ScoreLine>& lines) {
+  const Cases both = of_parts(cases, {"singles_bench"}), harmless = of_parts(cases, {"own_parameters_bench"});
+  if (both.empty() && harmless.empty()) return;
+  Cases on_bench = both;
+  std::erase_if(on_bench,
+                [](const ScoredCase* c) { return gap::rung_of_effect(c->truth.effects.front()) == gap::kBodyRung; });
+  lines.push_back(first_line("bench_top1", "with a bench: right effect first, of drive, hinges, stops, wings", 0.60,
+                             0.80, on_bench));
+  lines.push_back(first_line("bench_all_top1", "with a bench: right effect first, all", 0.55, 0.75, both));
+  lines.push_back(line("bench_rung", "with a bench: right rung of the ladder", Bar::at_least, 0.85, 0.95,
+                       share(both, [](const ScoredCase& c) {
+                         return most_probable_rung(c.prediction) == gap::rung_of_effect(c.truth.effects.front());
+                       })));
+  lines.push_back(line("false_alarm_bench", "false alarm with a bench: own parameters", Bar::at_most, kFalseAlarms,
+                       0.02, share(harmless, false_alarm)));
+  // of the same robots
+  std::map<std::pair<std::uint64_t, std::uint64_t>, const ScoredCase*> by_robot;
+  for (const ScoredCase* c : singles) by_robot[{c->truth.seed, c->truth.draw}] = c;
+  std::size_t with = 0, without = 0, count = 0;
+  for (const ScoredCase* c : both) {
+    const auto single = by_robot.find({c->truth.seed, c->truth.draw});
+    if (single == by_robot.end()) continue;
+    ++count, with += named_alone(*c), without += named_alone(*single->second);
+  }
+  for (const auto& [key, what, right] :
+       {std::tuple{"bench_pair_with", "the same robots, with a bench: right first", with},
+        {"bench_pair_without", "the same robots, by flights: right first", without}})
+    lines.push_back({key, what, "", "", proportion(right, count), {}, {}, {}, {}});
+}
+
 std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases);
 std::vector<ScoreLine> contrast_lines(const std::vector<ScoredCase>& cases);
 void add_hidden_lines(const std::string& key, const std::string& part, const std::vector<ScoredCase>& counting,
@@ -499,6 +543,7 @@ std::vector<ScoreLine> absolute_lines(const std::vector<ScoredCase>& cases) {
     l.push_back(line("undecided_next", "undecided singles: the proposal, flown, brings the truth to first place",
                      Bar::at_least, 0.75, 0.90, share(followed, next_brings_truth)));
   add_foresight("plan", "plan", singles, l);
+  add_bench(cases, singles, l);
   return l;
 }
 

@@ -29,9 +29,11 @@ struct CaseTruth {
 ///                             parameter of each body independent; declarations within the habits of laboratories
 ///   withheld, outside         an effect whose group is withheld from the catalogue; one never in the catalogue
 ///   pairs, hover              two effects of different groups; an effect that hover alone does not show, in hover
-inline constexpr const char* kParts[] = {"singles",    "singles_current", "redeclared",  "none",
-                                         "parameters", "own_parameters",  "conventions", "withheld",
-                                         "outside",    "pairs",           "hover"};
+///   singles_bench, own_parameters_bench
+///                             the robots of singles and of own_parameters, also clamped on a bench and filmed
+inline constexpr const char* kParts[] = {
+    "singles",  "singles_current", "redeclared", "none",  "parameters",    "own_parameters",      "conventions",
+    "withheld", "outside",         "pairs",      "hover", "singles_bench", "own_parameters_bench"};
 /// Parts of a contrast. All robots have independent parameters and inexact declarations; their tests are of another
 /// session than their references.
 ///   changed, changed_pairs    one effect, and two of different groups, at 0.7 to 2 times typical magnitude
