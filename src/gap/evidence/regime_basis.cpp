@@ -22,18 +22,29 @@ void RegimeBasis::append_functions(const Flights& flights, const std::vector<std
     functions.push_back(f->functions());
     column.push_back(Eigen::VectorXd::Ones(static_cast<Eigen::Index>(f->beats())));
   }
-  // appends a function with mean 0 and rms 1, except the constant; a function that never changes is left out
+  // Appends a function with mean 0 and rms 1, except the constant, over the flights in the air and over the runs on a
+  // bench: how high a bench stands tells nothing of flights. 0 where it never changes; left out if it changes nowhere.
   const auto append = [&](const std::string& name, const std::string& quantity, BasisFunction kind) {
-    double sum = 0, squares = 0, n = 0;
-    for (const Eigen::VectorXd& v : column)
-      sum += v.sum(), squares += v.squaredNorm(), n += static_cast<double>(v.size());
     const bool constant = functions_.empty();
-    const double mean = constant ? 0 : sum / n;
-    const double sd = constant ? 1 : std::sqrt(std::max(0.0, squares / n - mean * mean));
-    if (!(sd > 1e-9 * (std::abs(mean) + 1e-3))) return;
+    bool changes = constant;
+    for (const bool on_bench : {false, true}) {
+      const auto in_setting = [&](std::size_t f) { return flights[f]->clamped() == on_bench; };
+      double sum = 0, squares = 0, n = 0;
+      for (std::size_t f = 0; f < column.size(); ++f)
+        if (in_setting(f))
+          sum += column[f].sum(), squares += column[f].squaredNorm(), n += static_cast<double>(column[f].size());
+      if (n == 0 || constant) continue;
+      const double mean = sum / n, sd = std::sqrt(std::max(0.0, squares / n - mean * mean));
+      const bool here = sd > 1e-9 * (std::abs(mean) + 1e-3);
+      changes = changes || here;
+      for (std::size_t f = 0; f < column.size(); ++f)
+        if (in_setting(f) && here) column[f] = (column[f].array() - mean) / sd;
+        else if (in_setting(f)) column[f].setZero();
+    }
+    if (!changes) return;
     for (std::size_t f = 0; f < flights.size(); ++f) {
       values_[f].conservativeResize(column[f].size(), values_[f].cols() + 1);
-      values_[f].rightCols(1) = (column[f].array() - mean) / sd;
+      values_[f].rightCols(1) = column[f];
     }
     functions_.push_back({name, quantity, kind});
   };
@@ -56,7 +67,10 @@ void RegimeBasis::append_functions(const Flights& flights, const std::vector<std
   const auto index = [&](const std::string& name) {
     return static_cast<int>(std::ranges::find(functions_, name, &Function::name) - functions_.begin());
   };
-  const std::vector<std::pair<std::string, std::string>> products = flights[0]->products();
+  std::vector<std::pair<std::string, std::string>> products;
+  for (const auto& f : flights.all())
+    for (const auto& pair : f->products())
+      if (std::ranges::count(products, pair) == 0) products.push_back(pair);
   if (std::ranges::any_of(products, [&](const auto& p) { return std::max(index(p.first), index(p.second)) >= size(); }))
     return;
   for (const auto& [a, b] : products) {
@@ -89,10 +103,12 @@ void RegimeBasis::append_of_tests(const Flights& flights, const std::vector<std:
     // the offset of a flight: one value in it, another in all others
     const auto largest = std::ranges::max_element(values_, {}, [&](const auto& v) { return v(0, i); });
     in_all_(i, i) = 1;
-    const double elsewhere =
-        std::ranges::min_element(values_, {}, [&](const auto& v) { return v(0, i); })->operator()(0, i);
+    const std::size_t own = static_cast<std::size_t>(largest - values_.begin());
+    double elsewhere = (*largest)(0, i);
+    for (std::size_t f = 0; f < flights.size(); ++f)
+      if (flights[f]->clamped() == flights[own]->clamped()) elsewhere = std::min(elsewhere, values_[f](0, i));
     in_tests_(i, once) = elsewhere;
-    if (flights.is_reference(static_cast<std::size_t>(largest - values_.begin()))) continue;
+    if (flights.is_reference(own)) continue;
     in_tests_(i, i) = 1;
     in_tests_(i, 0) = -elsewhere;
   }

@@ -34,6 +34,29 @@ TEST(RegimeBasis, HasFunctionsOfMeanZeroAndRmsOne) {
   EXPECT_EQ(basis.kind(product), BasisFunction::product);
 }
 
+// A bench stands at 1 m; the flights are at 0, with a spread of 1 m.
+TEST(RegimeBasis, CentresABenchByItself) {
+  std::vector<std::shared_ptr<SyntheticFlight>> made;
+  for (int k = 0; k < 4; ++k)
+    made.push_back(std::make_shared<SyntheticFlight>("f" + std::to_string(k), k, synthetic_law));
+  made[1]->on_bench = made[3]->on_bench = true;
+  made[1]->height_m.setConstant(1), made[3]->height_m.setConstant(1);
+  made[3]->amplitude.array() += 5;
+  const Flights flights = as_flights(made);
+  const RegimeBasis basis(question_of(flights), flights);
+  for (int i = 1; i < basis.size(); ++i) {
+    if (basis.kind(i) == BasisFunction::flight || basis.kind(i) == BasisFunction::product) continue;
+    for (const std::size_t first : {0U, 1U}) {
+      const Eigen::MatrixXd &a = basis.values(first), &b = basis.values(first + 2);
+      EXPECT_NEAR(a.col(i).sum() + b.col(i).sum(), 0, 1e-9) << basis.name(i);
+      const double squares = a.col(i).squaredNorm() + b.col(i).squaredNorm(),
+                   n = static_cast<double>(a.rows() + b.rows());
+      const bool still = first == 1 && basis.quantity(i) == "height";
+      EXPECT_NEAR(squares / n, still ? 0 : 1, 1e-9) << basis.name(i);
+    }
+  }
+}
+
 TEST(RegimeBasis, TellsFlightsFromHeights) {
   const Flights flights{{},
                         {std::make_shared<SyntheticFlight>("low", 1, synthetic_law, 0),
