@@ -126,8 +126,10 @@ ModelDiscrepancy read_model_discrepancy(const std::filesystem::path& path) {
     axes("imu_mounting", "rad", sensors->number("imu_rotation_rad", io::positive()));
     axes("imu_place", "m", sensors->number("imu_place_m", io::positive()));
     d.nuisances.push_back({"power_delay", "delay_s", sensors->number("power_latency_s", io::positive())});
-    for (const char* id : {"imu_clock", "mocap_clock", "power_clock"})
+    for (const char* id : {"imu_clock", "mocap_clock", "power_clock", "forces_clock", "wings_clock"})
       d.nuisances.push_back({id, "rate", sensors->number("clock_rate", io::positive())});
+    for (const char* id : {"forces_delay", "wings_delay"})
+      d.nuisances.push_back({id, "delay_s", sensors->number("power_latency_s", io::positive())});
   }
   const io::Table background = root.table("background_sd");
   d.background["other"] = background.number("other", io::positive());

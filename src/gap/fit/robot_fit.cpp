@@ -50,6 +50,45 @@ bool of_sides(const model::CatalogueEffect& effect) {
          std::string_view(effect.parameters[1].name).starts_with("right_");
 }
 
+/// First and last channel of the stream of a bench whose times an error moves; none: it is none of those errors.
+std::optional<std::pair<int, int>> channels_of_stream(const std::string& error) {
+  if (error == "forces_clock" || error == "forces_delay") return std::pair{kAngularAccelerationX, kSpecificForceZ};
+  if (error == "wings_clock" || error == "wings_delay") return std::pair{kStrokeLeft, kRotationRight};
+  if (error == "power_clock" || error == "power_delay") return std::pair{kBattery, kCurrentRight};
+  return std::nullopt;
+}
+
+/// By how much the rows of a run on a bench change, to first order, if a stream comes late by t_late: where a row has
+/// c cos(phase) + s sin(phase) in harmonic h of the beat f,
+///   dc = -2 pi h f t_late s,   ds = 2 pi h f t_late c
+/// `error`: a delay, s; or the rate of a clock, with t_late = rate times the time since the middle of the log.
+Rows late_rows(const PredictedFlight& run, const ModelDiscrepancy::Nuisance& error) {
+  Rows rows(run.measured().size(), 0.0);
+  const auto channels = channels_of_stream(error.id);
+  if (!channels) return rows;
+  for (std::size_t beat = 0; beat < run.beats(); ++beat) {
+    const double since_s = (static_cast<double>(beat) - (static_cast<double>(run.beats()) - 1) / 2) / run.beats_Hz();
+    const double late_s = error.sd * (error.value == "rate" ? since_s : 1);
+    for (int channel = channels->first; channel <= channels->second; ++channel)
+      for (std::size_t h = 1; h <= kHarmonics; ++h) {
+        const double turn = 2 * std::numbers::pi * static_cast<double>(h) * run.beats_Hz() * late_s;
+        const std::size_t c = row_of_mean(beat, channel) + 2 * h - 1, s = c + 1;
+        rows[c] = -turn * run.measured()[s];
+        rows[s] = turn * run.measured()[c];
+      }
+  }
+  return rows;
+}
+
+/// Without errors of a bench if there is none.
+ModelDiscrepancy of_flights(ModelDiscrepancy discrepancy, const Flights& flights) {
+  if (std::ranges::none_of(flights.all(), [](const auto& f) { return f->clamped(); }))
+    std::erase_if(discrepancy.nuisances, [](const ModelDiscrepancy::Nuisance& n) {
+      return n.id.starts_with("forces_") || n.id.starts_with("wings_");
+    });
+  return discrepancy;
+}
+
 /// `withheld`, and tether unless each flight in which effects act has a ground: it would hang down to nowhere.
 std::vector<std::string> without_idle(std::vector<std::string> withheld, const Flights& flights) {
   if (!std::ranges::all_of(flights.tests, [](const auto& flight) { return flight->has_ground(); }))
@@ -65,7 +104,8 @@ RobotFit::RobotFit(Extent extent, const FitRules& rules, const Flights& flights,
       uncertain_(uncertain),
       withheld_(without_idle(std::move(withheld), flights)),
       threads_(io::thread_count(threads)),
-      fitter_(rules, flights, std::make_shared<const Evidence>(rules, flights, discrepancy, threads_), threads_),
+      fitter_(rules, flights,
+              std::make_shared<const Evidence>(rules, flights, of_flights(discrepancy, flights), threads_), threads_),
       no_effects_(uncertain_, {}) {
   if (extent == Extent::planned) {
     parameters_ = nominal_ = fitter_.linearise(no_effects_, no_effects_.start(), Fitter::axes(no_effects_));
@@ -477,8 +517,9 @@ void RobotFit::find_nuisances() {
   std::vector<double> steps(all.size(), 1);
   for (const ModelDiscrepancy::Nuisance& n : all) {
     VehicleHypothesis v = no_effects_.vehicle(parameters_.at);
-    for (const ModelDiscrepancy::Nuisance& other : all)
-      if (other.id == n.id) v.sensors[n.id][other.value] = other.value == n.value ? n.sd : 0;
+    if (!n.id.starts_with("forces_") && !n.id.starts_with("wings_"))
+      for (const ModelDiscrepancy::Nuisance& other : all)
+        if (other.id == n.id) v.sensors[n.id][other.value] = other.value == n.value ? n.sd : 0;
     vehicles.push_back(std::move(v));
   }
   const std::size_t minors = rules().minors(uncertain_);
@@ -493,6 +534,17 @@ void RobotFit::find_nuisances() {
   for_residuals(flights_, vehicles, threads_, [&](std::size_t i, Residuals rows) {
     if (!rows.empty()) changes[i] = change(std::move(rows), steps[i]);
   });
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (!channels_of_stream(all[i].id)) continue;
+    Residuals late;
+    bool moved = false;
+    for (std::size_t f = 0; f < flights_.size(); ++f) {
+      moved = moved || flights_[f]->clamped();
+      late.push_back(flights_[f]->clamped() ? late_rows(*flights_[f], all[i])
+                                            : Rows(flights_[f]->measured().size(), 0.0));
+    }
+    if (moved) changes[i] += evidence().basis_coefficients(late);
+  }
   sensor_errors_.assign(changes.begin(), changes.begin() + static_cast<std::ptrdiff_t>(all.size()));
   minors_.assign(changes.begin() + static_cast<std::ptrdiff_t>(all.size()), changes.end());
 }

@@ -14,6 +14,8 @@
 //   power_delay                 samples of power.csv earlier by the delay that the header does not declare
 //   imu_clock, mocap_clock,     times scaled about the middle of the log, for a clock that runs fast by `rate`: at
 //     power_clock               the ends of 10 s, a crystal's 50 ppm are 3 % of the period of the fourth harmonic
+// On a bench, delays and clocks of the streams are not undone: to first order, rows of harmonic h turn (late_rows()).
+//   forces_clock, forces_delay; wings_clock, wings_delay; power_clock, power_delay
 #pragma once
 
 #include <map>
