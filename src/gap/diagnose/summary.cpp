@@ -101,6 +101,8 @@ std::string sensor_line(const Estimate& s) {
   if (s.name == "imu.latency_s") return told("the IMU's samples are", 1e3, "ms", more ? "older" : "younger");
   if (s.name == "command.delay_s") return told("the inputs act", 1e3, "ms", more ? "later" : "earlier");
   if (s.name == "power_delay.delay_s") return told("those of currents are", 1e3, "ms", more ? "older" : "younger");
+  if (const std::size_t delay = s.name.find("_delay"); delay != std::string::npos)
+    return told("the samples of " + s.name.substr(0, delay) + ".csv are", 1e3, "ms", more ? "older" : "younger");
   if (const std::size_t clock = s.name.find("_clock"); clock != std::string::npos)
     return told("the clock of " + s.name.substr(0, clock) + ".csv is", 1e6, "ppm", more ? "fast" : "slow");
   if (s.name.starts_with("imu_mounting"))

@@ -50,36 +50,6 @@ bool of_sides(const model::CatalogueEffect& effect) {
          std::string_view(effect.parameters[1].name).starts_with("right_");
 }
 
-/// First and last channel of the stream of a bench whose times an error moves; none: it is none of those errors.
-std::optional<std::pair<int, int>> channels_of_stream(const std::string& error) {
-  if (error == "forces_clock" || error == "forces_delay") return std::pair{kAngularAccelerationX, kSpecificForceZ};
-  if (error == "wings_clock" || error == "wings_delay") return std::pair{kStrokeLeft, kRotationRight};
-  if (error == "power_clock" || error == "power_delay") return std::pair{kBattery, kCurrentRight};
-  return std::nullopt;
-}
-
-/// By how much the rows of a run on a bench change, to first order, if a stream comes late by t_late: where a row has
-/// c cos(phase) + s sin(phase) in harmonic h of the beat f,
-///   dc = -2 pi h f t_late s,   ds = 2 pi h f t_late c
-/// `error`: a delay, s; or the rate of a clock, with t_late = rate times the time since the middle of the log.
-Rows late_rows(const PredictedFlight& run, const ModelDiscrepancy::Nuisance& error) {
-  Rows rows(run.measured().size(), 0.0);
-  const auto channels = channels_of_stream(error.id);
-  if (!channels) return rows;
-  for (std::size_t beat = 0; beat < run.beats(); ++beat) {
-    const double since_s = (static_cast<double>(beat) - (static_cast<double>(run.beats()) - 1) / 2) / run.beats_Hz();
-    const double late_s = error.sd * (error.value == "rate" ? since_s : 1);
-    for (int channel = channels->first; channel <= channels->second; ++channel)
-      for (std::size_t h = 1; h <= kHarmonics; ++h) {
-        const double turn = 2 * std::numbers::pi * static_cast<double>(h) * run.beats_Hz() * late_s;
-        const std::size_t c = row_of_mean(beat, channel) + 2 * h - 1, s = c + 1;
-        rows[c] = -turn * run.measured()[s];
-        rows[s] = turn * run.measured()[c];
-      }
-  }
-  return rows;
-}
-
 /// Without errors of a bench if there is none.
 ModelDiscrepancy of_flights(ModelDiscrepancy discrepancy, const Flights& flights) {
   if (std::ranges::none_of(flights.all(), [](const auto& f) { return f->clamped(); }))
@@ -535,12 +505,12 @@ void RobotFit::find_nuisances() {
     if (!rows.empty()) changes[i] = change(std::move(rows), steps[i]);
   });
   for (std::size_t i = 0; i < all.size(); ++i) {
-    if (!channels_of_stream(all[i].id)) continue;
+    if (!is_lateness(all[i].id)) continue;
     Residuals late;
     bool moved = false;
     for (std::size_t f = 0; f < flights_.size(); ++f) {
       moved = moved || flights_[f]->clamped();
-      late.push_back(flights_[f]->clamped() ? late_rows(*flights_[f], all[i])
+      late.push_back(flights_[f]->clamped() ? late_rows(*flights_[f], all[i].id, all[i].value, all[i].sd)
                                             : Rows(flights_[f]->measured().size(), 0.0));
     }
     if (moved) changes[i] += evidence().basis_coefficients(late);

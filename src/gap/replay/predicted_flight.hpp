@@ -184,4 +184,13 @@ struct Flights {
   FlightList all() const;
 };
 
+/// Whether an error of a sensor (gap/replay/sensor_correction.hpp) is one of the times of a stream that a bench has.
+bool is_lateness(const std::string& error);
+/// By how much the measured rows of a run on a bench change, to first order, if a stream comes late by t_late: where a
+/// row has c cos(phase) + s sin(phase) in harmonic h of the beat f,
+///   dc = -2 pi h f t_late s,   ds = 2 pi h f t_late c
+/// `size`: a delay, s; or, for the value "rate", by how much a clock runs fast: t_late is that times the time since the
+/// middle of the log. 0 for other errors.
+Rows late_rows(const PredictedFlight& run, const std::string& error, const std::string& value, double size);
+
 }  // namespace flappy::gap

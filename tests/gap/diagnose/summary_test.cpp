@@ -67,6 +67,8 @@ TEST(Summary, SaysWhatToDoInThirtyLines) {
                 "  the IMU is turned by 1.1 deg about -y (0.57 to 1.7)\n"),
       std::string::npos)
       << text;
+  r.sensors = {{"forces_delay.delay_s", -2e-4, -3e-4, -1e-4, "s"}};
+  EXPECT_NE(all().find("\n  the samples of forces.csv are 0.2 ms younger (0.1 to 0.3)\n"), std::string::npos);
   r.sensors = {{"imu_clock.rate", -4e-5, -5e-5, -3e-5, ""}};
   EXPECT_NE(all().find("\n  the clock of imu.csv is 40 ppm slow (30 to 50)\n"), std::string::npos);
   r.sensors = {{"command.delay_s", -2e-3, -3e-3, -1e-3, "s"}};  // of a beat-averaged vehicle
