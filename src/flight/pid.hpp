@@ -3,10 +3,10 @@
 //   v_sp = v_ref + k (p_ref - p)             e = v_sp - v        a_f,l = a_ref + PID(e)       V_z = PID(e_z)
 //   pitch_sp = atan(a_f / g)                 roll_sp = -atan(a_l cos(pitch_sp) / g)
 //   V_d = PID(roll_sp - roll)                V_0 = PID(pitch_sp - pitch)      d_sigma = PID(yaw_ref - yaw)
-//     where P and D pass N
+//                                            there P and D pass N
 //   V_amp = V_hover + V_z / (cos roll cos pitch)
-// N: a notch at notch_hz, if any (notch(), below), because what a controller answers to the swing of each wing beat adds to
-// the beat that it commands, or takes from it, by its delay.
+// N: a notch at notch_hz, if any (notched(), below), because the answer to the swing of the pitch within each beat adds to
+// the beat that is commanded, or takes from it, by its delay. Roll and yaw hardly swing.
 // The derivative of a roll or pitch error is the negative low-passed body rate (yaw: relative to the set point's rate);
 // the derivative of a velocity error comes from the low-passed velocity. Integrators are clamped. They do not move
 // further out while the output that they drive is at its limit (anti-windup).
@@ -49,7 +49,7 @@ struct Pid {
   T integral_roll, integral_pitch;        // V
   T integral_yaw;                         // split cycle
   Vec3<T> velocity_m_s, body_rate_rad_s;  // low-passed
-  Vec3<T> notch_next, notch_after;        // memory of the notches of roll, pitch and yaw
+  T notch_next, notch_after;              // memory of the notch
 };
 
 template <class T>
@@ -244,13 +244,11 @@ FLAPPY_INLINE WingBeat<T> PidController::update(const PidConstants<Element<T>>& 
 
   m.body_rate_rad_s = add_scaled(m.body_rate_rad_s, T(k.rate_share), x.body_rate_rad_s - m.body_rate_rad_s);
   const auto attitude = [&](const PidGains<Element<T>>& gain, T& integral, const T& angle_error, const T& rate_error,
-                            auto most, T Vec3<T>::*axis) {
+                            auto most, bool swings = false) {
     T out;
-    if (k.notch_hz > 0) {
+    if (swings && k.notch_hz > 0) {
       const T swinging = T(gain.p) * angle_error + T(gain.d) * rate_error;
-      out =
-          notched(T(k.notch_near), T(k.notch_far), T(k.notch_back), swinging, m.notch_next.*axis, m.notch_after.*axis) +
-          integral;
+      out = notched(T(k.notch_near), T(k.notch_far), T(k.notch_back), swinging, m.notch_next, m.notch_after) + integral;
     } else {
       out = T(gain.p) * angle_error + (T(gain.d) * rate_error + integral);
     }
@@ -262,10 +260,10 @@ FLAPPY_INLINE WingBeat<T> PidController::update(const PidConstants<Element<T>>& 
   const Vec3<T>& w = m.body_rate_rad_s;
   const T yaw_reach(k.yaw_error_limit_rad);
   WingBeat<T> u;
-  u.difference_V = attitude(k.roll, m.integral_roll, T(roll_wanted - roll), T(-w.x), k.difference_limit_V, &Vec3<T>::x);
-  u.bias_V = attitude(k.pitch, m.integral_pitch, T(pitch_wanted - pitch), T(-w.y), k.bias_limit_V, &Vec3<T>::y);
+  u.difference_V = attitude(k.roll, m.integral_roll, T(roll_wanted - roll), T(-w.x), k.difference_limit_V);
+  u.bias_V = attitude(k.pitch, m.integral_pitch, T(pitch_wanted - pitch), T(-w.y), k.bias_limit_V, true);
   u.split_cycle = attitude(k.yaw, m.integral_yaw, clamp(yaw_error, T(-yaw_reach), yaw_reach),
-                           T(ref.heading_rate_rad_s - w.z), k.split_cycle_limit, &Vec3<T>::z);
+                           T(ref.heading_rate_rad_s - w.z), k.split_cycle_limit);
 
   const T climb = T(k.up.p) * error.z + (T(k.up.d) * slope.z + m.integral_z);
   const T lift = climb / max(R.row_z.z, T(0.5));  // cos roll cos pitch

@@ -224,8 +224,8 @@ class Reader {
     };
     c_.fleet.task = read("task", [&](const io::Table& t) { return flight::read_task(t, 1 / c_.fleet.control_hz); });
     c_.fleet.sensors = read("sensors", flight::read_sensors);
-    c_.fleet.controller = read(
-        "controller", [&](const io::Table& t) { return flight::read_controller(t, c_.fleet.control_hz); });
+    c_.fleet.controller =
+        read("controller", [&](const io::Table& t) { return flight::read_controller(t, c_.fleet.control_hz); });
     c_.controller_file = root_.file("controller");
     if (root_.has("randomisation") && root_.string("randomisation") == "posterior") {
       if (!c_.vehicle.posterior)

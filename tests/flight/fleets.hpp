@@ -35,8 +35,8 @@ inline Sensors sensors(const std::string& name, const Overrides& overrides = {})
 }
 inline Controller controller(const std::string& name, const Overrides& overrides = {}) {
   if (name == "none") return {};
-  return read_controller(
-      io::Config::load(test::source_path("configs/controllers/" + name + ".toml"), overrides).root(), 500);
+  return read_controller(io::Config::load(test::source_path("configs/controllers/" + name + ".toml"), overrides).root(),
+                         500);
 }
 inline Task task(const std::string& text, double tick_s = 0.002) {
   return read_task(io::Config::parse(text, "task.toml").root(), tick_s);

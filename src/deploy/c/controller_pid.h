@@ -20,21 +20,22 @@ static inline float flappy_integrated(float integral, const flappy_gains *k, flo
 }
 
 /* A step of a second-order notch at the wing beat, in transposed direct form II. */
-static inline float flappy_notched(float x, float *next, float *after) {
+static inline float flappy_notched(float x, flappy_feedback *m) {
   const flappy_feedback_constants *k = &flappy_controller_k.feedback;
-  const float y = flappy_fma(k->notch_near, x, *next);
-  *next = flappy_fma(k->notch_far, x - y, *after);
-  *after = flappy_difference2(k->notch_near, x, k->notch_back, y);
+  const float y = flappy_fma(k->notch_near, x, m->notch_next);
+  m->notch_next = flappy_fma(k->notch_far, x - y, m->notch_after);
+  m->notch_after = flappy_difference2(k->notch_near, x, k->notch_back, y);
   return y;
 }
 
-static inline float flappy_attitude_pid(const flappy_gains *k, float *integral, float error, float rate_error,
-                                        float limit, float *next, float *after) {
-  const float out = flappy_controller_k.feedback.notch_hz > 0.0F
-                        ? flappy_notched(flappy_sum2(k->p, error, k->d, rate_error), next, after) + *integral
-                        : flappy_fma(k->p, error, flappy_fma(k->d, rate_error, *integral));
+static inline float flappy_attitude(const flappy_gains *k, float *integral, float error, float out, float limit) {
   *integral = flappy_integrated(*integral, k, error, flappy_saturation(out, -limit, limit));
   return flappy_within(out, limit);
+}
+
+static inline float flappy_attitude_pid(const flappy_gains *k, float *integral, float error, float rate_error,
+                                        float limit) {
+  return flappy_attitude(k, integral, error, flappy_fma(k->p, error, flappy_fma(k->d, rate_error, *integral)), limit);
 }
 
 static inline float flappy_forward(flappy_sin_cos yaw, float x, float y) { return flappy_sum2(yaw.cos, x, yaw.sin, y); }
@@ -97,12 +98,16 @@ static inline flappy_wing_beat flappy_feedback_update(flappy_feedback *m, const 
   m->body_rate_rad_s = flappy_add_scaled(m->body_rate_rad_s, loop->rate_share,
                                          flappy_minus(x->body_rate_rad_s, m->body_rate_rad_s));
   w = m->body_rate_rad_s;
-  u.difference_V = flappy_attitude_pid(&k->roll, &m->integral_roll, roll_wanted - roll, -w.x, k->difference_limit_V,
-                                       &m->notch_next.x, &m->notch_after.x);
-  u.bias_V = flappy_attitude_pid(&k->pitch, &m->integral_pitch, pitch_wanted - pitch, -w.y, k->bias_limit_V,
-                                 &m->notch_next.y, &m->notch_after.y);
+  u.difference_V = flappy_attitude_pid(&k->roll, &m->integral_roll, roll_wanted - roll, -w.x, k->difference_limit_V);
+  if (k->notch_hz > 0.0F) {
+    const float swing = flappy_notched(flappy_sum2(k->pitch.p, pitch_wanted - pitch, k->pitch.d, -w.y), m);
+    u.bias_V = flappy_attitude(&k->pitch, &m->integral_pitch, pitch_wanted - pitch, swing + m->integral_pitch,
+                               k->bias_limit_V);
+  } else {
+    u.bias_V = flappy_attitude_pid(&k->pitch, &m->integral_pitch, pitch_wanted - pitch, -w.y, k->bias_limit_V);
+  }
   u.split_cycle = flappy_attitude_pid(&k->yaw, &m->integral_yaw, flappy_within(yaw_error, k->yaw_error_limit_rad),
-                                      ref->heading_rate_rad_s - w.z, k->split_cycle_limit, &m->notch_next.z, &m->notch_after.z);
+                                      ref->heading_rate_rad_s - w.z, k->split_cycle_limit);
 
   /* climb */
   climb = flappy_velocity_pid(&k->up, error.z, slope.z, m->integral_z);
@@ -128,7 +133,7 @@ static inline void flappy_feedback_start(flappy_feedback *m, const flappy_motion
   m->integral_roll = m->integral_pitch = m->integral_yaw = 0.0F;
   m->velocity_m_s = x->velocity_m_s;
   m->body_rate_rad_s = x->body_rate_rad_s;
-  m->notch_next = m->notch_after = flappy_vector_of(0.0F, 0.0F, 0.0F);
+  m->notch_next = m->notch_after = 0.0F;
 }
 
 /* Takes back what it learnt in the last period, but for its filters. */

@@ -17,5 +17,5 @@ typedef struct {
   float integral_x, integral_y, integral_z;          /* m/s^2, m/s^2 in W; V */
   float integral_roll, integral_pitch, integral_yaw; /* V, V, split cycle */
   flappy_vector velocity_m_s, body_rate_rad_s;       /* low-passed */
-  flappy_vector notch_next, notch_after;             /* memory of the notches of roll, pitch, yaw */
+  float notch_next, notch_after;                     /* memory of the notch */
 } flappy_feedback;

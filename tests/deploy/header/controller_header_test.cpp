@@ -465,7 +465,7 @@ struct Rest {
     c.tick(c.at(), now_us);
   }
   std::vector<float> estimate() {
-    std::vector<float> estimator(46), estimate(13), pid(18);
+    std::vector<float> estimator(46), estimate(13), pid(14);
     c.state(c.at(), estimator.data(), estimate.data(), pid.data());
     for (const auto* list : {&estimator, &estimate, &pid})
       for (const float x : *list) EXPECT_TRUE(std::isfinite(x));
