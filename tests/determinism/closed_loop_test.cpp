@@ -17,11 +17,10 @@ struct Case {
   const char* name;
   std::uint64_t in_float, in_double;
 };
-constexpr Case kCases[] = {{"pid", 0xc10ee1b178424d2a, 0xe75aa050a549d8be},
-                           {"arc", 0xf5c1f353f7772075, 0x09d4e56cfd8d8bca},
-                           {"actor", 0x54f8be77e5f165bc, 0xb59c7058671bf3b3},
-                           {"beat_averaged", 0x72d2f06ed6f723ff, 0x0b27535666c0d83e},
-                           {"jointed", 0x62fe5c1d3fae5f04, 0x14833ce5fd84951f}};
+constexpr Case kCases[] = {
+    {"pid", 0xc10ee1b178424d2a, 0xe75aa050a549d8be},           {"notched", 0x061cdb6374941593, 0xa666deb590bb004a},
+    {"arc", 0xf5c1f353f7772075, 0x09d4e56cfd8d8bca},           {"actor", 0x54f8be77e5f165bc, 0xb59c7058671bf3b3},
+    {"beat_averaged", 0x72d2f06ed6f723ff, 0x0b27535666c0d83e}, {"jointed", 0x62fe5c1d3fae5f04, 0x14833ce5fd84951f}};
 
 constexpr std::size_t kFlappers = 272, kSmall = 17;
 constexpr int kPeriods = 10;
@@ -133,9 +132,14 @@ FleetOptions options(const std::string& name) {
   c.kind = adaptive ? kind_of<ArcController>() : kind_of<PidController>();
   double gain = 0.5;
   for (ControllerField& f : fields(c)) {
+    if (f.otherwise) {
+      *f.value = *f.otherwise;
+      continue;
+    }
     *f.value = std::min(std::max(gain, f.range.low + 0.01), f.range.high);
     gain = gain < 3 ? gain * 1.3 : 0.4;
   }
+  if (name == "notched") c.constants.of<PidController>().notch_hz = 34;
   c.velocity_low_pass_hz = 20, c.body_rate_low_pass_hz = 30;
   if (adaptive) {
     ArcConstants<double>& k = c.constants.of<ArcController>();
