@@ -114,7 +114,7 @@ def main():
     if "bench" in o.steps:
         fly_all(robot, [f for f in ON_BENCH for _ in range(o.robots)], [n for _ in ON_BENCH for n in range(o.robots)],
                 [True] * o.robots * len(ON_BENCH))
-        for family in [*FAMILIES, ""]:
+        for family in [*ON_BENCH, ""]:
             shipped = LAB / "discrepancy" / f"without_{family}.toml" if family else CONFIGS / "gap" / "model_discrepancy.toml"
             output = o.out / f"bench_discrepancy_without_{family or 'none'}.toml"
             run(output, gap, "learn-discrepancy", "--vehicle", VEHICLE, "--discrepancy", shipped, "--robots",

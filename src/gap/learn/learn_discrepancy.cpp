@@ -166,7 +166,7 @@ void take(const ShareMoments& moments, const std::map<std::string, Moment>& back
     for (std::size_t h = 0; h <= kHarmonics; ++h)
       for (std::size_t k = 0; k < kKinds; ++k)
         if (moments[c][h][k].count > 0) shares[c][h][k] = std::max(moments[c][h][k].root(), kMinShare), seen = true;
-    // what no run on a bench has ever shown is as in the air
+    // a channel that no run on a bench has shown takes the shares of flights
     if (c >= kChannels && !seen && before[c] == before[c - kChannels]) shares[c] = shares[c - kChannels];
   }
   for (const auto& [effect, m] : backgrounds) background[effect] = std::max(m.root(), kMinBackground);

@@ -63,18 +63,23 @@ std::size_t rung_of_effect(const std::string& effect) {
   }
 }
 
+std::array<double, kRungs> rung_probabilities(const std::vector<RankedHypothesis>& hypotheses) {
+  std::array<double, kRungs> sums{};
+  for (const RankedHypothesis& h : hypotheses)
+    for (std::size_t rung = 0; rung < kRungs; ++rung)
+      if (std::ranges::any_of(h.effects, [&](const std::string& e) { return rung_of_effect(e) == rung; }))
+        sums[rung] += h.probability;
+  return sums;
+}
+
 std::vector<LadderRung> ladder_of(const RowContext& around, const TestResiduals& nominal, const TestResiduals& refit,
                                   const TestResiduals* effect, const std::vector<RankedHypothesis>& hypotheses) {
   constexpr const char* kNames[kRungs] = {"drive and hinges", "air", "body and sensors"};
+  const std::array<double, kRungs> probabilities = rung_probabilities(hypotheses);
   std::vector<LadderRung> ladder;
-  for (std::size_t rung = 0; rung < kRungs; ++rung) {
-    LadderRung r{kNames[rung], error_on(rung, around, &nominal), error_on(rung, around, &refit),
-                 error_on(rung, around, effect), 0};
-    for (const RankedHypothesis& h : hypotheses)
-      if (std::ranges::any_of(h.effects, [&](const std::string& e) { return rung_of_effect(e) == rung; }))
-        r.probability += h.probability;
-    ladder.push_back(std::move(r));
-  }
+  for (std::size_t rung = 0; rung < kRungs; ++rung)
+    ladder.push_back({kNames[rung], error_on(rung, around, &nominal), error_on(rung, around, &refit),
+                      error_on(rung, around, effect), probabilities[rung]});
   return ladder;
 }
 

@@ -4,6 +4,7 @@
 // (film, force map, open loop, closed loop). Controller and software come last: flappy-gap check --flown compares them.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "gap/localise/where.hpp"
@@ -14,6 +15,9 @@ namespace flappy::gap {
 enum RungIndex : std::size_t { kDriveRung, kAirRung, kBodyRung, kRungs };
 /// The rung where an effect acts.
 std::size_t rung_of_effect(const std::string& effect);
+
+/// [rung] Probability that effects of a rung are missing.
+std::array<double, kRungs> rung_probabilities(const std::vector<RankedHypothesis>& hypotheses);
 
 /// The three rungs below. `nominal`, `refit`, `effect`: [flight of `around`] residuals of the vehicle file, of the
 /// fitted parameters, and with effects as well (Fitted); null: not fitted. `hypotheses`: with their probabilities.

@@ -37,7 +37,7 @@ struct TestedBeat {
 
 class ChannelRows {
  public:
-  /// Of the flights in the air, or of the runs on a bench.
+  /// `clamped`: takes rows from runs on a bench alone, else from flights alone.
   ChannelRows(const RowContext& around, const TestResiduals& residual, int channel, bool clamped, Fitted fitted)
       : around_(around), channel_(channel), clamped_(clamped), fitted_(fitted) {
     const std::vector<int> all = blocks_of(around.beats, kLongBlock), fine = blocks_of(around.beats, kShortBlock);

@@ -194,17 +194,21 @@ ScoreLine first_line(const char* key, const char* what, double must, double aim,
   return line(key, what, Bar::at_least, must, aim, share(cases, named_alone), of_rivals(cases, rival_first));
 }
 
-/// With the case of `singles` of the same robot, if the same draw flew.
+/// Calls use(case, case of `singles` of the same robot) where the same draw flew.
+template <class Use>
+void for_same_robots(const Cases& cases, const Cases& singles, const Use& use) {
+  std::map<std::pair<std::uint64_t, std::uint64_t>, const ScoredCase*> by_robot;
+  for (const ScoredCase* c : singles) by_robot[{c->truth.seed, c->truth.draw}] = c;
+  for (const ScoredCase* c : cases)
+    if (const auto at = by_robot.find({c->truth.seed, c->truth.draw}); at != by_robot.end()) use(*c, *at->second);
+}
+
 ScoreLine redeclared_line(const Cases& cases, const Cases& singles) {
-  std::map<std::pair<std::uint64_t, std::uint64_t>, const Answer*> by_robot;
-  for (const ScoredCase* c : singles) by_robot[{c->truth.seed, c->truth.draw}] = &c->prediction;
   std::size_t unchanged = 0, count = 0;
-  for (const ScoredCase* c : cases) {
-    const auto single = by_robot.find({c->truth.seed, c->truth.draw});
-    if (single == by_robot.end()) continue;
+  for_same_robots(cases, singles, [&](const ScoredCase& c, const ScoredCase& single) {
     ++count;
-    unchanged += single->second->kind == c->prediction.kind && same(single->second->effects, c->prediction.effects);
-  }
+    unchanged += single.prediction.kind == c.prediction.kind && same(single.prediction.effects, c.prediction.effects);
+  });
   return line("redeclared_same", "verdict unchanged when only the declarations change", Bar::at_least, 0.90, 0.98,
               proportion(unchanged, count));
 }
@@ -285,16 +289,12 @@ void silence_rivals(std::vector<ScoredCase>& cases) {
 
 /// The rung whose effects are most probable; none: no effect is.
 std::size_t most_probable_rung(const Answer& a) {
-  std::array<double, gap::kRungs> of_rung{};
-  for (const gap::RankedHypothesis& h : a.sets)
-    for (std::size_t rung = 0; rung < gap::kRungs; ++rung)
-      if (std::ranges::any_of(h.effects, [&](const std::string& e) { return gap::rung_of_effect(e) == rung; }))
-        of_rung[rung] += h.probability;
+  const std::array<double, gap::kRungs> of_rung = gap::rung_probabilities(a.sets);
   const auto most = std::ranges::max_element(of_rung);
   return *most > 0 ? static_cast<std::size_t>(most - of_rung.begin()) : gap::kRungs;
 }
 
-/// What a bench adds to flights; nothing without robots that had both.
+/// Adds the rows that score diagnoses of flights and bench together; none if no robot was on a bench.
 void add_bench(const std::vector<ScoredCase>& cases, const Cases& singles, std::vector<ScoreLine>& lines) {
   const Cases both = of_parts(cases, {"singles_bench"}), harmless = of_parts(cases, {"own_parameters_bench"});
   if (both.empty() && harmless.empty()) return;
@@ -310,15 +310,10 @@ void add_bench(const std::vector<ScoredCase>& cases, const Cases& singles, std::
                        })));
   lines.push_back(line("false_alarm_bench", "false alarm with a bench: own parameters", Bar::at_most, kFalseAlarms,
                        0.02, share(harmless, false_alarm)));
-  // of the same robots
-  std::map<std::pair<std::uint64_t, std::uint64_t>, const ScoredCase*> by_robot;
-  for (const ScoredCase* c : singles) by_robot[{c->truth.seed, c->truth.draw}] = c;
   std::size_t with = 0, without = 0, count = 0;
-  for (const ScoredCase* c : both) {
-    const auto single = by_robot.find({c->truth.seed, c->truth.draw});
-    if (single == by_robot.end()) continue;
-    ++count, with += named_alone(*c), without += named_alone(*single->second);
-  }
+  for_same_robots(both, singles, [&](const ScoredCase& c, const ScoredCase& single) {
+    ++count, with += named_alone(c), without += named_alone(single);
+  });
   for (const auto& [key, what, right] :
        {std::tuple{"bench_pair_with", "the same robots, with a bench: right first", with},
         {"bench_pair_without", "the same robots, by flights: right first", without}})
