@@ -320,4 +320,11 @@ std::vector<OverSessions> change_over_sessions(const blind::Family& family, cons
   return all;
 }
 
+std::vector<OverSessions> larger_of(std::vector<OverSessions> in_flight, const std::vector<OverSessions>& on_bench) {
+  in_flight.resize(std::max(in_flight.size(), on_bench.size()));
+  for (std::size_t i = 0; i < on_bench.size(); ++i)
+    if (on_bench[i].ratio > in_flight[i].ratio) in_flight[i] = on_bench[i];
+  return in_flight;
+}
+
 }  // namespace flappy::benchmark

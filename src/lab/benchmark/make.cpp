@@ -125,9 +125,8 @@ class Maker {
       flightlog::write_flight_log(case_folder(p) / (kFlightFolder + std::to_string(p.flights + k + 1)), logs.back());
     }
     if (p.effects.empty()) return;
-    const std::vector<OverSessions> shown = change_over_sessions(family_, a, logs, command_.other_sessions);
-    for (std::size_t i = 0; i < shown.size(); ++i)
-      if (shown[i].ratio > over_sessions[i].ratio) over_sessions[i] = shown[i];
+    over_sessions =
+        larger_of(std::move(over_sessions), change_over_sessions(family_, a, logs, command_.other_sessions));
   }
 
   void seal() const {

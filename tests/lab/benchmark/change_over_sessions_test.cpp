@@ -143,5 +143,16 @@ TEST(ChangeOverSessions, FliesTheProgrammeOfTheTestsInOtherSessions) {
   EXPECT_TRUE(change_over_sessions(family, robot, {family.fly(robot, 0).log}, 3).empty()) << "too few to say";
 }
 
+TEST(LargerOf, TakesWhatIsKnown) {
+  const std::vector<OverSessions> in_flight = {{"rate", 4}, {"force", 1}}, on_bench = {{"stroke", 2}, {"current", 9}};
+  const std::vector<OverSessions> both = larger_of(in_flight, on_bench);
+  ASSERT_EQ(both.size(), 2U);
+  EXPECT_EQ(both[0].channel, "rate");
+  EXPECT_EQ(both[1].channel, "current");
+  ASSERT_EQ(larger_of({}, on_bench).size(), 2U) << "the robot crashes in nearly all other sessions";
+  EXPECT_EQ(larger_of({}, on_bench)[0].channel, "stroke");
+  EXPECT_EQ(larger_of(in_flight, {})[1].channel, "force");
+}
+
 }  // namespace
 }  // namespace flappy::benchmark
