@@ -69,18 +69,12 @@ class RegimeBasis {
     BasisFunction kind;
     bool of_tests = false;
   };
-  /// Whether what differs in the tests has a copy of a function: not the offset of a flight, nor, on a bench alone,
-  /// products of inputs, for what differs between its sessions was learnt without them.
-  bool has_copy(int i) const {
-    return kind(i) != BasisFunction::flight && !(all_on_bench_ && kind(i) == BasisFunction::product);
-  }
   void append_functions(const Flights& flights, const std::vector<std::size_t>& offsets);
   void append_of_tests(const Flights& flights, const std::vector<std::size_t>& tests);
   void find_covered(const Flights& flights);
   const Function& function(int i) const { return functions_[static_cast<std::size_t>(i)]; }
   std::vector<Function> functions_;
   std::vector<Eigen::MatrixXd> values_;
-  bool all_on_bench_ = false;
   Eigen::MatrixXd in_tests_;  ///< [function][function in the tests alone]
   Eigen::MatrixXd in_all_;    ///< [function in the tests alone][function]
   std::array<bool, static_cast<std::size_t>(Regimes::count)> covered_{};

@@ -7,7 +7,6 @@ namespace flappy::gap {
 
 RegimeBasis::RegimeBasis(const EvidenceRules& rules, const Flights& flights) {
   covered_.fill(true);
-  all_on_bench_ = std::ranges::all_of(flights.all(), [](const auto& f) { return f->clamped(); });
   append_functions(flights, rules.offsets(flights));
   const std::vector<std::size_t> apart = rules.apart(flights);
   if (apart.empty()) return;
@@ -84,7 +83,7 @@ void RegimeBasis::append_functions(const Flights& flights, const std::vector<std
 void RegimeBasis::append_of_tests(const Flights& flights, const std::vector<std::size_t>& tests) {
   const int once = size();
   for (int i = 0; i < once; ++i) {
-    if (!has_copy(i)) continue;
+    if (kind(i) == BasisFunction::flight) continue;
     for (std::size_t f = 0; f < flights.size(); ++f) {
       const Eigen::VectorXd column = (std::ranges::count(tests, f) > 0 ? 1.0 : 0.0) * values_[f].col(i);
       values_[f].conservativeResize(column.size(), values_[f].cols() + 1);
@@ -95,14 +94,10 @@ void RegimeBasis::append_of_tests(const Flights& flights, const std::vector<std:
   in_all_ = in_tests_ = Eigen::MatrixXd::Zero(size(), size());
   int again = once;
   for (int i = 0; i < once; ++i) {
-    if (has_copy(i)) {
+    if (kind(i) != BasisFunction::flight) {
       in_tests_(i, again) = in_tests_(again, again) = 1;
       in_all_(i, i) = in_all_(again, i) = 1;
       ++again;
-      continue;
-    }
-    if (kind(i) != BasisFunction::flight) {  // changes the tests and the references alike
-      in_all_(i, i) = 1;
       continue;
     }
     // the offset of a flight: one value in it, another in all others
@@ -125,7 +120,6 @@ Eigen::MatrixXd RegimeBasis::without_offsets(bool as_test) const {
   for (int i = 0; i < size() && !of_tests(i); ++i) {
     if (kind(i) == BasisFunction::flight) continue;
     to(i, i) = 1;
-    if (!has_copy(i)) continue;
     if (as_test) to(i, again) = 1;
     ++again;
   }
