@@ -59,8 +59,12 @@ ModelDiscrepancy of_flights(ModelDiscrepancy discrepancy, const Flights& flights
   return discrepancy;
 }
 
-/// `withheld`, and tether unless each flight in which effects act has a ground: it would hang down to nowhere.
+/// `withheld`; tether, unless each flight in which effects act has a ground: it would hang down to nowhere; and what
+/// surrounds a robot in the air, if all runs are on a bench: a rig stays where it stands.
 std::vector<std::string> without_idle(std::vector<std::string> withheld, const Flights& flights) {
+  if (std::ranges::all_of(flights.all(), [](const auto& flight) { return flight->clamped(); }))
+    withheld.insert(withheld.end(), {model::Wind::kInfo.id, model::GroundEffect::kInfo.id,
+                                     model::CeilingEffect::kInfo.id, model::WallEffect::kInfo.id});
   if (!std::ranges::all_of(flights.tests, [](const auto& flight) { return flight->has_ground(); }))
     withheld.emplace_back(model::Tether::kInfo.id);
   return withheld;

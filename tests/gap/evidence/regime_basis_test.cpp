@@ -57,6 +57,15 @@ TEST(RegimeBasis, CentresABenchByItself) {
   }
 }
 
+TEST(RegimeBasis, HasNoProductsInAContrastOfABench) {
+  const auto made = synthetic_flights(4, synthetic_law);
+  for (const auto& f : made) f->on_bench = true;
+  EXPECT_GE(index_of(basis_of(as_flights(made)), "amplitude velocity_x"), 0) << "alone";
+  EXPECT_LT(index_of(basis_of(as_flights(made, 2)), "amplitude velocity_x"), 0);
+  made[0]->on_bench = false;
+  EXPECT_GE(index_of(basis_of(as_flights(made, 2)), "amplitude velocity_x"), 0) << "with a flight";
+}
+
 TEST(RegimeBasis, TellsFlightsFromHeights) {
   const Flights flights{{},
                         {std::make_shared<SyntheticFlight>("low", 1, synthetic_law, 0),

@@ -60,6 +60,21 @@ TEST_F(RobotFits, GivesMinorDrawsOfAJointFit) {
   EXPECT_NEAR(robot.minors_given(joint).at(0), 1.5, 0.5);
 }
 
+TEST_F(RobotFits, LeavesOutTheSurroundingsOfARig) {
+  const auto knows = [](const RobotFit& robot, const char* effect) {
+    return std::ranges::count(robot.magnitudes(), effect, &MagnitudeColumn::effect) > 0;
+  };
+  const auto planned = [&](const Flights& flights) {
+    return RobotFit::planned(question_of(flights), flights, *priors_, read_model_discrepancy(), 2);
+  };
+  const auto made = synthetic_flights(2, synthetic_law);
+  const Flights flights = as_flights(made);
+  made[0]->on_bench = true;
+  EXPECT_TRUE(knows(planned(flights), "wind")) << "with a flight";
+  made[1]->on_bench = true;
+  EXPECT_FALSE(knows(planned(flights), "wind"));
+}
+
 TEST_F(RobotFits, KnowsWhatMagnitudesChange) {
   const std::vector<MagnitudeColumn>& all = robot_->magnitudes();
   const auto wind = std::ranges::find(all, "wind", &MagnitudeColumn::effect);
