@@ -55,8 +55,11 @@ std::string wing(const model::Side& side, const char* stroke_axis, bool damping,
   return xml.str();
 }
 
-/// Springs come with the loads.
-std::string vehicle_xml(const model::Vehicle& vehicle, const PeerOptions& options, const MujocoSettings& settings) {
+thread_local MujocoPeer* stepping = nullptr;  // MuJoCo's callback is global
+
+}  // namespace
+
+std::string mujoco_xml(const model::Vehicle& vehicle, const PeerOptions& options, const MujocoSettings& settings) {
   const bool friction = options.dry_friction == DryFriction::constraint;
   std::ostringstream xml;
   xml << std::setprecision(17) << "<mujoco><compiler angle='radian'/><option timestep='" << options.step_s
@@ -70,10 +73,6 @@ std::string vehicle_xml(const model::Vehicle& vehicle, const PeerOptions& option
       << wing(vehicle.right, "0 0 -1", settings.joint_damping, friction) << "</body></worldbody></mujoco>";
   return xml.str();
 }
-
-thread_local MujocoPeer* stepping = nullptr;  // MuJoCo's callback is global
-
-}  // namespace
 
 std::string mujoco_version() {
   if (mj_version() != mjVERSION_HEADER)
@@ -105,7 +104,7 @@ MujocoPeer::MujocoPeer(const model::Vehicle& vehicle, const PeerOptions& options
     : vehicle_(vehicle),
       options_(options),
       joint_damping_(settings.joint_damping),
-      model_(mujoco_model(vehicle_xml(vehicle, options, settings)), mj_deleteModel),
+      model_(mujoco_model(mujoco_xml(vehicle, options, settings)), mj_deleteModel),
       data_(mj_makeData(model_.get()), mj_deleteData) {
   mjcb_control = load_stage;
   mju_user_warning = [](const char*) {};  // else MuJoCo writes them to a file in the working folder

@@ -40,6 +40,9 @@ inline MujocoSettings with_default_stops(MujocoSettings settings) {
   return settings;
 }
 
+/// The vehicle as MJCF, without loads and springs.
+std::string mujoco_xml(const model::Vehicle& vehicle, const PeerOptions& options, const MujocoSettings& settings = {});
+
 class MujocoPeer {
  public:
   /// At rest at the origin, level, all joints at zero.

@@ -385,6 +385,8 @@ int main(int argc, char** argv) {
       app.command("convergence", "error against step size, and against work for other integrators");
   io::Command work_precision =
       app.command("work-precision", "error against processor time of our step, MuJoCo and DART");
+  std::string flights;
+  work_precision.option("--flights", flights, "only write 64 of the flights into this folder, for other engines");
   io::Command learner = app.command("learner", "updates per second of the learner, and of LibTorch");
   io::Command engines =
       app.command("engines", "training on lanes and on LibTorch: start, memory, updates/s, time to 90 %");
@@ -415,6 +417,7 @@ int main(int argc, char** argv) {
     if (engines.given()) return finish("engines", bench::engines(seeds, beside));
     const model::Vehicle v = model::read_vehicle(vehicle);
     if (convergence.given()) return finish("convergence", bench::convergence(v));
+    if (!flights.empty()) return bench::write_flights(v, 64, flights);
     if (work_precision.given()) return finish("work-precision", bench::error_against_work(v, options));
     if (busy.given()) return finish("busy", bench::busy(v, options));
     finish("speed", bench::speed(v, options));

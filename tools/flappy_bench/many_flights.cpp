@@ -4,10 +4,13 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <random>
 
 #include "accuracy.hpp"
+#include "flappy/vehicle_file.hpp"
 #include "io/config.hpp"
+#include "io/files.hpp"
 #include "io/installation.hpp"
 #include "sim/randomise.hpp"
 #include "sim/storage.hpp"
@@ -229,6 +232,30 @@ std::vector<Errors> errors_of(const model::Vehicle& vehicle, const Manoeuvre& ma
     errors.push_back({position_m, attitude_rad, std::sqrt(thrust / n) / (mean_N / n)});
   }
   return errors;
+}
+
+void write_flights([[maybe_unused]] const model::Vehicle& vehicle, [[maybe_unused]] std::size_t count,
+                   [[maybe_unused]] const std::filesystem::path& folder) {
+#ifdef FLAPPY_HAVE_PEERS
+  std::vector<OwnFlight> flights = draw(vehicle, kAboutHover);
+  flights.resize(std::min(count, flights.size()));
+  const std::vector<Flight> exact = free_flights(flights, kAboutHover.exact_step_s);
+  const auto voltages = voltages_of(flights);
+  nlohmann::json all = nlohmann::json::array();
+  std::filesystem::create_directories(folder);
+  for (std::size_t i = 0; i < flights.size(); ++i) {
+    const std::string file = "vehicle_" + std::to_string(i) + ".toml";
+    io::write_atomically(folder / file, model::vehicle_text(flights[i].vehicle));
+    all.push_back({{"vehicle", file},
+                   {"stroke_rad", flights[i].start.stroke_rad},
+                   {"rotation_rad", flights[i].start.rotation_rad},
+                   {"voltages_V", voltages[i]},
+                   {"end_m", {exact[i].x_m, exact[i].y_m, exact[i].z_m}}});
+  }
+  io::write_atomically(folder / "flights.json", all.dump() + "\n");
+#else
+  throw io::InputError("--flights: this build has no peers; accepted: one of scripts/bench peers");
+#endif
 }
 
 std::vector<WorkPrecisionRow> work_precision(const model::Vehicle& vehicle, [[maybe_unused]] double enough_m,

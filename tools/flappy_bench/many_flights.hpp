@@ -2,6 +2,7 @@
 // other engines.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
@@ -34,6 +35,10 @@ struct WorkPrecisionRow {
   std::string engine, settings;
   double step_s, position_error_m, attitude_error_rad, flapper_s_per_cpu_s;
 };
+
+/// Writes the first `count` of these flights for engines that no C++ reaches: vehicle_I.toml, and flights.json with the voltages (each
+/// held for 1 ms), the start and the end of our 1 us run. Only of a build with peers.
+void write_flights(const model::Vehicle& vehicle, std::size_t count, const std::filesystem::path& folder);
 
 /// Errors at the end of free flights about hover against our 1 us run, and seconds of flight per second of one processor; our timing is
 /// in float. Peers fly as many flights as fit into a minute, at ever finer steps until their error is below half of `enough_m`.
