@@ -1,21 +1,27 @@
 #include "io/run_program.hpp"
 
 #include <spawn.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstdio>
+#include <fstream>
 #include <memory>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include "io/files.hpp"
 
 namespace flappy::io {
 namespace {
+
+/// Between two looks at a program that runs.
+constexpr std::chrono::milliseconds kLook{2};
 
 using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
 
@@ -25,6 +31,14 @@ std::string contents(std::FILE* file) {
   std::array<char, 4096> block;
   while (const std::size_t count = std::fread(block.data(), 1, block.size(), file)) text.append(block.data(), count);
   return text;
+}
+
+/// Peak memory so far of a program that runs, else 0. getrusage() would count that of the program that started it, too.
+double peak_so_far(pid_t program) {
+  std::ifstream status("/proc/" + std::to_string(program) + "/status");
+  for (std::string word; status >> word;)
+    if (double kB = 0; word == "VmHWM:" && status >> kB) return 1024 * kB;
+  return 0;
 }
 
 }  // namespace
@@ -60,11 +74,16 @@ Finished run(const std::vector<std::string>& command, std::string_view input) {
   const int numbers[] = {fileno(streams[0].get()), fileno(streams[1].get()), fileno(streams[2].get())};
   const pid_t child = start_program(command, numbers);
   int status = 0;
-  rusage used{};
-  while (wait4(child, &status, 0, &used) < 0)
-    if (errno != EINTR) fail(errno);
+  double peak_bytes = 0;
+  for (pid_t ended = 0; ended == 0;) {
+    peak_bytes = std::max(peak_bytes, peak_so_far(child));
+    ended = waitpid(child, &status, WNOHANG);
+    if (ended < 0 && errno == EINTR) ended = 0;
+    else if (ended < 0) fail(errno);
+    else if (ended == 0) std::this_thread::sleep_for(kLook);
+  }
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, contents(streams[1].get()), contents(streams[2].get()),
-          1024.0 * static_cast<double>(used.ru_maxrss)};
+          peak_bytes};
 }
 
 std::string run_program(const std::vector<std::string>& command, std::string_view input, const std::string& result) {

@@ -17,7 +17,7 @@ pid_t start_program(const std::vector<std::string>& command, std::span<const int
 struct Finished {
   int exit_code;  ///< -1: a signal ended it
   std::string out, err;
-  double peak_bytes;  ///< peak memory
+  double peak_bytes;  ///< peak memory, as looked at every 2 ms
 };
 /// Runs a program (along PATH, no shell) with `input` on stdin. Throws std::system_error where it cannot be started.
 Finished run(const std::vector<std::string>& command, std::string_view input = {});

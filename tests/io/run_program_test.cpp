@@ -28,5 +28,14 @@ TEST(RunProgram, SaysWhatIsMissingOrFailed) {
   EXPECT_EQ(run({"sh", "-c", "echo why >&2; kill -9 $$"}), "figure.svg: is not written: sh failed: why\\x0a");
 }
 
+TEST(Run, CountsTheMemoryOfTheProgramAlone) {
+  const std::vector<char> own(64 << 20, 1);  // which the kernel's usage of a child would include
+  const Finished small = io::run({"sleep", "0.05"});
+  EXPECT_GT(small.peak_bytes, 1e5);
+  EXPECT_LT(small.peak_bytes, 32e6) << own[0];
+  const Finished large = io::run({"sh", "-c", "text=$(head -c 40000000 /dev/zero | tr '\\0' x); sleep 0.05"});
+  EXPECT_GT(large.peak_bytes, 40e6);
+}
+
 }  // namespace
 }  // namespace flappy::io

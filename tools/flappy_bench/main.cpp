@@ -19,9 +19,11 @@
 #include "io/parallel.hpp"
 #include "io/program.hpp"
 #include "io/progress.hpp"
+#include "io/text.hpp"
 #include "many_flights.hpp"
 #include "model/effects/registry.hpp"
 #include "roof.hpp"
+#include "scale.hpp"
 #include "speed.hpp"
 #ifdef FLAPPY_HAVE_PEERS
 #include <mujoco/mujoco.h>
@@ -342,6 +344,29 @@ Json engines(int seeds, const std::string& beside) {
   return {{"engines", list}, {"processors", io::processors()}, {"instruction_set", sim::best_instruction_set()}};
 }
 
+Json scale(const std::vector<std::string>& of, double share) {
+  io::ProgressLine progress("measured");
+  const std::vector<ScaleRow> rows =
+      measure_scale(of, share, [&](double done, const std::string& what) { progress.show(done, what); });
+  progress.clear();
+  std::printf("%-32s %10s %10s %10s %8s   %s\n", "", "size", "s", "MB", "power", "command");
+  Json list = Json::array();
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const ScaleRow& r = rows[i];
+    const bool first = i == 0 || rows[i - 1].what != r.what;
+    const double power = first ? std::nan("") : growth(rows[i - 1], r);
+    std::printf("%-32s %10.0f %10.2f %10.0f %8s   %s\n", r.what.c_str(), r.size, r.seconds, r.peak_bytes / 1e6,
+                first ? "" : io::format("%.2f", power).c_str(), r.command.c_str());
+    list.push_back({{"what", r.what},
+                    {"size", r.size},
+                    {"seconds", r.seconds},
+                    {"peak_bytes", r.peak_bytes},
+                    {"power", first ? Json(nullptr) : Json(power)},
+                    {"command", r.command}});
+  }
+  return {{"rows", list}, {"processors", io::processors()}};
+}
+
 Json telemetry(double duration_s) {
   std::printf("shown to another process at 500 Hz for %g s, five topics each\n", duration_s);
   std::printf("  %8s %10s %8s %28s %10s %20s\n", "flappers", "shown", "dropped", "late: median, 99 %, most", "heard",
@@ -399,6 +424,13 @@ int main(int argc, char** argv) {
   double telemetry_s = 10;
   telemetry.option("--duration", telemetry_s, "seconds").range(0.1, 1000.0).shows_default();
   io::Command busy = app.command("busy", "work per second of processor time while others hold all processors");
+  io::Command scale = app.command("scale", "time and memory of growing work: flappers, updates, logs, flights, jobs");
+  std::vector<std::string> of;
+  double share = 1;
+  int jobs = 0;
+  scale.option("--of", of, "only these: " + io::joined(bench::scales()));
+  scale.option("--share", share, "up to this share of the largest sizes").range(0.0, 1.0).shows_default();
+  scale.option("--jobs", jobs, "only put so many jobs through a queue").range(1, 1000000);
   io::Command batch = app.command("batch", "fly a batch at one input and summarise it");
   std::string config;
   std::vector<std::string> overrides;
@@ -412,6 +444,8 @@ int main(int argc, char** argv) {
       if (!figures.empty()) bench::append_figures(figures, command, results);
     };
     if (batch.given()) return program.write_json(bench::fly_batch(config, overrides));
+    if (jobs > 0) return bench::pass_jobs(static_cast<std::size_t>(jobs));
+    if (scale.given()) return finish("scale", bench::scale(of, share));
     if (learner.given()) return finish("learner", bench::learner(options));
     if (telemetry.given()) return finish("telemetry", bench::telemetry(telemetry_s));
     if (engines.given()) return finish("engines", bench::engines(seeds, beside));
