@@ -122,11 +122,12 @@ def main():
             shipped.write_text(with_bench(shipped.read_text(), output.read_text()))
         fly_all(pair, [f for f in ON_BENCH for _ in range(o.pairs)], [n for _ in ON_BENCH for n in range(o.pairs)],
                 [True] * o.pairs * len(ON_BENCH))
-        for family in ON_BENCH:
-            shipped = LAB / "sessions" / f"bench_without_{family}.toml"
-            start = shipped if shipped.exists() else LAB / "sessions" / f"without_{family}.toml"
-            learn(f"bench_without_{family}.toml", [f for f in ON_BENCH if f != family], shipped, lambda families: [
-                "--sessions", start, "--discrepancy", LAB / "discrepancy" / f"without_{family}.toml",
+        for family in [*ON_BENCH, ""]:
+            shipped = LAB / "sessions" / f"bench_without_{family}.toml" if family else CONFIGS / "gap" / "bench_session_variation.toml"
+            in_flight = LAB / "sessions" / f"without_{family}.toml" if family else CONFIGS / "gap" / "session_variation.toml"
+            discrepancy = LAB / "discrepancy" / f"without_{family}.toml" if family else CONFIGS / "gap" / "model_discrepancy.toml"
+            learn(f"bench_without_{family or 'none'}.toml", [f for f in ON_BENCH if f != family], shipped, lambda families: [
+                "--sessions", shipped if shipped.exists() else in_flight, "--discrepancy", discrepancy,
                 "--pairs", *[pair(f, n, True) for f in families for n in range(o.pairs)]])
     if "verdict" in o.steps:
         for f in FAMILIES:

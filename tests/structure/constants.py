@@ -16,7 +16,7 @@ from self_test import misjudged, run
 CODE, CONFIGS = "src/gap", "configs/gap"
 THEORY = "docs/theory/diagnosis.md"
 # Which file a key of the theory is of: the first that has it.
-FILES = ("verdict.toml", "model_discrepancy.toml", "contrast_verdict.toml", "session_variation.toml", "beat_averaged/verdict.toml")
+FILES = ("verdict.toml", "model_discrepancy.toml", "contrast_verdict.toml", "session_variation.toml", "bench_session_variation.toml", "beat_averaged/verdict.toml")
 KINDS = "Choice|Source|Learnt|Derived|Size"
 BEGINS = re.compile(rf"(?:^|[.?] )(?=(?:{KINDS})(?:: |\.))")
 COMMIT = re.compile(r"\b[0-9a-f]{7,12}(?P<dirty>-dirty)?\b")

@@ -42,6 +42,12 @@ std::vector<int> read_channels(const std::vector<std::string>& names, bool beat_
   return list;
 }
 
+/// Whether all of these logs are of a clamped robot.
+bool on_bench(const std::vector<std::string>& logs) {
+  return std::ranges::all_of(
+      logs, [](const std::string& log) { return fs::exists(fs::path(log) / flightlog::log_file::kForces); });
+}
+
 /// The flights of each folder of a session in its place, by their names.
 std::vector<std::string> flights_of(const std::vector<std::string>& given,
                                     std::map<std::string, std::string>& sessions) {
@@ -140,7 +146,9 @@ DiagnosisRequest read_request(const DiagnosisSettings& settings) {
   // a contrast of a beat-averaged vehicle uses only the errors of laws of the session variation
   if (contrast)
     options.discrepancy.session =
-        beat_averaged ? read_session_variation() : read_session_variation(file(s.sessions, "session_variation.toml"));
+        beat_averaged ? read_session_variation()
+                      : read_session_variation(file(
+                            s.sessions, on_bench(all) ? "bench_session_variation.toml" : "session_variation.toml"));
   return {s,
           std::move(sets),
           std::move(sessions),
