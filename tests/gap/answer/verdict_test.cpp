@@ -294,6 +294,24 @@ TEST(Request, TakesSetsOfReferences) {
             "--reference =a: no name before \"=\"; accepted: LOG, or NAME=LOG as far=LOG");
 }
 
+TEST(Request, TakesWhatDiffersOnABenchWhereAllLogsAreOfOne) {
+  const flight::Folder folder;
+  DiagnosisSettings s;
+  s.vehicle = kConfigs + "vehicles/hummingbird_nominal.toml";
+  for (const char* name : {"before", "after"}) {
+    std::filesystem::create_directories(folder / name);
+    io::write_atomically(folder / name / "flight.toml", "");
+    io::write_atomically(folder / name / "forces.csv", "");
+  }
+  s.reference = {folder / "before"};
+  s.flights = {folder / "after"};
+  const auto scale_sd = [&] { return read_request(s).options.discrepancy.session.scale_sd; };
+  const auto of_file = [](const char* name) { return read_session_variation(kConfigs + "gap/" + name).scale_sd; };
+  EXPECT_EQ(scale_sd(), of_file("bench_session_variation.toml"));
+  std::filesystem::remove(folder / "after" / "forces.csv");
+  EXPECT_EQ(scale_sd(), of_file("session_variation.toml")) << "one log is of a flight";
+}
+
 TEST(VerdictRule, IsReadStrictly) {
   const flight::Folder folder;
   const std::string path = (folder / "constants.toml").string();
