@@ -53,7 +53,7 @@ Words diagnosis(const Words& flights, const std::filesystem::path& folder) {
 std::vector<Scale> all_scales() {
   return {
       {"flappers",
-       {1024, 4096, 16384, 65536, 262144, 1048576},
+       {1024, 4096, 16384, 65536, 262144, 1000000},
        [](double size, const auto&) {
          return Words{program("flappy-bench"), "batch", config("sim/hover_batch.toml"), "--set", "count=" + text(size)};
        }},

@@ -94,6 +94,10 @@ std::string uncorrected(std::string name) {
   return name;
 }
 
+/// Updates of --adapt, as an override. Choice: the escape of a robot that had changed succeeded in 89.4 % of flights after
+/// so many, and in 89.8 % after 60,000.
+constexpr const char* kAdaptUpdates = "learn.updates=8000";
+
 /// The vehicle that a diagnosis corrected, as an override for training on from `run`. Throws io::InputError unless the
 /// diagnosis was of the run's vehicle.
 std::string adapted_vehicle(const fs::path& diagnosis, const fs::path& run) {
@@ -231,6 +235,7 @@ int main(int argc, char** argv) {
           throw io::InputError("--set " + text + ": --adapt sets the vehicle; accepted: other keys");
       config_name = train::config_of(init).string();
       overrides.insert(overrides.begin(), train::adapted_vehicle(adapt, init));
+      overrides.insert(overrides.begin(), train::kAdaptUpdates);  // what is given later counts
       if (out.empty())
         out = (fs::path("runs") / (fs::absolute(init).lexically_normal().filename().string() + "_adapted")).string();
     }
