@@ -33,6 +33,9 @@ def with_bench(text, learnt):
     commit = re.search(r"commit (\w+)", learnt).group(1)
     text = re.sub(r" Shares of a bench: commit \w+\.", "", tables.sub("", text))
     text = re.sub(r"^(# Learnt: .*)$", rf"\1 Shares of a bench: commit {commit}.", text, count=1, flags=re.M)
+    meaning = " bench_share: of runs on a bench, where it differs."
+    if meaning not in text:
+        text = text.replace("from which learning started.", "from which learning started." + meaning, 1)
     return re.sub(r"^(?=# Priors of the scales)", "".join(tables.findall(learnt)), text, count=1, flags=re.M)
 
 

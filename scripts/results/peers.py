@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Peers at their newest, beside us on one core: steps, flights at equal error, environment steps. Run by scripts/bench peers.
 
-    scripts/results/peers.py BUILD OUT [--flights 16]
+    scripts/results/peers.py BUILD OUT [--flights 16] [--part bench|dart|warp|environments]
 
 BUILD: made by scripts/bench peers with MuJoCo's newest library, its venv in BUILD/venv. Prints tables, and writes OUT/peers.json.
-An engine that no C++ of ours reaches flies our vehicle in Python; of its time only that of its own steps counts, so that Python costs it
-nothing. Loads on it are those of tests/reference/peer.hpp, as in C++.
+An engine that no C++ of ours reaches flies our vehicle in Python; of its time only the call of its own step counts, so that Python
+costs it little. Loads on it are those of tests/reference/peer.hpp, as in C++.
 """
 import argparse
 import ctypes
@@ -232,6 +232,9 @@ def main():
     parser.add_argument("--part", choices=["bench", "dart", "warp", "environments"], help="only this part")
     parser.add_argument("--one", help=argparse.SUPPRESS)
     o = parser.parse_args()
+    if not 1 <= o.flights <= 64:
+        sys.exit(f"--flights {o.flights}: is not from 1 to 64; accepted: so many")
+    o.build, o.out = o.build.resolve(), o.out.resolve()
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     bench, library, folder = o.build / "bin" / "flappy-bench", o.build / "tools" / "libflappy_peer_library.so", o.out / "flights"
     o.out.mkdir(parents=True, exist_ok=True)
@@ -250,20 +253,19 @@ def main():
         return
 
     def rate_of(name):
-        done = subprocess.run([sys.executable, __file__, o.build, o.out, "--one", name], capture_output=True, text=True)
+        done = subprocess.run([sys.executable, Path(__file__).resolve(), o.build, o.out, "--one", name], capture_output=True, text=True, cwd=o.out)
         if done.returncode != 0:
-            sys.exit(f"{name}: {done.stderr.strip().splitlines()[-1]}")
+            sys.exit(f"{name}: {(done.stderr.strip().splitlines() or [f'exit code {done.returncode}'])[-1]}")
         return json.loads(done.stdout.strip().splitlines()[-1])
 
     file = o.out / "peers.json"
     found = json.loads(file.read_text()) if file.exists() else {}
     found["versions"] = {p: importlib.metadata.version(p) for p in ("mujoco", "mujoco-warp", "dartpy", "envpool", "crazyflow", "jax")}
     print(found["versions"])
-    if not (folder / "flights.json").exists():
-        subprocess.run([bench, "work-precision", "--flights", folder], check=True)
+    subprocess.run([bench, "work-precision", "--flights", folder], check=True)
     if o.part in (None, "bench"):
         for name, command in (("speed", []), ("work-precision", ["work-precision"])):
-            subprocess.run([bench, "--json", o.out / f"{name}.json", *command], check=True)
+            subprocess.run([bench, "--json", o.out / f"{name}.json", *command], check=True, cwd=o.out)
             found[name] = json.loads((o.out / f"{name}.json").read_text())
     if o.part in (None, "dart"):
         found["dart"] = dart_rows(library, folder, o.flights)

@@ -145,8 +145,9 @@ def of_config(path, root):
             name = f"{table}.{key}".replace('"', "")
             if value in ("true", "false"):
                 continue
-            if not comment and (table.startswith("share.") or table == "background_sd"):
-                group = "share.CHANNEL.KIND" if table.startswith("share.") else "background_sd.EFFECT"
+            of_shares = re.match(r"(bench_)?share\.", table)
+            if not comment and (of_shares or table == "background_sd"):
+                group = f"{of_shares.group()}CHANNEL.KIND" if of_shares else "background_sd.EFFECT"
                 row = many.setdefault(group, Constant(group, [], of_table[0], of_them or of_file[1], str(path.relative_to(root)), number))
                 row.what, row.values = row.what or of_table[0], row.values + numbers
                 if row not in found:

@@ -429,7 +429,7 @@ int main(int argc, char** argv) {
   double share = 1;
   int jobs = 0;
   scale.option("--of", of, "only these: " + io::joined(bench::scales()));
-  scale.option("--share", share, "up to this share of the largest sizes").range(0.0, 1.0).shows_default();
+  scale.option("--share", share, "up to this share of the largest sizes").range(0.001, 1.0).shows_default();
   scale.option("--jobs", jobs, "only put so many jobs through a queue").range(1, 1000000);
   io::Command batch = app.command("batch", "fly a batch at one input and summarise it");
   std::string config;

@@ -254,7 +254,7 @@ void write_flights([[maybe_unused]] const model::Vehicle& vehicle, [[maybe_unuse
   }
   io::write_atomically(folder / "flights.json", all.dump() + "\n");
 #else
-  throw io::InputError("--flights: this build has no peers; accepted: one of scripts/bench peers");
+  throw io::InputError("--flights: this build has neither MuJoCo nor DART; accepted: a build of scripts/bench");
 #endif
 }
 

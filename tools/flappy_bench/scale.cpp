@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <system_error>
 
 #include "io/files.hpp"
 #include "io/installation.hpp"
@@ -28,17 +29,28 @@ std::string text(double value) { return io::format("%.0f", value); }
 std::string config(const char* name) { return io::config_path(name); }
 std::string program(const char* name) { return io::beside_program(std::string("bin/") + name); }
 
-void run(const Words& command) {
-  const io::Finished done = io::run(command);
-  if (done.exit_code != 0) throw io::InputError(command[0] + ": " + done.err.substr(0, done.err.find('\n')));
+/// Peak memory. `what`: for the message of the io::InputError that it throws if the program fails.
+double run(const Words& command, const std::string& what) {
+  try {
+    io::Finished done = io::run(command);
+    if (done.exit_code == 0) return done.peak_bytes;
+    while (done.err.ends_with('\n')) done.err.pop_back();
+    const std::string last = done.err.substr(done.err.rfind('\n') + 1);
+    throw io::InputError(what + ": " + command[0] + " ended " +
+                         (done.exit_code < 0 ? "by a signal" : "with " + std::to_string(done.exit_code)) + ": " + last);
+  } catch (const std::system_error& error) {
+    throw io::InputError(what + ": " + command[0] + ": " + error.code().message() +
+                         "; accepted: a build with all programs");
+  }
 }
 
-/// A log of a hovering flight with all that a diagnosis needs.
+/// A log of a figure eight, with all that a diagnosis needs.
 std::string flown(double seconds, int seed, const std::filesystem::path& folder) {
   const std::string log = (folder / ("log_" + text(seconds) + "_" + std::to_string(seed))).string();
   if (!std::filesystem::exists(log))
     run({program("flappy-fly"), config("fly/figure_eight.toml"), "--set", "flight.duration_s=" + text(seconds), "--set",
-         "flight.seed=" + std::to_string(seed), "--log", log});
+         "flight.seed=" + std::to_string(seed), "--log", log},
+        "a log of " + text(seconds) + " s");
   return log;
 }
 
@@ -102,6 +114,9 @@ std::vector<std::string> scales() {
 
 std::vector<ScaleRow> measure_scale(const std::vector<std::string>& of, double share,
                                     const std::function<void(double done, const std::string& now)>& tell) {
+  for (const std::string& what : of)
+    if (const std::vector<std::string> known = scales(); std::ranges::count(known, what) == 0)
+      throw io::InputError("--of " + what + ": is not known; accepted: " + io::joined(known));
   std::vector<ScaleRow> rows;
   double begun = 0;
   for (const Scale& s : all_scales()) {
@@ -112,13 +127,9 @@ std::vector<ScaleRow> measure_scale(const std::vector<std::string>& of, double s
       tell(begun / static_cast<double>(of.empty() ? scales().size() : of.size()), text(size) + " " + s.what);
       const Words command = s.command(size, folder.path());
       const auto from = std::chrono::steady_clock::now();
-      const io::Finished done = io::run(command);
-      ScaleRow row{s.what,
-                   size,
-                   {},
-                   std::chrono::duration<double>(std::chrono::steady_clock::now() - from).count(),
-                   done.peak_bytes};
-      if (done.exit_code != 0) throw io::InputError(command[0] + ": " + done.err.substr(0, done.err.find('\n')));
+      const double peak_bytes = run(command, text(size) + " " + s.what);
+      ScaleRow row{
+          s.what, size, {}, std::chrono::duration<double>(std::chrono::steady_clock::now() - from).count(), peak_bytes};
       for (const std::string& word : command)
         if (word.find(folder.path().string()) == std::string::npos)
           row.command += (row.command.empty() ? "" : " ") + std::filesystem::path(word).filename().string();

@@ -15,7 +15,7 @@ struct ScaleRow {
   double peak_bytes = 0;
 };
 
-/// What grows: "flappers", "updates", "seconds of log", "flights in a diagnosis", "jobs in a queue".
+/// Names of what grows.
 std::vector<std::string> scales();
 
 /// The rows of these, each at growing sizes up to `share` of the largest. Throws io::InputError if a program fails.

@@ -217,7 +217,7 @@ int main(int argc, char** argv) {
       app.option("--init", init, "what to start with: a run folder (its best actor and its critics), or an actor alone")
           .excludes(resumed);
   app.option("--adapt", adapt,
-             "folder of a diagnosis: trains the run of --init on, with its configuration and the corrected vehicle")
+             "folder of a diagnosis: trains the run of --init on, with its configuration and the corrected vehicle, for 8,000 updates")
       .needs(initial)
       .excludes(resumed);
   const io::Option of_threads = app.option("--threads", threads, "0: all").range(0, 1024);
@@ -226,7 +226,7 @@ int main(int argc, char** argv) {
       .excludes(resumed);
   program.takes_ranks();
   return program.run(argc, argv, [&] {
-    if (!adapt.empty()) {  // a short name for what the three options CONFIG, --set vehicle and --init do
+    if (!adapt.empty()) {  // a short name for CONFIG, --init, --set vehicle and --set learn.updates
       if (!config_name.empty())
         throw io::InputError(config_name + ": --adapt trains on with the configuration of the run " + init +
                              "; accepted: no other one");

@@ -36,7 +36,8 @@ constexpr int channel_of(int group) { return group / kCoefficients % kChannels; 
 constexpr int column_of(int group) { return group % (kChannels * kCoefficients); }
 
 /// Smooth functions of the regime; [basis] is the index of a function. The first is the constant; each other one has
-/// mean 0 and rms 1 over all flights, and likewise over all runs on a bench. Functions that never change are left out. In a contrast, copies of all functions
+/// mean 0 and rms 1 over all flights, and likewise over all runs on a bench. Functions that never change are left out. In a contrast of a
+/// bench alone there are no products. In a contrast, copies of all functions
 /// except the offsets of flights follow: a copy is 0 in the references and equal to the function in the tests, for what
 /// differs there.
 class RegimeBasis {

@@ -63,7 +63,7 @@ void RegimeBasis::append_functions(const Flights& flights, const std::vector<std
     for (std::size_t f = 0; f < flights.size(); ++f) column[f].setConstant(f == offset ? 1 : 0);
     append("flight " + flights[offset]->name(), "flight", BasisFunction::flight);
   }
-  // none in a contrast of a bench alone. Choice: with them two of four harmless development robots were not unchanged
+  // A contrast of a bench alone has none. Choice: with them two of four harmless development robots were called changed.
   if (!flights.references.empty() && std::ranges::all_of(flights.all(), [](const auto& f) { return f->clamped(); }))
     return;
   // products of centred functions; none at all if one of the factors never changes

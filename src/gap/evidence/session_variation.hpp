@@ -88,7 +88,7 @@ struct SessionVariation {
   double precision_of_scale() const;
 };
 
-/// Text of configs/gap/session_variation.toml. `learnt`: source of the values, for the head of the file.
+/// Text of configs/gap/session_variation.toml and bench_session_variation.toml. `learnt`: source of the values, for the head of the file.
 std::string session_text(const SessionVariation& session, const std::string& learnt);
 /// io::InputError with file and line.
 SessionVariation read_session_variation(
