@@ -179,7 +179,8 @@ int main(int argc, char** argv) {
                   "flights of the same robot before what --flights are asked about; NAME=LOG begins another set, "
                   "which is asked about, too");
   const auto takes_constants = [](io::Command& to, auto& settings) {
-    to.option("--sessions", settings.sessions, "what differs between sessions [session_variation.toml, of a bench alone bench_session_variation.toml]");
+    to.option("--sessions", settings.sessions,
+              "what differs between sessions [session_variation.toml, of a bench alone bench_session_variation.toml]");
     to.option("--priors", settings.priors, "what is uncertain of the vehicle [configs/gap/priors.toml, as the next]");
     to.option("--discrepancy", settings.discrepancy, "what every model gets wrong [model_discrepancy.toml]");
     to.option("--verdict", settings.verdict, "constants of the verdict [verdict.toml]");

@@ -217,7 +217,8 @@ int main(int argc, char** argv) {
       app.option("--init", init, "what to start with: a run folder (its best actor and its critics), or an actor alone")
           .excludes(resumed);
   app.option("--adapt", adapt,
-             "folder of a diagnosis: trains the run of --init on, with its configuration and the corrected vehicle, for 8,000 updates")
+             "folder of a diagnosis: trains the run of --init on, with its configuration and the corrected vehicle, "
+             "for 8,000 updates")
       .needs(initial)
       .excludes(resumed);
   const io::Option of_threads = app.option("--threads", threads, "0: all").range(0, 1024);
