@@ -78,9 +78,11 @@ TEST(Evidence, KeepsABenchApartFromTheAir) {
   made[1]->on_bench = made[3]->on_bench = true;
   const Flights flights = as_flights(made);
   ModelDiscrepancy discrepancy = read_model_discrepancy();
-  for (std::size_t c = kChannels; c < kSettingChannels; ++c)
+  for (std::size_t c = kChannels; c < kSettingChannels; ++c) {
+    discrepancy.shares[c] = discrepancy.shares[c - kChannels];
     for (auto& of_harmonic : discrepancy.shares[c])
       for (double& share : of_harmonic) share *= 3;
+  }
   const Evidence declared(question_of(flights), flights, discrepancy, 1);
   Residuals residual;
   for (const auto& f : made) residual.push_back(f->noise(77, f->on_bench ? 0.25 : 0.05));
