@@ -18,14 +18,12 @@ struct Opened {
 
 extern "C" {
 
-/// To be closed by peer_close(); a fault of the file ends the program with its message.
+/// Lives as long as the program. A fault of the file ends the program with its message.
 void* peer_open(const char* vehicle_file, double step_s) noexcept {
   auto* o = new Opened{model::read_vehicle(vehicle_file), {}};
   o->mjcf = reference::mujoco_xml(o->vehicle, {.step_s = step_s});
   return o;
 }
-
-void peer_close(void* opened) { delete static_cast<Opened*>(opened); }
 
 const char* peer_mjcf(const void* opened) { return static_cast<const Opened*>(opened)->mjcf.c_str(); }
 

@@ -8,7 +8,7 @@
 namespace flappy::bench {
 
 struct ScaleRow {
-  std::string what;  ///< of which there are `size`
+  std::string what;  ///< unit of `size`: flappers, updates
   double size = 0;
   std::string command;  ///< without the names of temporary files
   double seconds = 0;   ///< wall time of the program

@@ -236,7 +236,7 @@ int main(int argc, char** argv) {
           throw io::InputError("--set " + text + ": --adapt sets the vehicle; accepted: other keys");
       config_name = train::config_of(init).string();
       overrides.insert(overrides.begin(), train::adapted_vehicle(adapt, init));
-      overrides.insert(overrides.begin(), train::kAdaptUpdates);  // what is given later counts
+      overrides.insert(overrides.begin(), train::kAdaptUpdates);  // a --set of the user comes later and overrides it
       if (out.empty())
         out = (fs::path("runs") / (fs::absolute(init).lexically_normal().filename().string() + "_adapted")).string();
     }

@@ -50,12 +50,13 @@ bool of_sides(const model::CatalogueEffect& effect) {
          std::string_view(effect.parameters[1].name).starts_with("right_");
 }
 
+/// Whether an error of a sensor is one of a bench's force sensor or film.
+bool is_of_bench(const std::string& id) { return id.starts_with("forces_") || id.starts_with("wings_"); }
+
 /// Without errors of a bench if there is none.
 ModelDiscrepancy of_flights(ModelDiscrepancy discrepancy, const Flights& flights) {
   if (std::ranges::none_of(flights.all(), [](const auto& f) { return f->clamped(); }))
-    std::erase_if(discrepancy.nuisances, [](const ModelDiscrepancy::Nuisance& n) {
-      return n.id.starts_with("forces_") || n.id.starts_with("wings_");
-    });
+    std::erase_if(discrepancy.nuisances, [](const ModelDiscrepancy::Nuisance& n) { return is_of_bench(n.id); });
   return discrepancy;
 }
 
@@ -491,7 +492,7 @@ void RobotFit::find_nuisances() {
   std::vector<double> steps(all.size(), 1);
   for (const ModelDiscrepancy::Nuisance& n : all) {
     VehicleHypothesis v = no_effects_.vehicle(parameters_.at);
-    if (!n.id.starts_with("forces_") && !n.id.starts_with("wings_"))
+    if (!is_of_bench(n.id))
       for (const ModelDiscrepancy::Nuisance& other : all)
         if (other.id == n.id) v.sensors[n.id][other.value] = other.value == n.value ? n.sd : 0;
     vehicles.push_back(std::move(v));

@@ -57,7 +57,7 @@ std::vector<OverSessions> change_over_sessions(const blind::Family& family, cons
                                                const std::vector<flightlog::FlightLog>& flown,
                                                std::size_t other_sessions = kOtherSessions);
 
-/// Of each effect the larger ratio, in flight or on a bench. Either list may be empty: not known, counted as 0.
+/// For each effect, the entry with the larger ratio. An empty list, where nothing is known, counts as ratios of 0.
 std::vector<OverSessions> larger_of(std::vector<OverSessions> in_flight, const std::vector<OverSessions>& on_bench);
 
 }  // namespace flappy::benchmark
