@@ -26,7 +26,7 @@ using Json = nlohmann::ordered_json;
 struct FamilyOptions {
   std::string family;     ///< empty: family A with its own options
   std::string reference;  ///< folder for a session without effects that the robot flies before; empty: none
-  std::size_t reference_sessions = 1;  ///< of the flights of `reference`, in turn
+  std::size_t reference_sessions = 1;  ///< of the flights of `reference` (benchmark::fly_drawn)
   bool calm_reference = false;
   bool hover = false, bench = false, own_parameters = false, conventions = false;
 };
@@ -211,7 +211,8 @@ int main(int argc, char** argv) {
       fly.option("--reference", of.reference,
                  "of a family: folder for a session of the same robot without the effects, flown before")
           .needs(family);
-  fly.option("--reference-sessions", of.reference_sessions, "sessions of the flights of --reference, in turn")
+  fly.option("--reference-sessions", of.reference_sessions,
+             "sessions of the flights of --reference, in turn; with --bench each has all runs")
       .range(std::size_t{1}, blind::Family::kFlights)
       .needs(reference)
       .shows_default();

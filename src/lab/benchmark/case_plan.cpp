@@ -14,7 +14,7 @@ namespace {
 /// Below kSeedsOfAFamily: robots flown by hand. Already used: 700001 to 799999
 /// and, from each family's first seed, the 120,000 from each of 5,000,000, 5,500,000, ..., 8,500,000 on.
 constexpr std::uint64_t kSeedsOfAFamily = 10'000'000, kReported = 9'000'000, kSeedsOfAPart = 10'000,
-                        kSeedsOfSessions = 300'000;
+                        kSeedsOfSessions = 300'000, kSeedsOfBench = 150'000;
 /// Parts of kParts whose robots are no others': the first ones.
 constexpr std::size_t kOwnRobots = 11;
 /// Least number of cases of most parts; rounded up so that all effects of a part have as many.
@@ -43,7 +43,8 @@ class Planner {
       : options_(options),
         family_(family),
         first_seed_(number_of(family) * kSeedsOfAFamily + (options.reported ? kReported : 0) +
-                    (options.contrast ? (options.reference_sessions - 1) * kSeedsOfSessions : 0)),
+                    (options.contrast ? (options.reference_sessions - 1) * kSeedsOfSessions : 0) +
+                    (options.contrast && options.bench ? kSeedsOfBench : 0)),
         random_(first_seed_) {
     Ids known;
     for (const blind::FamilyEffect& e : family.effects()) (in_catalogue(e) ? known : outside_).push_back(e.id);
@@ -185,6 +186,7 @@ class Planner {
         c.reference_sessions = std::min(options_.reference_sessions, c.references);
         c.flights = std::min(c.flights, options_.flights);
         c.bench = options_.bench;
+        if (c.bench) c.reference_sessions = options_.reference_sessions, c.references *= c.reference_sessions;
       });
     };
     const auto single = [&](std::size_t k, PlannedCase& c) { this->single(k, c); };

@@ -25,9 +25,10 @@ struct PlannedCase {
   bool published = false;                            ///< its vehicle is drawn from the published randomisation
   /// In a contrast, the robot flies `references` flights without its effects, and then `flights` in another session.
   std::size_t references = 0, flights = blind::Family::kFlights;
-  std::size_t reference_sessions = 1;  ///< the references are of so many sessions, in turn
-  bool calm_reference = false;         ///< the references hover and follow slow paths
-  std::vector<std::string> withheld;   ///< effects withheld from the catalogue
+  /// The references are of so many sessions: in turn, or on a bench each with all runs.
+  std::size_t reference_sessions = 1;
+  bool calm_reference = false;        ///< the references hover and follow slow paths
+  std::vector<std::string> withheld;  ///< effects withheld from the catalogue
 };
 
 /// The assignment of a case to its family, without the seed.
@@ -42,7 +43,7 @@ struct PlanOptions {
   std::vector<std::string> effects;  ///< robots have these effects of the catalogue alone; empty: all
   std::size_t at_most = 0;           ///< most cases of each part; 0: all
   std::size_t flights = blind::Family::kFlights;  ///< most flights of a session of a contrast
-  /// The references of a contrast are of so many sessions. Plans of other numbers have other seeds.
+  /// The references of a contrast are of so many sessions. Plans of other numbers have other seeds, as those of benches.
   std::size_t reference_sessions = blind::Family::kFlights;
   bool bench = false;  ///< robots of contrasts are clamped in place of flying
 };

@@ -58,16 +58,16 @@ std::uint64_t seed_of_draw(std::uint64_t seed, std::uint64_t draw) { return seed
 
 namespace {
 
-/// Flies until the robot crashes; how it did, or none. Flights are of the session of `a` and, in turn, of `sessions` - 1
-/// others, which are no session of the tests, 1.
+/// Flies until the robot crashes; how it did, or none. Flights are of the session of `a` and of `sessions` - 1 others,
+/// which are no session of the tests, 1: in turn, or each with all runs on a bench, whose runs have inputs of their own.
 std::optional<std::string> fly_session(const Family& family, blind::Assignment a, std::size_t sessions,
                                        std::vector<blind::FamilyFlight>& flights) {
   flights.clear();
   const std::size_t first = a.session;
-  while (flights.size() < Family::kFlights) {
-    const std::size_t turn = flights.size() % sessions;
+  while (flights.size() < (a.bench ? sessions : 1) * Family::kFlights) {
+    const std::size_t turn = a.bench ? flights.size() / Family::kFlights : flights.size() % sessions;
     a.session = turn == 0 ? first : first + turn + 1;
-    flights.push_back(family.fly(a, flights.size()));
+    flights.push_back(family.fly(a, flights.size() % Family::kFlights));
     flights.back().log.header.session = "session " + std::to_string(a.session);
     if (flights.back().crashed) return "flight " + std::to_string(flights.size()) + " " + flights.back().how;
   }

@@ -368,6 +368,59 @@ TEST_F(Benchmark, PlansContrasts) {
               }).starts_with("--part singles: not with --contrast; accepted: changed, "));
 }
 
+/// Flies nothing; keeps which runs were asked for.
+struct RecordingFamily final : blind::Family {
+  std::string name() const override { return "recording"; }
+  const std::vector<blind::FamilyEffect>& effects() const override { return effects_; }
+  bool has_bench() const override { return true; }
+  blind::FamilyFlight fly(const blind::Assignment& a, std::size_t flight) const override {
+    flown.push_back({a.session, flight});
+    return {};
+  }
+  blind::Contrast contrast(const blind::Assignment&, std::size_t, const std::string&, double) const override {
+    return {};
+  }
+  blind::FamilyFlight fly_on_board(const blind::Assignment&, std::size_t, const std::array<double, 4>&, double,
+                                   blind::OnBoard&) const override {
+    return {};
+  }
+  blind::FamilyEscape escape(const blind::Assignment&, std::size_t, const blind::EscapeAssignment&) const override {
+    return {};
+  }
+  std::vector<blind::FamilyEffect> effects_;
+  mutable std::vector<std::pair<std::size_t, std::size_t>> flown;  ///< session, flight
+};
+
+// Runs on a bench have inputs of their own: sessions of one run each would differ by their inputs, not by what sessions differ by.
+TEST(FlyDrawn, EachSessionHasAllRunsOfABench) {
+  using Flown = std::vector<std::pair<std::size_t, std::size_t>>;
+  const auto flown = [](bool bench) {
+    const RecordingFamily family;
+    blind::Assignment a, reference;
+    a.bench = reference.bench = bench;
+    a.session = 1;
+    fly_drawn(family, a, 1, {}, reference, 2);
+    return family.flown;
+  };
+  EXPECT_EQ(flown(true), (Flown{{0, 0}, {0, 1}, {0, 2}, {2, 0}, {2, 1}, {2, 2}, {1, 0}, {1, 1}, {1, 2}}));
+  EXPECT_EQ(flown(false), (Flown{{0, 0}, {2, 1}, {0, 2}, {1, 0}, {1, 1}, {1, 2}}));
+}
+
+TEST(PlanCases, ReferencesOnABenchAreWholeSessions) {
+  RecordingFamily family;
+  for (const char* id : {"wind", "coulomb_friction"}) family.effects_.emplace_back().id = id;
+  PlanOptions options;
+  options.contrast = options.bench = true;
+  options.parts = {"unchanged"};
+  options.at_most = 1;
+  const PlannedCase c = plan_cases(family, options).front();
+  EXPECT_EQ(c.reference_sessions, 3U);
+  EXPECT_EQ(c.references, 9U);
+  EXPECT_EQ(c.flights, 3U);
+  options.bench = false;
+  EXPECT_NE(plan_cases(family, options).front().seed, c.seed);
+}
+
 TEST_F(Benchmark, PlansEveryPart) {
   const blind::Family& family = family_named("a");
   const std::vector<PlannedCase> plan = plan_cases(family, {});
