@@ -17,6 +17,8 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from blind_table import OF_THE_BENCH
+
 ROOT = Path(__file__).resolve().parents[2]
 CONFIGS = ROOT / "configs"
 LAB = CONFIGS / "lab"
@@ -87,10 +89,12 @@ def main():
     effects = {f: effects_of(f) for f in FAMILIES}
 
     def pair(family, number, bench=False):
-        """Two sessions of a robot of its own; in flight, every second one has an effect in the later one, each family others."""
+        """Sessions of a robot of its own; every second one has an effect in the last one, each family others."""
         folder, effect = o.out / ("benches" if bench else "pairs") / f"{family}{number}", ""
-        if number % 2 == 1 and not bench:
-            effect = effects[family][(number // 2 * len(FAMILIES) + FAMILIES.index(family)) % len(effects[family])]
+        if number % 2 == 1:
+            families = ON_BENCH if bench else FAMILIES
+            known = [e for e in effects[family] if e in OF_THE_BENCH] if bench else effects[family]
+            effect = known[(number // 2 * len(families) + families.index(family)) % len(known)]
         options = ["--effect", f"{effect}=1"] if effect else []
         run(folder / "test" / "flight_3", blind, "fly", "--family", family, "--seed", FIRST_SEED + 1000 + number, "--own-parameters",
             "--conventions", "--reference", folder / "reference", "--reference-sessions", 3, *options, *(["--bench"] if bench else []),
