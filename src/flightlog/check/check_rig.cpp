@@ -98,14 +98,29 @@ void check_resonance(const FlightLog& log, Findings& findings) {
                       resonance > band ? LogPlace{} : LogPlace{kForces}});
 }
 
-/// Amplitude of the force along z at a frequency.
-double force_amplitude(const FlightLog& log, double hz) {
-  const ForcesStream& f = *log.forces;
-  double mean = 0, cosine = 0, sine = 0;
+/// The force along z less its mean, and its times: means over `samples` samples each.
+struct SlowForce {
+  Column t_s, force_N;
+};
+SlowForce slow_force(const ForcesStream& f, std::size_t samples) {
+  double mean = 0;
   for (const double v : f.force_z_N) mean += v / static_cast<double>(f.t_s.size());
+  SlowForce slow;
+  for (std::size_t i = 0; i + samples <= f.t_s.size(); i += samples) {
+    double t = 0, force = 0;
+    for (std::size_t k = i; k < i + samples; ++k) t += f.t_s[k] - f.t_s.front(), force += f.force_z_N[k] - mean;
+    slow.t_s.push_back(t / static_cast<double>(samples));
+    slow.force_N.push_back(force / static_cast<double>(samples));
+  }
+  return slow;
+}
+
+/// Amplitude of the force at a frequency, times the number of samples over two.
+double amplitude(const SlowForce& f, double hz) {
+  double cosine = 0, sine = 0;
   for (std::size_t i = 0; i < f.t_s.size(); ++i) {
-    const double angle = 2 * std::numbers::pi * hz * (f.t_s[i] - f.t_s.front());
-    cosine += (f.force_z_N[i] - mean) * std::cos(angle), sine += (f.force_z_N[i] - mean) * std::sin(angle);
+    const double angle = 2 * std::numbers::pi * hz * f.t_s[i];
+    cosine += f.force_N[i] * std::cos(angle), sine += f.force_N[i] * std::sin(angle);
   }
   return std::hypot(cosine, sine);
 }
@@ -121,10 +136,14 @@ void check_forces_beat(const FlightLog& log, Findings& findings) {
     findings.push_back({"forces beat", Verdict::not_tested, "fewer than five beats in the voltages", {}});
     return;
   }
+  // Samples of a period of the force that are kept, of those of a fast sensor. Choice: 16 lose 0.6 % of its amplitude.
+  constexpr double kKept = 16;
+  const double samples = log.header.rig->rate_hz / (kKept * 2 * *driven);
+  const SlowForce slow = slow_force(*log.forces, static_cast<std::size_t>(std::max(1.0, samples)));
   double best = 0, most = -1;
   const double step = 0.1 / span_s;
   for (double hz = 2 * *driven * (1 - kSearchedShare); hz <= 2 * *driven * (1 + kSearchedShare); hz += step)
-    if (const double a = force_amplitude(log, hz); a > most) most = a, best = hz / 2;
+    if (const double a = amplitude(slow, hz); a > most) most = a, best = hz / 2;
   const double ratio = best / *driven, limit = std::max(kSpeedApart, kBeatsApart / (*driven * span_s));
   const std::string seen = format("the force beats at %.5g Hz, the voltages at %.5g Hz", best, *driven);
   if (std::abs(ratio - 1) <= limit) findings.push_back({"forces beat", Verdict::ok, seen, {{"ratio", ratio}}});

@@ -90,12 +90,17 @@ void clamped_block(sim::Block<Flown>& block, double interval_s, ClampedBlockStat
   }
 }
 
-void project_block(const Flown* sample, const double* weights, int count, std::size_t width, Flown* rows) {
-  const std::size_t n = width * sim::kLanes<Flown>;
+template <class Real>
+void project_block(const Real* sample, const double* weights, int count, std::size_t width, Real* rows) {
+  using Wide = Lanes<Real, kWidth<Real>>;
+  const std::size_t n = width * kVehicles;
   for (int c = 0; c < count; ++c, rows += n) {
-    const V weight = all(weights[c]);
-    for (std::size_t i = 0; i < n; i += kWidth<Flown>)
-      (V::load(rows + i) + weight * V::load(sample + i)).store(rows + i);
+    const Wide weight(static_cast<Real>(weights[c]));
+    for (std::size_t i = 0; i < n; i += kWidth<Real>) {
+      const Wide sum = Wide::load(rows + i), value = Wide::load(sample + i);
+      if constexpr (std::is_same_v<Real, Flown>) (sum + weight * value).store(rows + i);
+      else (sum + Wide(weight * value)).store(rows + i);  // rounded before the sum, as BeatProjection::project does
+    }
   }
 }
 
@@ -105,8 +110,10 @@ extern const ResetBlock reset_block_kernel;
 const ResetBlock reset_block_kernel = reset_block;
 extern const ClampedBlock clamped_block_kernel;
 const ClampedBlock clamped_block_kernel = clamped_block;
-extern const ProjectBlock project_block_kernel;
-const ProjectBlock project_block_kernel = project_block;
+extern const ProjectBlock<Flown> project_block_kernel;
+const ProjectBlock<Flown> project_block_kernel = project_block<Flown>;
+extern const ProjectBlock<double> project_meter_kernel;
+const ProjectBlock<double> project_meter_kernel = project_block<double>;
 
 }  // namespace FLAPPY_ISA
 }  // namespace flappy::gap

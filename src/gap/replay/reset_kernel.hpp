@@ -64,6 +64,7 @@ using ClampedBlock = void (*)(sim::Block<Flown>& block, double interval_s, Clamp
 
 /// Adds a sample, times each weight, to the rows of a beat: the sums of BeatProjection for all lanes. `sample`:
 /// [signal][lane], `width` signals; `weights`: [coefficient], `count` of them; `rows`: [coefficient][signal][lane].
-using ProjectBlock = void (*)(const Flown* sample, const double* weights, int count, std::size_t width, Flown* rows);
+template <class Real>
+using ProjectBlock = void (*)(const Real* sample, const double* weights, int count, std::size_t width, Real* rows);
 
 }  // namespace flappy::gap

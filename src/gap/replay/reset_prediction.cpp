@@ -13,7 +13,8 @@
 namespace flappy::gap {
 FLAPPY_KERNELS(ResetBlock, reset_block_kernel);
 FLAPPY_KERNELS(ClampedBlock, clamped_block_kernel);
-FLAPPY_KERNELS(ProjectBlock, project_block_kernel);
+FLAPPY_KERNELS(ProjectBlock<Flown>, project_block_kernel);
+FLAPPY_KERNELS(ProjectBlock<double>, project_meter_kernel);
 
 namespace {
 
@@ -337,6 +338,7 @@ ResetPrediction::Replay ResetPrediction::replay(const std::vector<Lane>& lanes) 
   std::vector<Flown> voltages_V(static_cast<std::size_t>(longest) * 2 * kVehicles);
   Replay result;
   result.samples.resize(r.intervals() * kSample);
+  result.power.resize(power_step_.size() * kMeter);
   // readings of the last step before an interval, then of each step of the interval
   std::vector<Flown> meter(r.log.power ? (static_cast<std::size_t>(longest) + 1) * kMeter : 0);
   std::size_t step = 0, metered = 0;
@@ -365,10 +367,13 @@ ResetPrediction::Replay ResetPrediction::replay(const std::vector<Lane>& lanes) 
     for (; metered < power_step_.size() && power_step_[metered] + 1 < step; ++metered) {
       const double late = power_late_[metered];
       const Flown* now = &meter[(power_step_[metered] + 1 + static_cast<std::size_t>(r.steps[k]) - step) * kMeter];
+      double* const readings = &result.power[metered * kMeter];
       for (std::size_t i = 0; i < kMeter; ++i) {
-        const double here = now[i], sample = here + late * (here - double{now[i + kMeter]});
-        result.power.push_back(i < kVehicles ? r.full * r.log.header.power->battery_nominal_V * sample : sample);
+        const double here = now[i];
+        readings[i] = here + late * (here - double{now[i + kMeter]});
       }
+      for (std::size_t i = 0; i < kVehicles; ++i)
+        readings[i] = r.full * r.log.header.power->battery_nominal_V * readings[i];
     }
     if (r.log.power) std::copy_n(&meter[static_cast<std::size_t>(r.steps[k]) * kMeter], kMeter, meter.data());
   }
@@ -378,7 +383,8 @@ ResetPrediction::Replay ResetPrediction::replay(const std::vector<Lane>& lanes) 
 
 std::vector<Rows> ResetPrediction::fly(const std::vector<Lane>& lanes) const {
   const Recording& r = recording_;
-  const ProjectBlock project = *project_block_kernels[sim::place_of("")];
+  const ProjectBlock<Flown> project = *project_block_kernels[sim::place_of("")];
+  const ProjectBlock<double> project_meter = *project_meter_kernels[sim::place_of("")];
   const Replay seen = replay(lanes);
   std::vector<Flown> together(r.beats * kCoefficients * kSample, 0);
   imu_.for_each([&](std::size_t sample, std::size_t beat, const double(&weights)[kCoefficients]) {
@@ -386,7 +392,10 @@ std::vector<Rows> ResetPrediction::fly(const std::vector<Lane>& lanes) const {
             &together[beat * kCoefficients * kSample]);
   });
   Rows metered_together(r.log.power ? r.beats * kCoefficients * kMetered * kVehicles : 0, 0);
-  if (r.log.power) power_.project(seen.power.data(), kMetered * kVehicles, metered_together.data());
+  power_.for_each([&](std::size_t sample, std::size_t beat, const double(&weights)[kCoefficients]) {
+    project_meter(&seen.power[sample * kMeter], weights, kCoefficients, kMetered,
+                  &metered_together[beat * kCoefficients * kMeter]);
+  });
   const Eigen::Matrix3Xd none = Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(r.beats));
   std::vector<Rows> result(lanes.size());
   for (std::size_t lane = 0; lane < lanes.size(); ++lane) {
