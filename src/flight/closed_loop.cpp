@@ -63,12 +63,36 @@ FLAPPY_INLINE void act(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episo
       action[i] = clamp(L<T>(action[i] + size * noise), L<T>(-1), L<T>(1));
     }
   }
+  if (plan.late_most > 0)
+    for (int i = 0; i < kMaxActions; ++i)
+      where(acts, L<T>(episode.adds[i]), L<T>::load(s.late + i * kLanes<T> + first))
+          .store(s.late + i * kLanes<T> + first);
   for (int i = 0; i < plan.actions; ++i) {
     episode.action[i] = where(acts, action[i], episode.action[i]);
     episode.adds[i] = where(acts, scaled_action(plan.task, i, action[i]), episode.adds[i]);
   }
   episode.action_reward = where(acts, L<T>(0), episode.action_reward);
   store_rows(episode, s.flight.episode, first);
+}
+
+/// Where the present action does not act yet, that before it does. Inference and transport take another time for each.
+template <class T>
+FLAPPY_INLINE void come_late(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episode<L<T>>& episode, int first) {
+  const FlightBlock<T>& f = s.flight;
+  T* const periods = s.late + kMaxActions * kLanes<T> + first;
+  T waits[kWidth<T>];
+  for (int i = 0; i < kWidth<T>; ++i) {
+    const std::uint32_t since = f.tick[first + i] % plan.action_repeat;
+    if (since == 0) {
+      const sim::RandomKey key{plan.seed, f.flapper[first + i], f.flight[first + i], sim::Stream::inference};
+      const double share = sim::uniform_pair(key, f.tick[first + i]).first;
+      periods[i] = static_cast<T>(static_cast<std::uint32_t>(share * (plan.late_most + 1)));
+    }
+    waits[i] = static_cast<T>(since) < periods[i] ? T(1) : T(0);
+  }
+  const auto waiting = L<T>::load(waits) > L<T>(0);
+  for (int k = 0; k < kMaxActions; ++k)
+    episode.adds[k] = where(waiting, L<T>::load(s.late + k * kLanes<T> + first), episode.adds[k]);
 }
 
 /// The inputs that the controller has learnt to hold; 0 without a controller.
@@ -94,6 +118,7 @@ FLAPPY_INLINE void steer(const FlightSpace<T>& s, const FlightPlan<T>& plan, int
   FlightBlock<T>& f = s.flight;
   auto episode = load_rows<Episode<L<T>>>(f.episode, first);
   if (plan.actor.layers > 0) act(s, plan, episode, first);
+  if (plan.late_most > 0) come_late(s, plan, episode, first);
   const auto estimate = load_rows<Estimate<L<T>>>(f.estimate, first);
   const auto ref = setpoint(f, plan, first);
   const L<T> zero(0);

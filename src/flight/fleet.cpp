@@ -130,6 +130,7 @@ template <class T>
 void Fleet<T>::set_actions(std::size_t block, const T* actions) {
   const auto [first, last] = flappers(block);
   const auto count = static_cast<std::size_t>(storage_->plan.actions);
+  for (std::size_t i = first; i < last; ++i) storage_->keep_action(i);
   auto& rows = storage_->blocks[block].episode;
   for (std::size_t k = 0; k < count; ++k) {
     T* const action = rows[offsetof(Episode<T>, action) / sizeof(T) + k];
@@ -160,6 +161,7 @@ void Fleet<T>::set_adds(std::size_t i, std::span<const double> adds) {
   const auto [f, lane] = storage_->at(i);
   auto e = get<Episode<double>>(f.episode, lane);
   storage_->check_count(adds.size());
+  storage_->keep_action(i);
   for (std::size_t k = 0; k < adds.size(); ++k) {
     const double low = storage_->scaled(static_cast<int>(k), -1), high = storage_->scaled(static_cast<int>(k), 1);
     e.adds[k] = std::min(std::max(adds[k], low), high);
@@ -238,7 +240,7 @@ void Fleet<T>::fly_block(std::size_t b) {
                 {&s.ring[(b + 1) * s.ring_size], s.ring_size * sizeof(T)},
                 {&s.queue[(b + 1) * s.queue_size], s.queue_size * sizeof(T)}}};
     s.fly({body.blocks[b], body.effects_of(b), s.blocks[b], &s.ring[b * s.ring_size], &s.queue[b * s.queue_size],
-           s.remembered.data() + b * s.past_size, tap, ahead},
+           s.remembered.data() + b * s.past_size, s.late.data() + b * s.late_size, tap, ahead},
           plan);
   }
 }
@@ -463,6 +465,7 @@ std::vector<std::span<std::byte>> Fleet<T>::memory() {
       std::as_writable_bytes(std::span(body.blocks)), std::as_writable_bytes(std::span(s.blocks)),
       std::as_writable_bytes(std::span(s.ring)), std::as_writable_bytes(std::span(s.queue))};
   if (!s.remembered.empty()) all.push_back(std::as_writable_bytes(std::span(s.remembered)));
+  if (!s.late.empty()) all.push_back(std::as_writable_bytes(std::span(s.late)));
   if (!body.lane_effects.empty()) {
     all.push_back(std::as_writable_bytes(std::span(body.lane_effects)));
     all.push_back(std::as_writable_bytes(std::span(body.block_effects)));
@@ -516,6 +519,7 @@ std::uint64_t Fleet<T>::hash(std::size_t first, std::size_t last) const {
     add(storage_->ring, storage_->ring_size);
     add(storage_->queue, storage_->queue_size);
     add(storage_->remembered, storage_->past_size);
+    add(storage_->late, storage_->late_size);
     all = sim::mixed(all, h);
   }
   return all;

@@ -39,7 +39,8 @@ struct Fleet<T>::Storage {
   std::vector<FlightBlock<T>> blocks;
   std::vector<T> ring, queue;  // [block][slot][row][lane]
   std::vector<T> remembered;   // earlier observations: [block][action ago][row of the observation][lane]
-  std::size_t ring_size, queue_size, past_size;
+  std::vector<T> late;         // [block][FlightSpace::late]
+  std::size_t ring_size, queue_size, past_size, late_size;
   std::vector<Segment<T>> path;
   std::shared_ptr<const policy::Actor> actor;
   std::vector<T> actor_numbers;
@@ -73,6 +74,8 @@ struct Fleet<T>::Storage {
     fill_plan();
     past_size = static_cast<std::size_t>(plan.past) * kLanes<T>;
     remembered.assign(n * past_size, T(0));
+    late_size = plan.late_most > 0 ? kLateRows * kLanes<T> : 0;
+    late.assign(n * late_size, T(0));
   }
 
   void fill_plan() {
@@ -91,6 +94,7 @@ struct Fleet<T>::Storage {
     plan.actions = options.task.actions();
     plan.sets_voltages = options.task.sets_voltages();
     plan.action_repeat = options.task.action_repeat;
+    plan.late_most = options.task.action_late_most;
     const auto all = static_cast<int>(options.task.observation().size());
     plan.observed = all / static_cast<int>(options.task.history);
     plan.past = all - plan.observed;
@@ -133,6 +137,17 @@ struct Fleet<T>::Storage {
   Place at(std::size_t i) {
     const auto place = sim::storage_of(batch).at(i);
     return {blocks[i / kLanes<T>], place.lane};
+  }
+
+  /// Row `k` of FlightSpace::late of flapper `i`.
+  T& late_at(std::size_t i, int k) {
+    return late[i / kLanes<T> * late_size + static_cast<std::size_t>(k) * kLanes<T> + i % kLanes<T>];
+  }
+  /// The present action goes on until the next one acts.
+  void keep_action(std::size_t i) {
+    if (plan.late_most == 0) return;
+    const auto e = get<Episode<double>>(at(i).block.episode, at(i).lane);
+    for (int k = 0; k < kMaxActions; ++k) late_at(i, k) = static_cast<T>(e.adds[k]);
   }
 
   /// Element `k` of the earlier observations of flapper `i`, newest observation first.
@@ -229,6 +244,7 @@ void Fleet<T>::Storage::start_lane(std::size_t i, std::uint32_t episode, const T
   Episode<double> fresh{};
   for (int k = 0; k < plan.actions; ++k) fresh.adds[k] = scaled(k, 0);
   put(fresh, f.episode, lane);
+  keep_action(i);
 }
 
 /// Computes the observation before the first control period, and fills the history with it.

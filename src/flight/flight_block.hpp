@@ -15,6 +15,7 @@ inline constexpr int kImuRows = model::kRows<Imu>, kEstimatorRows = model::kRows
                      kTruthRows = model::kRows<Truth>;
 inline constexpr int kEstimateRows = model::kRows<Estimate>, kEpisodeRows = model::kRows<Episode>;
 inline constexpr int kIncrementRows = model::kRows<Increment>, kMocapRows = model::kRows<MocapSample>;
+inline constexpr int kLateRows = kMaxActions + 1;
 inline constexpr int kImuSampleRows = model::kRows<ImuSample>;
 
 template <class T>
@@ -48,6 +49,7 @@ struct FlightSpace {
   T* ring;   // IMU increments that the estimator may still apply, [slot][row of Increment][lane]
   T* queue;  // motion-capture poses in transit, [slot][row of MocapSample][lane]
   T* past;   // earlier observations, [action ago][row of the observation][lane]; unused without a history
+  T* late;  // of actions that act later: Episode::adds of the action before, then how many control periods late the present one is, [row][lane]; unused without
   Tap<T> tap;
   sim::Ahead ahead;  // memory of the next block, which the first physics steps prefetch
 };
@@ -83,6 +85,7 @@ struct FlightPlan {
   PathView<T> path;
   policy::ActorView<T> actor;
   std::uint32_t action_repeat;  // control periods per action
+  std::uint32_t late_most;      // most control periods by which an action acts later
   std::uint32_t period;  // control periods since the fleet began: counter of the exploration noise's random numbers
   bool explores;
   T noise_kept, noise_fresh;        // weights of the last noise and of a new standard normal in the next noise

@@ -408,6 +408,14 @@ Task read_task(const io::Table& table, double tick_s) {
   task.action_repeat = static_cast<std::uint32_t>(std::lround(repeat_s / tick_s));
   if (std::abs(repeat_s / tick_s - task.action_repeat) > 1e-6)
     table.fail("action.repeat_s", "is no whole number of control periods", "n x " + io::shortest_digits(tick_s) + " s");
+  const double longest_s = (task.action_repeat - 1) * tick_s;
+  const double jitter_s = table.number_or("action.jitter_s", 0, io::non_negative(1));
+  task.action_late_most = static_cast<std::uint32_t>(std::lround(jitter_s / tick_s));
+  if (std::abs(jitter_s / tick_s - task.action_late_most) > 1e-6)
+    table.fail("action.jitter_s", "is no whole number of control periods", "n x " + io::shortest_digits(tick_s) + " s");
+  if (jitter_s > longest_s + 1e-9)
+    table.fail("action.jitter_s", "lets an action come after the next one",
+               "0 to " + io::shortest_digits(longest_s) + " s");
   k.reward = read_reward(table);
 
   const auto limit = [&](const std::string& name, double otherwise) {

@@ -138,6 +138,8 @@ struct Task {
   std::uint32_t parts = 0;          ///< observed parts, bits of Part
   std::uint32_t history = 1;        ///< number of observations that a policy sees at once: now, and at its last actions
   std::uint32_t action_repeat = 1;  ///< control periods per action of the policy
+  /// Most control periods by which an action acts later: each draws its own number from 0 to this, uniform.
+  std::uint32_t action_late_most = 0;
   ActionKind action_kind = ActionKind::wing_beat;
   /// Unit of the first three wing-beat inputs; "1" for vehicles without motors, which mix them.
   std::string input_unit = "V";

@@ -27,6 +27,7 @@ enum class Stream : std::uint32_t {
   force_sensor = 14,
   design = 15,
   effects = 16,
+  inference = 17,
 };
 
 struct RandomKey {

@@ -150,7 +150,7 @@ TEST(Evaluator, JudgesTheSameInBothDetails) {
 }
 
 TEST(Evaluator, FliesThePolicyFromOutsideAsTheActor) {
-  const FlyConfig config = escape({"task.action.repeat_s=0.004"});
+  const FlyConfig config = escape({"task.action.repeat_s=0.004", "task.action.jitter_s=0.002"});
   const auto actor = random_actor(config.fleet.task);
   const Outside outside(*actor, config.fleet.task);
   rollout::Evaluator evaluator(config, {.count = 20, .part = 12});

@@ -22,6 +22,7 @@ std::int32_t whole_us(double s) { return static_cast<std::int32_t>(std::lround(s
 rollout::FlyConfig on_board(rollout::FlyConfig config) {
   config.draw_no_vehicles();
   config.excitation = {};
+  config.fleet.task.action_late_most = 0;  // on board, an action comes late by itself
   config.fleet.task.constants.hand_back.on_estimate = 1;
   double& latency_s = config.fleet.sensors.imu.latency_s;
   latency_s = std::ceil(latency_s * config.fleet.control_hz - 1e-6) / config.fleet.control_hz;
