@@ -63,6 +63,12 @@ def main():
         if subprocess.run(list(map(str, command)), stdout=subprocess.DEVNULL).returncode != 0 or not output.exists():
             sys.exit(f"{output}: was not written; the same command goes on")
 
+    def shipped_file(kind, family):
+        """What is learnt for judges of a family; without one: for users."""
+        names = {"discrepancy": ("discrepancy/", "model_discrepancy"), "sessions": ("sessions/", "session_variation"),
+                 "bench": ("sessions/bench_", "bench_session_variation"), "verdict": ("sessions/verdict_", "contrast_verdict")}
+        return LAB / f"{names[kind][0]}without_{family}.toml" if family else CONFIGS / "gap" / f"{names[kind][1]}.toml"
+
     def others(family):
         return [f for f in FAMILIES if f != family]
 
@@ -73,10 +79,10 @@ def main():
         shutil.copyfile(output, shipped)
 
     def robot(family, number, bench=False):
-        """Flights of a robot as its file, each of another session: what differs between days belongs to what models get wrong."""
+        """Flights of a robot as its file, of three sessions: what differs between days belongs to what models get wrong."""
         name = f"{'bench_' if bench else ''}{family}{number}"
         folder = o.out / "robots" / name
-        run(folder / "flight_3", blind, "fly", "--family", family, "--seed", FIRST_SEED + number, "--bench" if bench else "--power",
+        run(folder / f"flight_{9 if bench else 3}", blind, "fly", "--family", family, "--seed", FIRST_SEED + number, "--bench" if bench else "--power",
             "--reference", folder, "--reference-sessions", 3, "--out", o.out / "later" / name)
         return folder
 
@@ -89,7 +95,7 @@ def main():
     effects = {f: effects_of(f) for f in FAMILIES}
 
     def pair(family, number, bench=False):
-        """Sessions of a robot of its own; every second one has an effect in the last one, each family others."""
+        """Sessions of a robot of its own. Every second robot has an effect in its last session; families have different effects."""
         folder, effect = o.out / ("benches" if bench else "pairs") / f"{family}{number}", ""
         if number % 2 == 1:
             families = ON_BENCH if bench else FAMILIES
@@ -108,21 +114,20 @@ def main():
     if "discrepancy" in o.steps:
         fly_all(robot, [f for f in FAMILIES for _ in range(o.robots)], [n for _ in FAMILIES for n in range(o.robots)])
         for family in [*FAMILIES, ""]:
-            shipped = LAB / "discrepancy" / f"without_{family}.toml" if family else CONFIGS / "gap" / "model_discrepancy.toml"
+            shipped = shipped_file("discrepancy", family)
             learn(f"discrepancy_without_{family or 'none'}.toml", others(family), shipped, lambda families: [
                 "--discrepancy", shipped, "--robots", *[robot(f, n) for f in families for n in range(o.robots)]])
     if "sessions" in o.steps:
         fly_all(pair, [f for f in FAMILIES for _ in range(o.pairs)], [n for _ in FAMILIES for n in range(o.pairs)])
         for family in [*FAMILIES, ""]:
-            shipped = LAB / "sessions" / f"without_{family}.toml" if family else CONFIGS / "gap" / "session_variation.toml"
-            discrepancy = LAB / "discrepancy" / f"without_{family}.toml" if family else CONFIGS / "gap" / "model_discrepancy.toml"
+            shipped, discrepancy = shipped_file("sessions", family), shipped_file("discrepancy", family)
             learn(f"sessions_without_{family or 'none'}.toml", others(family), shipped, lambda families: [
                 "--sessions", shipped, "--discrepancy", discrepancy, "--pairs", *[pair(f, n) for f in families for n in range(o.pairs)]])
     if "bench" in o.steps:
         fly_all(robot, [f for f in ON_BENCH for _ in range(o.robots)], [n for _ in ON_BENCH for n in range(o.robots)],
                 [True] * o.robots * len(ON_BENCH))
         for family in [*ON_BENCH, ""]:
-            shipped = LAB / "discrepancy" / f"without_{family}.toml" if family else CONFIGS / "gap" / "model_discrepancy.toml"
+            shipped = shipped_file("discrepancy", family)
             output = o.out / f"bench_discrepancy_without_{family or 'none'}.toml"
             run(output, gap, "learn-discrepancy", "--vehicle", VEHICLE, "--discrepancy", shipped, "--robots",
                 *[robot(f, n, True) for f in ON_BENCH if f != family for n in range(o.robots)], "--out", output)
@@ -130,11 +135,9 @@ def main():
         fly_all(pair, [f for f in ON_BENCH for _ in range(o.pairs)], [n for _ in ON_BENCH for n in range(o.pairs)],
                 [True] * o.pairs * len(ON_BENCH))
         for family in [*ON_BENCH, ""]:
-            shipped = LAB / "sessions" / f"bench_without_{family}.toml" if family else CONFIGS / "gap" / "bench_session_variation.toml"
-            in_flight = LAB / "sessions" / f"without_{family}.toml" if family else CONFIGS / "gap" / "session_variation.toml"
-            discrepancy = LAB / "discrepancy" / f"without_{family}.toml" if family else CONFIGS / "gap" / "model_discrepancy.toml"
+            shipped, discrepancy = shipped_file("bench", family), shipped_file("discrepancy", family)
             learn(f"bench_without_{family or 'none'}.toml", [f for f in ON_BENCH if f != family], shipped, lambda families: [
-                "--sessions", shipped if shipped.exists() else in_flight, "--discrepancy", discrepancy,
+                "--sessions", shipped, "--discrepancy", discrepancy,
                 "--pairs", *[pair(f, n, True) for f in families for n in range(o.pairs)]])
     if "verdict" in o.steps:
         for f in FAMILIES:
@@ -142,10 +145,10 @@ def main():
             run(folder / "manifest.json", blind, "make", "--family", f, "--contrast", "--set", "development", "--part", "changed",
                 "unchanged", "--cases", o.cases, "--out", folder)
             # judged as reported robots are: by what has not seen their family
-            run(folder / "cases.jsonl", blind, "score", folder, "--discrepancy", LAB / "discrepancy" / f"without_{f}.toml",
-                "--sessions", LAB / "sessions" / f"without_{f}.toml", "--verdict", LAB / "sessions" / f"verdict_without_{f}.toml")
+            run(folder / "cases.jsonl", blind, "score", folder,
+                *(x for kind in ("discrepancy", "sessions", "verdict") for x in (f"--{kind}", shipped_file(kind, f))))
         for family in [*FAMILIES, ""]:
-            shipped = LAB / "sessions" / f"verdict_without_{family}.toml" if family else CONFIGS / "gap" / "contrast_verdict.toml"
+            shipped = shipped_file("verdict", family)
             start, output = (o.out / f"verdict_{which}{family or 'none'}.toml" for which in ("before_", "without_"))
             if not start.exists():
                 shutil.copyfile(shipped, start)

@@ -63,10 +63,6 @@ FLAPPY_INLINE void act(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episo
       action[i] = clamp(L<T>(action[i] + size * noise), L<T>(-1), L<T>(1));
     }
   }
-  if (plan.late_most > 0)
-    for (int i = 0; i < kMaxActions; ++i)
-      where(acts, L<T>(episode.adds[i]), L<T>::load(s.late + i * kLanes<T> + first))
-          .store(s.late + i * kLanes<T> + first);
   for (int i = 0; i < plan.actions; ++i) {
     episode.action[i] = where(acts, action[i], episode.action[i]);
     episode.adds[i] = where(acts, scaled_action(plan.task, i, action[i]), episode.adds[i]);
@@ -75,7 +71,7 @@ FLAPPY_INLINE void act(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episo
   store_rows(episode, s.flight.episode, first);
 }
 
-/// Where the present action does not act yet, that before it does. Inference and transport take another time for each.
+/// Until the present action acts, the one before does. Inference and transport take another time for each.
 template <class T>
 FLAPPY_INLINE void come_late(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episode<L<T>>& episode, int first) {
   const FlightBlock<T>& f = s.flight;
@@ -91,8 +87,11 @@ FLAPPY_INLINE void come_late(const FlightSpace<T>& s, const FlightPlan<T>& plan,
     waits[i] = static_cast<T>(since) < periods[i] ? T(1) : T(0);
   }
   const auto waiting = L<T>::load(waits) > L<T>(0);
-  for (int k = 0; k < kMaxActions; ++k)
-    episode.adds[k] = where(waiting, L<T>::load(s.late + k * kLanes<T> + first), episode.adds[k]);
+  for (int k = 0; k < kMaxActions; ++k) {
+    T* const acting = s.late + k * kLanes<T> + first;
+    episode.adds[k] = where(waiting, L<T>::load(acting), episode.adds[k]);
+    episode.adds[k].store(acting);
+  }
 }
 
 /// The inputs that the controller has learnt to hold; 0 without a controller.

@@ -130,7 +130,6 @@ template <class T>
 void Fleet<T>::set_actions(std::size_t block, const T* actions) {
   const auto [first, last] = flappers(block);
   const auto count = static_cast<std::size_t>(storage_->plan.actions);
-  for (std::size_t i = first; i < last; ++i) storage_->keep_action(i);
   auto& rows = storage_->blocks[block].episode;
   for (std::size_t k = 0; k < count; ++k) {
     T* const action = rows[offsetof(Episode<T>, action) / sizeof(T) + k];
@@ -161,7 +160,6 @@ void Fleet<T>::set_adds(std::size_t i, std::span<const double> adds) {
   const auto [f, lane] = storage_->at(i);
   auto e = get<Episode<double>>(f.episode, lane);
   storage_->check_count(adds.size());
-  storage_->keep_action(i);
   for (std::size_t k = 0; k < adds.size(); ++k) {
     const double low = storage_->scaled(static_cast<int>(k), -1), high = storage_->scaled(static_cast<int>(k), 1);
     e.adds[k] = std::min(std::max(adds[k], low), high);
@@ -527,8 +525,8 @@ std::uint64_t Fleet<T>::hash(std::size_t first, std::size_t last) const {
 
 template <class T>
 std::size_t Fleet<T>::bytes_per_flapper() const {
-  return (sizeof(FlightBlock<T>) + (storage_->ring_size + storage_->queue_size + storage_->past_size) * sizeof(T)) /
-         kLanes<T>;
+  const Storage& s = *storage_;
+  return (sizeof(FlightBlock<T>) + (s.ring_size + s.queue_size + s.past_size + s.late_size) * sizeof(T)) / kLanes<T>;
 }
 
 template class Fleet<float>;

@@ -138,7 +138,8 @@ class Fleet {
   void observation(std::size_t i, T* row) const;
   /// Last action of the policy with its noise, in [-1, 1]; 0 beyond the task's actions.
   std::array<T, kMaxActions> action(std::size_t i) const;
-  /// Last action in physical units: offset to the controller's output, or motor voltages; 0 beyond the task's actions.
+  /// Last action in physical units, also of one that is late: offset to the controller's output, or motor voltages; 0
+  /// beyond the task's actions.
   std::array<T, kMaxActions> adds(std::size_t i) const;
   T action_reward(std::size_t i) const;  ///< sum of rewards since the last action of the actor or set_actions()
   /// Normalised squared innovations of the last mocap pose: angle and position, three degrees of freedom each.

@@ -39,7 +39,7 @@ struct Fleet<T>::Storage {
   std::vector<FlightBlock<T>> blocks;
   std::vector<T> ring, queue;  // [block][slot][row][lane]
   std::vector<T> remembered;   // earlier observations: [block][action ago][row of the observation][lane]
-  std::vector<T> late;         // [block][FlightSpace::late]
+  std::vector<T> late;         // [block]: FlightSpace::late
   std::size_t ring_size, queue_size, past_size, late_size;
   std::vector<Segment<T>> path;
   std::shared_ptr<const policy::Actor> actor;
@@ -139,17 +139,6 @@ struct Fleet<T>::Storage {
     return {blocks[i / kLanes<T>], place.lane};
   }
 
-  /// Row `k` of FlightSpace::late of flapper `i`.
-  T& late_at(std::size_t i, int k) {
-    return late[i / kLanes<T> * late_size + static_cast<std::size_t>(k) * kLanes<T> + i % kLanes<T>];
-  }
-  /// The present action goes on until the next one acts.
-  void keep_action(std::size_t i) {
-    if (plan.late_most == 0) return;
-    const auto e = get<Episode<double>>(at(i).block.episode, at(i).lane);
-    for (int k = 0; k < kMaxActions; ++k) late_at(i, k) = static_cast<T>(e.adds[k]);
-  }
-
   /// Element `k` of the earlier observations of flapper `i`, newest observation first.
   T* past_at(std::size_t i, int k) {
     return &remembered[i / kLanes<T> * past_size + static_cast<std::size_t>(k) * kLanes<T> + i % kLanes<T>];
@@ -244,7 +233,9 @@ void Fleet<T>::Storage::start_lane(std::size_t i, std::uint32_t episode, const T
   Episode<double> fresh{};
   for (int k = 0; k < plan.actions; ++k) fresh.adds[k] = scaled(k, 0);
   put(fresh, f.episode, lane);
-  keep_action(i);
+  if (late_size > 0)
+    for (int k = 0; k < kMaxActions; ++k)
+      late[i / kLanes<T> * late_size + static_cast<std::size_t>(k * kLanes<T> + lane)] = static_cast<T>(fresh.adds[k]);
 }
 
 /// Computes the observation before the first control period, and fills the history with it.

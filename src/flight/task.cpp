@@ -353,6 +353,7 @@ std::vector<Signal> Task::action() const {
 void Task::forbid_actions() {
   std::ranges::fill(constants.action_low, 0);
   std::ranges::fill(constants.action_high, 0);
+  action_late_most = 0;
 }
 
 sim::FlapperState Task::sample_start(sim::RandomKey key) const {
@@ -404,18 +405,17 @@ Task read_task(const io::Table& table, double tick_s) {
     table.fail("observation", "has " + std::to_string(numbers) + " numbers",
                "parts of at most " + std::to_string(kMaxObservation));
   TaskConstants<double>& k = task.constants;
-  const double repeat_s = table.number_or("action.repeat_s", tick_s, {tick_s, 1});
-  task.action_repeat = static_cast<std::uint32_t>(std::lround(repeat_s / tick_s));
-  if (std::abs(repeat_s / tick_s - task.action_repeat) > 1e-6)
-    table.fail("action.repeat_s", "is no whole number of control periods", "n x " + io::shortest_digits(tick_s) + " s");
-  const double longest_s = (task.action_repeat - 1) * tick_s;
-  const double jitter_s = table.number_or("action.jitter_s", 0, io::non_negative(1));
-  task.action_late_most = static_cast<std::uint32_t>(std::lround(jitter_s / tick_s));
-  if (std::abs(jitter_s / tick_s - task.action_late_most) > 1e-6)
-    table.fail("action.jitter_s", "is no whole number of control periods", "n x " + io::shortest_digits(tick_s) + " s");
-  if (jitter_s > longest_s + 1e-9)
+  const auto periods = [&](const char* key, double seconds) {
+    const auto count = static_cast<std::uint32_t>(std::lround(seconds / tick_s));
+    if (std::abs(seconds / tick_s - count) > 1e-6)
+      table.fail(key, "is no whole number of control periods", "n x " + io::shortest_digits(tick_s) + " s");
+    return count;
+  };
+  task.action_repeat = periods("action.repeat_s", table.number_or("action.repeat_s", tick_s, {tick_s, 1}));
+  task.action_late_most = periods("action.jitter_s", table.number_or("action.jitter_s", 0, io::non_negative(1)));
+  if (task.action_late_most >= task.action_repeat)
     table.fail("action.jitter_s", "lets an action come after the next one",
-               "0 to " + io::shortest_digits(longest_s) + " s");
+               "less than action.repeat_s, " + io::shortest_digits(task.action_repeat * tick_s) + " s");
   k.reward = read_reward(table);
 
   const auto limit = [&](const std::string& name, double otherwise) {

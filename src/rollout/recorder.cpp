@@ -213,6 +213,7 @@ struct Recorder<T>::Storage {
     std::vector<double> memory = fleet.remembered(flapper);
     // from there on alone the exported C can go on as this flapper does
     if (body.steps != 0 || fleet.tick(flapper) != 0 || memory.empty() || task.sets_voltages()) return;
+    if (task.action_late_most > 0) return;  // there, each action acts at once
     flightlog::FlownHeader& flown = log.header.flown.emplace();
     const flight::Motion estimate = fleet.estimate(flapper);
     auto& pose = flown.start_pose.emplace();

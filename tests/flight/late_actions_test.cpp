@@ -10,53 +10,87 @@
 namespace flappy::flight::late_actions_test {
 namespace {
 
-/// A policy that acts every 10 ms on a robot without a controller.
+/// A policy that acts every 10 ms on a robot without a controller. Actions of 1, 0 and -1 are 9, 5 and 1 V.
 Task late_task(const std::string& jitter) {
   std::string text = staying();
+  text.replace(text.find("[-5.0, 5.0]"), 11, "[1.0, 9.0]");
   return task(text.replace(text.find("[action]"), 8, "[action]\nrepeat_s = 0.01\n" + jitter));
+}
+FleetOptions late_options(const std::string& jitter = "jitter_s = 0.008\n") {
+  return fleet_options(sensors("paper"), controller("none"), late_task(jitter));
+}
+constexpr float kVolts = 4, kMiddle_V = 5;
+
+void start(Fleet<float>& fleet, std::size_t flappers, std::uint32_t episode = 0) {
+  for (std::size_t i = 0; i < flappers; ++i) fleet.start(i, episode, {.position_m = {0, 0, 0.4}}, sim::Start::flying);
 }
 
 /// All actions of a fleet's flappers alike.
-template <class T>
-void act_alike(Fleet<T>& fleet, std::size_t count, T value) {
-  const std::vector<T> actions(count * 4, value);
+void act_alike(Fleet<float>& fleet, std::size_t flappers, float value) {
+  const std::vector<float> actions(flappers * 4, value);
   for (std::size_t b = 0; b < fleet.blocks(); ++b) fleet.set_actions(b, &actions[fleet.flappers(b).first * 4]);
+}
+
+/// [flapper] In how many of the five control periods of an action the one before it acted.
+std::vector<std::size_t> periods_late(Fleet<float>& fleet, std::size_t flappers, float before, float now) {
+  std::vector<std::size_t> late(flappers, 0U);
+  for (std::size_t period = 0; period < 5; ++period) {
+    fleet.step();
+    for (std::size_t i = 0; i < flappers; ++i) {
+      const double volts = fleet.input(i).amplitude_V;
+      if (std::abs(volts - (kMiddle_V + kVolts * before)) < 1e-5) late[i] = period + 1;
+      else EXPECT_NEAR(volts, kMiddle_V + kVolts * now, 1e-5) << "neither the action before nor the present one";
+    }
+  }
+  return late;
 }
 
 // Each of the five numbers of control periods is drawn 256 times of 1,280: the standard deviation is 14.
 TEST(LateActions, AreLateByADrawOfTheirOwn) {
   constexpr std::size_t kFlappers = 64;
-  Fleet<float> fleet(kFlappers, test::nominal(),
-                     fleet_options(sensors("paper"), controller("none"), late_task("jitter_s = 0.008\n")));
-  for (std::size_t i = 0; i < kFlappers; ++i) fleet.start(i, 0, {.position_m = {0, 0, 0.4}}, sim::Start::flying);
-  std::vector<std::size_t> late(kFlappers), of(6);
+  Fleet<float> fleet(kFlappers, test::nominal(), late_options());
+  start(fleet, kFlappers);
+  std::vector<std::size_t> of(6);
   float before = 0;  // the robot starts with the middle of the range
   for (int n = 0; n < 20; ++n) {
     const float now = n % 2 == 0 ? 0.8F : -0.8F;
     act_alike(fleet, kFlappers, now);
-    std::ranges::fill(late, 0U);
-    for (int period = 0; period < 5; ++period) {
-      fleet.step();
-      for (std::size_t i = 0; i < kFlappers; ++i) {
-        const double volts = fleet.input(i).amplitude_V;
-        if (std::abs(volts - 5.0 * before) < 1e-5) late[i] = static_cast<std::size_t>(period) + 1;
-        else EXPECT_NEAR(volts, 5.0 * now, 1e-5) << "neither the action before nor the present one";
-      }
-    }
-    for (const std::size_t periods : late) ++of[periods];
+    for (const std::size_t periods : periods_late(fleet, kFlappers, before, now)) ++of[periods];
     before = now;
   }
   for (std::size_t periods = 0; periods < 5; ++periods)
     EXPECT_NEAR(static_cast<double>(of[periods]), 256, 60) << periods;
   EXPECT_EQ(of[5], 0U) << "each action acts before the next";
+  for (const std::size_t periods : periods_late(fleet, kFlappers, 0.5F, before))
+    EXPECT_EQ(periods, 0U) << "without a new action the last one goes on";
+  start(fleet, kFlappers, 1);
+  act_alike(fleet, kFlappers, 0.3F);
+  periods_late(fleet, kFlappers, 0, 0.3F);  // after a new start, no action of the flight before acts
+}
+
+TEST(LateActions, ArePartOfHashAndMemory) {
+  const FleetOptions o = late_options();
+  Fleet<float> a(20, test::nominal(), o), b(20, test::nominal(), o);
+  start(a, 20);
+  act_alike(a, 20, 0.5F);
+  for (int period = 0; period < 5; ++period) a.step();
+  act_alike(a, 20, -0.5F);
+  a.step();
+  const auto from = a.memory(), to = b.memory();
+  ASSERT_EQ(from.size(), to.size());
+  for (std::size_t k = 0; k < from.size(); ++k) std::ranges::copy(from[k], to[k].begin());
+  b.restored(a.periods());
+  EXPECT_EQ(a.hash(), b.hash());
+  for (int period = 0; period < 4; ++period) a.step(), b.step();
+  EXPECT_EQ(a.hash(), b.hash());
 }
 
 TEST(LateActions, AreLateAlikeOnEveryInstructionSet) {
   const auto hash = [](const std::string& set, const std::string& jitter) {
-    FleetOptions o = fleet_options(sensors("paper"), controller("none"), late_task(jitter));
+    FleetOptions o = late_options(jitter);
     o.batch.instruction_set = set;
     Fleet<float> fleet(20, test::nominal(), o);
-    for (std::size_t i = 0; i < 20; ++i) fleet.start(i, 0, {.position_m = {0, 0, 0.4}}, sim::Start::flying);
+    start(fleet, 20);
     for (int n = 0; n < 10; ++n) {
       act_alike(fleet, 20, 0.1F * static_cast<float>(n));
       for (int period = 0; period < 5; ++period) fleet.step();
@@ -72,7 +106,8 @@ TEST(LateActions, AreLateAlikeOnEveryInstructionSet) {
 
 TEST(LateActions, ActBeforeTheNextOne) {
   EXPECT_EQ(test::refusal([] { late_task("jitter_s = 0.01\n"); }),
-            "task.toml:17:12: action.jitter_s: lets an action come after the next one; accepted: 0 to 0.008 s");
+            "task.toml:17:12: action.jitter_s: lets an action come after the next one; accepted: less than "
+            "action.repeat_s, 0.01 s");
   EXPECT_EQ(test::refusal([] { late_task("jitter_s = 0.003\n"); }),
             "task.toml:17:12: action.jitter_s: is no whole number of control periods; accepted: n x 0.002 s");
 }

@@ -94,6 +94,7 @@ EscapeAssignment escape_assignment(const EscapeRules& r, const fs::path& config)
   };
   const flight::HandBack<double>& back = r.constants.hand_back;
   require(r.task.history == 1, "a task without history");
+  require(r.task.action_late_most == 0, "a task without action.jitter_s");
   require(r.constants.holds_trim > 0, "a task of base = \"trim\"");
   require(back.enabled > 0 && back.on_estimate > 0, "a hand-back with on = \"estimate\"");
   require(back.x_m < -kUnbounded && back.speed_x_m_s > kUnbounded, "a hand-back without x_m and speed_x_m_s");

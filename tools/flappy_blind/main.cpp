@@ -26,7 +26,7 @@ using Json = nlohmann::ordered_json;
 struct FamilyOptions {
   std::string family;     ///< empty: family A with its own options
   std::string reference;  ///< folder for a session without effects that the robot flies before; empty: none
-  std::size_t reference_sessions = 1;  ///< of the flights of `reference` (benchmark::fly_drawn)
+  std::size_t reference_sessions = 1;  ///< how many sessions the flights of `reference` are of
   bool calm_reference = false;
   bool hover = false, bench = false, own_parameters = false, conventions = false;
 };
@@ -259,7 +259,7 @@ int main(int argc, char** argv) {
   make.option("--out", made.out, "folder for the cases").required();
   make.option("--set", set, "development or reported: which seeds").one_of({"development", "reported"}).required();
   const io::Option contrast =
-      make.flag("--contrast", made.plan.contrast, "robots with reference flights of another session");
+      make.flag("--contrast", made.plan.contrast, "robots with reference flights of other sessions");
   std::vector<std::string> parts(std::begin(benchmark::kParts), std::end(benchmark::kParts));
   parts.insert(parts.end(), std::begin(benchmark::kContrastParts), std::end(benchmark::kContrastParts));
   make.option("--part", made.plan.parts, "these parts alone").one_of(parts);
@@ -268,7 +268,8 @@ int main(int argc, char** argv) {
       .range(std::size_t{1}, blind::Family::kFlights)
       .needs(contrast)
       .shows_default();
-  make.option("--reference-sessions", made.plan.reference_sessions, "of the references of each robot, with --contrast")
+  make.option("--reference-sessions", made.plan.reference_sessions,
+              "of the references of each robot, in turn; with --bench each has all runs")
       .range(std::size_t{1}, blind::Family::kFlights)
       .needs(contrast)
       .shows_default();

@@ -98,7 +98,7 @@ void check_resonance(const FlightLog& log, Findings& findings) {
                       resonance > band ? LogPlace{} : LogPlace{kForces}});
 }
 
-/// The force along z less its mean, and its times: means over `samples` samples each.
+/// Means of the force along z, less its overall mean, over `samples` samples each, and their times.
 struct SlowForce {
   Column t_s, force_N;
 };
@@ -136,9 +136,9 @@ void check_forces_beat(const FlightLog& log, Findings& findings) {
     findings.push_back({"forces beat", Verdict::not_tested, "fewer than five beats in the voltages", {}});
     return;
   }
-  // Samples of a period of the force that are kept, of those of a fast sensor. Choice: 16 lose 0.6 % of its amplitude.
+  // Samples kept of each period of the force. Choice: 16 lose 0.6 % of its amplitude.
   constexpr double kKept = 16;
-  const double samples = log.header.rig->rate_hz / (kKept * 2 * *driven);
+  const double samples = static_cast<double>(log.forces->t_s.size()) / span_s / (kKept * 2 * *driven);
   const SlowForce slow = slow_force(*log.forces, static_cast<std::size_t>(std::max(1.0, samples)));
   double best = 0, most = -1;
   const double step = 0.1 / span_s;

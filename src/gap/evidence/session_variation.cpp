@@ -35,8 +35,11 @@ constexpr const char* kSessionParametersHead =
 # Weather: density by 1 %. A battery put back: mass by 0.5 %, centre of mass by 0.1 mm. Temperature of the motors: resistance by 2.5 %, torque constant
 # by 0.3 %. Wear and grease: friction and damping by 7 %. A hinge that was touched: rest angle by 0.3 degrees. The IMU and the markers are taken off and
 # put back: mounting by a tenth of its prior. Clocks drift with temperature. Choice: made before any session was seen.
-# Forces, film and currents of a bench start earlier or later by 0.3 ms. Choice: made after harmless development robots had been called changed.
 )";
+constexpr const char* kDelays =
+    "  # Streams of a bench start earlier or later, by 0.3 ms. Choice: made after harmless development robots had been "
+    "called "
+    "changed.";
 constexpr const char* kSessionBackground =
     R"(# Prior standard deviation of the change of each effect's magnitude from session to session, in coordinates of the effect (1: the prior of the
 # catalogue).
@@ -105,7 +108,8 @@ std::string session_text(const SessionVariation& s, const std::string& learnt) {
     text += std::string(stage_name(stage)) + " = " + number(s.law_error[stage]) + "\n";
   text += "spread = " + number(s.law_spread) + "\nmost = " + number(s.law_most) + "\n\n" + kSessionParametersHead +
           "[parameters]\n";
-  for (const auto& [name, sd] : s.parameters) text += "\"" + name + "\" = " + number(sd) + "\n";
+  for (const auto& [name, sd] : s.parameters)
+    text += "\"" + name + "\" = " + number(sd) + (name.ends_with("_delay") ? kDelays : "") + "\n";
   text += "\n" + shares_text(s.shares) + kSessionBackground + "[background_sd]\n";
   for (const auto& [effect, sd] : s.background)
     text += effect + " = " + number(sd) + (effect == "other" ? kOthers : "") + "\n";

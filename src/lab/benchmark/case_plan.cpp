@@ -182,11 +182,11 @@ class Planner {
       this->part(name, count, [&](std::size_t k, PlannedCase& c) {
         c.references = blind::Family::kFlights;
         fill(k, c);
-        c.references = std::min(c.references, options_.flights);
-        c.reference_sessions = std::min(options_.reference_sessions, c.references);
-        c.flights = std::min(c.flights, options_.flights);
         c.bench = options_.bench;
-        if (c.bench) c.reference_sessions = options_.reference_sessions, c.references *= c.reference_sessions;
+        if (!c.bench) c.references = std::min(c.references, options_.flights);
+        c.reference_sessions = std::min(options_.reference_sessions, c.references);
+        if (c.bench) c.references = c.reference_sessions * blind::Family::kFlights;
+        c.flights = std::min(c.flights, options_.flights);
       });
     };
     const auto single = [&](std::size_t k, PlannedCase& c) { this->single(k, c); };

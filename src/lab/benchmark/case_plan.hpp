@@ -43,7 +43,7 @@ struct PlanOptions {
   std::vector<std::string> effects;  ///< robots have these effects of the catalogue alone; empty: all
   std::size_t at_most = 0;           ///< most cases of each part; 0: all
   std::size_t flights = blind::Family::kFlights;  ///< most flights of a session of a contrast
-  /// The references of a contrast are of so many sessions. Plans of other numbers have other seeds, as those of benches.
+  /// The references of a contrast are of so many sessions. Each number has seeds of its own, and so have benches.
   std::size_t reference_sessions = blind::Family::kFlights;
   bool bench = false;  ///< robots of contrasts are clamped in place of flying
 };

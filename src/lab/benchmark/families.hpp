@@ -38,9 +38,8 @@ struct FlownRobot {
 std::uint64_t seed_of_draw(std::uint64_t seed, std::uint64_t draw);
 
 /// Draws robots until one flies all its flights, like blind::fly_sampled, with the draw's seed in `a`, which `prepare`
-/// may then change. `reference`: flights before, which the same robot has to fly, too: of `sessions` other sessions, in turn,
-/// or on a bench each with all runs.
-/// Logs name their session. blind::NeverFlies after 20 draws.
+/// may then change. `reference`: flights before, which the same robot has to fly, too, of `sessions` other sessions: in
+/// flight one of each in turn, on a bench all runs of each. Logs name their session. blind::NeverFlies after 20 draws.
 FlownRobot fly_drawn(const blind::Family& family, blind::Assignment a, std::uint64_t seed,
                      const std::function<void(blind::Assignment&)>& prepare = {},
                      std::optional<blind::Assignment> reference = {}, std::size_t sessions = 1);

@@ -82,6 +82,7 @@ class Flight {
   static flight::FleetOptions led(const rollout::FlyConfig& config) {
     flight::FleetOptions o = config.fleet;
     o.controller = {};
+    o.task.action_late_most = 0;  // commands come from outside, as late as they come
     o.batch.threads = 1;
     return o;
   }

@@ -17,6 +17,7 @@
 #include "lab/benchmark/make.hpp"
 #include "lab/benchmark/records.hpp"
 #include "lab/benchmark/score_bench.hpp"
+#include "lab/benchmark/stub_family.hpp"
 #include "model/effects/registry.hpp"
 #include "refusal.hpp"
 
@@ -368,34 +369,22 @@ TEST_F(Benchmark, PlansContrasts) {
               }).starts_with("--part singles: not with --contrast; accepted: changed, "));
 }
 
-/// Flies nothing; keeps which runs were asked for.
-struct RecordingFamily final : blind::Family {
-  std::string name() const override { return "recording"; }
-  const std::vector<blind::FamilyEffect>& effects() const override { return effects_; }
+/// Keeps which runs were asked for.
+struct RecordingFamily final : StubFamily {
+  using StubFamily::StubFamily;
   bool has_bench() const override { return true; }
   blind::FamilyFlight fly(const blind::Assignment& a, std::size_t flight) const override {
-    flown.push_back({a.session, flight});
+    flown.emplace_back(a.session, flight);
     return {};
   }
-  blind::Contrast contrast(const blind::Assignment&, std::size_t, const std::string&, double) const override {
-    return {};
-  }
-  blind::FamilyFlight fly_on_board(const blind::Assignment&, std::size_t, const std::array<double, 4>&, double,
-                                   blind::OnBoard&) const override {
-    return {};
-  }
-  blind::FamilyEscape escape(const blind::Assignment&, std::size_t, const blind::EscapeAssignment&) const override {
-    return {};
-  }
-  std::vector<blind::FamilyEffect> effects_;
   mutable std::vector<std::pair<std::size_t, std::size_t>> flown;  ///< session, flight
 };
 
-// Runs on a bench have inputs of their own: sessions of one run each would differ by their inputs, not by what sessions differ by.
+// Runs on a bench have inputs of their own, by which sessions of one run each would differ.
 TEST(FlyDrawn, EachSessionHasAllRunsOfABench) {
   using Flown = std::vector<std::pair<std::size_t, std::size_t>>;
   const auto flown = [](bool bench) {
-    const RecordingFamily family;
+    const RecordingFamily family("recording");
     blind::Assignment a, reference;
     a.bench = reference.bench = bench;
     a.session = 1;
@@ -407,8 +396,9 @@ TEST(FlyDrawn, EachSessionHasAllRunsOfABench) {
 }
 
 TEST(PlanCases, ReferencesOnABenchAreWholeSessions) {
-  RecordingFamily family;
-  for (const char* id : {"wind", "coulomb_friction"}) family.effects_.emplace_back().id = id;
+  std::vector<blind::FamilyEffect> effects(2);
+  effects[0].id = "wind", effects[1].id = "coulomb_friction";
+  const RecordingFamily family("recording", effects);
   PlanOptions options;
   options.contrast = options.bench = true;
   options.parts = {"unchanged"};
@@ -417,6 +407,10 @@ TEST(PlanCases, ReferencesOnABenchAreWholeSessions) {
   EXPECT_EQ(c.reference_sessions, 3U);
   EXPECT_EQ(c.references, 9U);
   EXPECT_EQ(c.flights, 3U);
+  options.parts = {"changed_short_reference"};
+  EXPECT_EQ(plan_cases(family, options).front().reference_sessions, 1U);
+  EXPECT_EQ(plan_cases(family, options).front().references, 3U);
+  options.parts = {"unchanged"};
   options.bench = false;
   EXPECT_NE(plan_cases(family, options).front().seed, c.seed);
 }
