@@ -41,6 +41,12 @@ def with_bench(text, learnt):
     return re.sub(r"^(?=# Priors of the scales)", "".join(tables.findall(learnt)), text, count=1, flags=re.M)
 
 
+def with_laws(text, of_flights):
+    """A file of what differs between sessions of a bench with the errors of laws that flights showed: the bench adds to these."""
+    table = re.compile(r"^\[law_error\]\n.*?\n\n", re.S | re.M)
+    return table.sub(lambda _: table.search(of_flights).group(), text, count=1)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path)
@@ -136,8 +142,10 @@ def main():
                 [True] * o.pairs * len(ON_BENCH))
         for family in [*ON_BENCH, ""]:
             shipped, discrepancy = shipped_file("bench", family), shipped_file("discrepancy", family)
+            start = o.out / f"before_bench_without_{family or 'none'}.toml"
+            start.write_text(with_laws(shipped.read_text(), shipped_file("sessions", family).read_text()))
             learn(f"bench_without_{family or 'none'}.toml", [f for f in ON_BENCH if f != family], shipped, lambda families: [
-                "--sessions", shipped, "--discrepancy", discrepancy,
+                "--sessions", start, "--discrepancy", discrepancy,
                 "--pairs", *[pair(f, n, True) for f in families for n in range(o.pairs)]])
     if "verdict" in o.steps:
         for f in FAMILIES:

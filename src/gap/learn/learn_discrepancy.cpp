@@ -36,7 +36,7 @@ constexpr double kMinBackground = 0.01;
 constexpr std::size_t kMinLaws = 5;
 /// Smallest standard deviation of the logarithm of errors of laws. Choice.
 constexpr double kMinSpread = 0.25;
-/// The centre over all stages counts as much as this many errors of a stage. Choice.
+/// What a stage had before counts as much as this many errors. Choice.
 constexpr double kShrinkLaws = 2;
 /// The quantile of errors of laws, over their centres, that is the largest of them. Choice.
 constexpr double kLargestLaw = 0.95;
@@ -328,15 +328,12 @@ void learn_own(const Robots& pairs, ModelDiscrepancy& now) {
   choose(pairs, own, now, to.effect_freedom, {1, 2, 4, 8, 30}, "effect_freedom");
 }
 
-/// Law errors of known effects.
-using LawErrors = std::vector<std::pair<std::string, double>>;
+}  // namespace
 
-/// The centre of each stage, shrunk to that of all, and the spread of errors over the centres.
-void take(const LawErrors& errors, SessionVariation& to) {
-  double all = 0;
-  for (const auto& [effect, error] : errors) all += std::log(error) / static_cast<double>(errors.size());
+void learn_laws(const LawErrors& errors, SessionVariation& to) {
   std::array<Moment, model::kStages> stages;
-  stages.fill({kShrinkLaws * all, kShrinkLaws});
+  for (std::size_t stage = 0; stage < model::kStages; ++stage)
+    stages[stage] = {kShrinkLaws * std::log(to.law_error[stage]), kShrinkLaws};
   for (const auto& [effect, error] : errors) {
     Moment& m = stages[static_cast<std::size_t>(model::stage_of(effect))];
     m.sum += std::log(error);
@@ -350,8 +347,6 @@ void take(const LawErrors& errors, SessionVariation& to) {
   to.law_spread = std::max(std::log(io::quantile(over, 0.84) / io::quantile(over, 0.16)) / 2, kMinSpread);
   to.law_most = std::max(io::quantile(over, kLargestLaw), 1.0);
 }
-
-}  // namespace
 
 ModelDiscrepancy learn_discrepancy(const std::vector<Flights>& flights, const sim::Randomisation& uncertain,
                                    const ModelDiscrepancy& start, int threads) {
@@ -431,7 +426,7 @@ SessionVariation learn_sessions(const std::vector<SessionPair>& pairs, const sim
   const auto asked = std::ranges::count_if(pairs, [](const SessionPair& p) { return !p.effect.empty(); });
   const std::string few = io::format("--pairs: %zu of %td pairs with an effect tell of its law; accepted: at least %zu",
                                      errors.size(), asked, kMinLaws);
-  if (errors.size() >= kMinLaws) take(errors, now.session);
+  if (errors.size() >= kMinLaws) learn_laws(errors, now.session);
   else if (std::cmp_equal(asked, pairs.size())) throw io::InputError(few);
   else if (asked > 0) io::log(io::LogLevel::warning, few + ", so law_error stays as it was");
   return now.session;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "gap/fit/robot_fit.hpp"
@@ -23,6 +24,13 @@ struct SessionPair {
   Flights flights;
   std::string effect;  ///< effect of the catalogue that appeared before the tests; empty: none
 };
+
+/// Deviations of the laws of effects from the catalogue's, as shares of their changes, by effect.
+using LawErrors = std::vector<std::pair<std::string, double>>;
+
+/// Takes the centre of each stage, and the spread of errors over the centres. The centre that a stage had counts, too, so
+/// a stage without an error keeps it.
+void learn_laws(const LawErrors& errors, SessionVariation& to);
 
 /// Learns from pairs without an effect what differs between sessions; then, from pairs with an effect, how far its law
 /// deviates from the catalogue's. What too few pairs show stays as in `start.session`. io::InputError after Ctrl-C, as

@@ -63,5 +63,18 @@ TEST(LearnSessions, FindsHowMuchLessSessionsDiffer) {
   EXPECT_EQ(learnt.law_error, start.session.law_error) << "no pair has an effect";
 }
 
+TEST(LearnLaws, KeepsWhatNoEffectShows) {
+  SessionVariation s;
+  s.law_error.fill(0.1);
+  // two errors of drive at 0.4 count as much as what it had: the mean of the logarithms
+  learn_laws({{"command_delay", 0.4}, {"gear_backlash", 0.4}, {"com_offset", 0.2}}, s);
+  const auto of = [&](model::Stage stage) { return s.law_error[static_cast<std::size_t>(stage)]; };
+  EXPECT_NEAR(of(model::Stage::drive), 0.2, 1e-12);
+  EXPECT_NEAR(of(model::Stage::body), 0.1 * std::cbrt(2), 1e-12);
+  EXPECT_EQ(of(model::Stage::air), s.law_error_of("rotational_lift"));
+  EXPECT_NEAR(of(model::Stage::air), 0.1, 1e-15);
+  EXPECT_NEAR(s.law_most, 2, 0.05) << "drive: 0.4 over 0.2";
+}
+
 }  // namespace
 }  // namespace flappy::gap::learn_discrepancy_test
