@@ -5,7 +5,8 @@
 
 Robots are flown with seeds that no benchmark uses, but for the last step, whose robots are development robots, and kept in OUT. After any
 stop, the same command goes on. In the end configs/lab and configs/gap hold what was learnt: for each family from the other two, starting
-from the file for this family, and for users from all three. The last step learns the constants of the verdict. A build of no commit is refused.
+from the file for this family, and for users from all three. On a bench there are B and C, and laws start from those of flights. The last
+step learns the constants of the verdict. A build of no commit is refused.
 """
 import argparse
 import os
@@ -42,9 +43,12 @@ def with_bench(text, learnt):
 
 
 def with_laws(text, of_flights):
-    """A file of what differs between sessions of a bench with the errors of laws that flights showed: the bench adds to these."""
+    """Replaces the errors of laws by those of flights, from which learning on a bench starts."""
     table = re.compile(r"^\[law_error\]\n.*?\n\n", re.S | re.M)
-    return table.sub(lambda _: table.search(of_flights).group(), text, count=1)
+    new, count = table.subn(lambda _: table.search(of_flights).group(), text, count=1)
+    if count == 0:
+        sys.exit("[law_error] is not there; accepted: a file of what differs between sessions")
+    return new
 
 
 def main():
@@ -143,7 +147,8 @@ def main():
         for family in [*ON_BENCH, ""]:
             shipped, discrepancy = shipped_file("bench", family), shipped_file("discrepancy", family)
             start = o.out / f"before_bench_without_{family or 'none'}.toml"
-            start.write_text(with_laws(shipped.read_text(), shipped_file("sessions", family).read_text()))
+            if not start.exists():
+                start.write_text(with_laws(shipped.read_text(), shipped_file("sessions", family).read_text()))
             learn(f"bench_without_{family or 'none'}.toml", [f for f in ON_BENCH if f != family], shipped, lambda families: [
                 "--sessions", start, "--discrepancy", discrepancy,
                 "--pairs", *[pair(f, n, True) for f in families for n in range(o.pairs)]])

@@ -80,9 +80,13 @@ FLAPPY_INLINE void come_late(const FlightSpace<T>& s, const FlightPlan<T>& plan,
   for (int i = 0; i < kWidth<T>; ++i) {
     const std::uint32_t since = f.tick[first + i] % plan.action_repeat;
     if (since == 0) {
-      const sim::RandomKey key{plan.seed, f.flapper[first + i], f.flight[first + i], sim::Stream::inference};
-      const double share = sim::uniform_pair(key, f.tick[first + i]).first;
-      periods[i] = static_cast<T>(static_cast<std::uint32_t>(share * (plan.late_most + 1)));
+      using One = Lanes<T, 1>;
+      const T share = sim::uniforms<One>(plan.seed, static_cast<std::uint32_t>(sim::Stream::inference),
+                                         f.tick[first + i], f.flapper + first + i, f.flight + first + i)
+                          .u[0]
+                          .raw[0];
+      const auto late = static_cast<std::uint32_t>(share * static_cast<T>(plan.late_most + 1));
+      periods[i] = static_cast<T>(late < plan.late_most ? late : plan.late_most);
     }
     waits[i] = static_cast<T>(since) < periods[i] ? T(1) : T(0);
   }

@@ -112,7 +112,9 @@ def of_config(path, root):
     head, of_file, table, of_table, block = None, ("", ""), "", ("", ""), []
     lines = iter(enumerate(path.read_text(encoding="utf-8").splitlines(), 1))
     for number, line in lines:
-        text, _, behind = line.partition("#") if line.partition("#")[0].count('"') % 2 == 0 else (line, "", "")  # else in a string
+        text, _, behind = line.partition("#")
+        if text.count('"') % 2 == 1:  # this # is within a string
+            text, behind = line, ""
         text = text.strip()
         if not text:
             if behind or line.startswith("#"):

@@ -71,9 +71,12 @@ TEST(LearnLaws, KeepsWhatNoEffectShows) {
   const auto of = [&](model::Stage stage) { return s.law_error[static_cast<std::size_t>(stage)]; };
   EXPECT_NEAR(of(model::Stage::drive), 0.2, 1e-12);
   EXPECT_NEAR(of(model::Stage::body), 0.1 * std::cbrt(2), 1e-12);
-  EXPECT_EQ(of(model::Stage::air), s.law_error_of("rotational_lift"));
   EXPECT_NEAR(of(model::Stage::air), 0.1, 1e-15);
-  EXPECT_NEAR(s.law_most, 2, 0.05) << "drive: 0.4 over 0.2";
+  EXPECT_NEAR(s.law_most, 2, 1e-12) << "a quantile of 0.4 / 0.2, twice, and 0.2 / 0.126";
+  s.law_error.fill(0.1);
+  learn_laws({{"command_delay", 0.02}, {"gear_backlash", 0.8}}, s);
+  // errors of two: quantiles at 16 and 84 % are at these shares of the way between them
+  EXPECT_NEAR(s.law_spread, std::log((0.16 * 0.02 + 0.84 * 0.8) / (0.84 * 0.02 + 0.16 * 0.8)) / 2, 1e-12);
 }
 
 }  // namespace
