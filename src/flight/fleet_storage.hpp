@@ -140,8 +140,10 @@ struct Fleet<T>::Storage {
   }
 
   /// Element `k` of the earlier observations of flapper `i`, newest observation first.
-  T* past_at(std::size_t i, int k) {
-    return &remembered[i / kLanes<T> * past_size + static_cast<std::size_t>(k) * kLanes<T> + i % kLanes<T>];
+  T* past_at(std::size_t i, int k) { return number_at(remembered, past_size, i, k); }
+  /// Row `k` of flapper `i` in a list [block][row][lane]; `size`: numbers of a block.
+  static T* number_at(std::vector<T>& list, std::size_t size, std::size_t i, int k) {
+    return &list[i / kLanes<T> * size + static_cast<std::size_t>(k) * kLanes<T> + i % kLanes<T>];
   }
   /// Pushes the observation of flapper `i` into its history, as each action of a policy does.
   void remember(std::size_t i) {
@@ -234,8 +236,7 @@ void Fleet<T>::Storage::start_lane(std::size_t i, std::uint32_t episode, const T
   for (int k = 0; k < plan.actions; ++k) fresh.adds[k] = scaled(k, 0);
   put(fresh, f.episode, lane);
   if (late_size > 0)
-    for (int k = 0; k < kMaxActions; ++k)
-      late[i / kLanes<T> * late_size + static_cast<std::size_t>(k * kLanes<T> + lane)] = static_cast<T>(fresh.adds[k]);
+    for (int k = 0; k < kMaxActions; ++k) *number_at(late, late_size, i, k) = static_cast<T>(fresh.adds[k]);
 }
 
 /// Computes the observation before the first control period, and fills the history with it.

@@ -15,7 +15,7 @@ inline constexpr int kImuRows = model::kRows<Imu>, kEstimatorRows = model::kRows
                      kTruthRows = model::kRows<Truth>;
 inline constexpr int kEstimateRows = model::kRows<Estimate>, kEpisodeRows = model::kRows<Episode>;
 inline constexpr int kIncrementRows = model::kRows<Increment>, kMocapRows = model::kRows<MocapSample>;
-inline constexpr int kLateRows = kMaxActions + 1;  // of FlightSpace::late: Episode::adds, and the lateness
+inline constexpr int kLateRows = kMaxActions + 1;  // four numbers that act, and one delay
 inline constexpr int kImuSampleRows = model::kRows<ImuSample>;
 
 template <class T>
@@ -49,7 +49,9 @@ struct FlightSpace {
   T* ring;   // IMU increments that the estimator may still apply, [slot][row of Increment][lane]
   T* queue;  // motion-capture poses in transit, [slot][row of MocapSample][lane]
   T* past;   // earlier observations, [action ago][row of the observation][lane]; unused without a history
-  T* late;   // what acts now, and by how many control periods the present action is late, [row][lane]; unused without
+  // [kLateRows][lane]: the offsets or voltages that act now, then the delay of the last action in control periods. It is
+  // used only if late_most > 0.
+  T* late;
   Tap<T> tap;
   sim::Ahead ahead;  // memory of the next block, which the first physics steps prefetch
 };

@@ -9,7 +9,7 @@ namespace flappy::gap {
 namespace {
 
 constexpr const char* kSessionHead =
-    R"(# What differs between two sessions of one robot in which nothing that matters has changed. An effect that is named by contrast with
+    R"(# This file says by how much two sessions of one robot differ if nothing that matters has changed. An effect that is named by contrast with
 # reference flights has to explain more than this. Read by flappy-gap diagnose --reference, written by flappy-gap learn-discrepancy --pairs.
 #
 # Learnt: flappy-gap learn-discrepancy --pairs, )";

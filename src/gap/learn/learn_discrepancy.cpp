@@ -36,7 +36,7 @@ constexpr double kMinBackground = 0.01;
 constexpr std::size_t kMinLaws = 5;
 /// Smallest standard deviation of the logarithm of errors of laws. Choice.
 constexpr double kMinSpread = 0.25;
-/// What a stage had before counts as much as this many errors. Choice.
+/// The centre from which learning starts weighs as much as this many errors of its stage. Choice.
 constexpr double kShrinkLaws = 2;
 /// The quantile of errors of laws, over their centres, that is the largest of them. Choice.
 constexpr double kLargestLaw = 0.95;
