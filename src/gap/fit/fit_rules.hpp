@@ -47,6 +47,8 @@ class FitRules : public EvidenceRules {
                                    double law_factor) const = 0;
   /// Prior by which RobotFit::weigh weighs a law factor that is not 1. It tries powers of two within the bounds.
   virtual LawPrior law_prior(const ModelDiscrepancy& discrepancy) const = 0;
+  /// Whether RobotFit::weigh also searches the scales of test flights and backgrounds from their priors.
+  virtual bool weighs_from_priors() const = 0;
   /// [group][basis] Standard deviation of the discrepancy in a fit that moves the effects alone (Fitter::fit_effects).
   virtual BasisCoefficients effects_discrepancy_sd(const Fitter& fitter, const Hypothesis& hypothesis,
                                                    const Fit& fit) const = 0;

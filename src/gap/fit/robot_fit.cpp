@@ -390,27 +390,47 @@ ScaledEvidence RobotFit::weigh(const Hypothesis& hypothesis, const Fit& fit, con
     w.posterior.log_evidence -= 0.5 * std::pow(std::log(law_factor) / law.spread, 2);
     return w;
   };
-  ScaledEvidence best = with(1, start);
-  // also from prior scales of their own background: the effect may explain what a large background did
+  // each law factor: from the best scales so far, and from further starts
+  std::vector<Scales> starts = further_starts(hypothesis, start);
+  const auto best_of = [&](double law_factor, const Scales& from) {
+    ScaledEvidence best = with(law_factor, from);
+    for (const Scales& further : starts)
+      if (ScaledEvidence w = with(law_factor, further); w.posterior.log_evidence > best.posterior.log_evidence)
+        best = std::move(w);
+    return best;
+  };
+  ScaledEvidence best = best_of(1, start);
+  if (!fitter_.law_may_deviate(hypothesis, fit)) return best;
+  if (!rules().weighs_from_priors()) starts.clear();
+  for (const double step : {std::min(kLawStep, law.most), 1 / std::min(kLawStep, law.most)})
+    for (double law_factor = step; law_factor <= law.most && law_factor >= 1 / law.most; law_factor *= step) {
+      ScaledEvidence other = best_of(law_factor, best.scales);
+      if (other.posterior.log_evidence < best.posterior.log_evidence) break;
+      best = std::move(other);
+    }
+  return best;
+}
+
+/// Expectation-maximisation finds the nearest maximum: what other scales explain, a hypothesis may explain itself.
+std::vector<Scales> RobotFit::further_starts(const Hypothesis& hypothesis, const Scales& start) const {
+  const ModelDiscrepancy& d = evidence().discrepancy();
+  std::vector<Scales> starts;
   Scales without_background = start;
   bool differs = false;
   for (const std::string& effect : hypothesis.effects())
     for (const std::string& name : {effect, effect + kOfBoth})
       if (const auto e = static_cast<std::size_t>(fitter_.place_of(name)); e < start.effects.size()) {
-        without_background.effects[e] = start.prior_scale(evidence().discrepancy().scale_prior(name));
+        without_background.effects[e] = start.prior_scale(d.scale_prior(name));
         differs = true;
       }
-  if (differs)
-    if (ScaledEvidence w = with(1, without_background); w.posterior.log_evidence > best.posterior.log_evidence)
-      best = std::move(w);
-  if (!fitter_.law_may_deviate(hypothesis, fit)) return best;
-  for (const double step : {std::min(kLawStep, law.most), 1 / std::min(kLawStep, law.most)})
-    for (double law_factor = step; law_factor <= law.most && law_factor >= 1 / law.most; law_factor *= step) {
-      ScaledEvidence other = with(law_factor, best.scales);
-      if (other.posterior.log_evidence < best.posterior.log_evidence) break;
-      best = std::move(other);
-    }
-  return best;
+  if (differs) starts.push_back(without_background);
+  if (!rules().weighs_from_priors()) return starts;
+  Scales prior = start;
+  prior.centre_tests(d.session);
+  for (std::size_t e = 0; e < std::min(prior.effects.size(), fitter_.effects().size()); ++e)
+    prior.effects[e] = prior.prior_scale(d.scale_prior(fitter_.effects()[e]));
+  starts.push_back(prior);
+  return starts;
 }
 
 std::vector<SensorFinding> RobotFit::sensors(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit) const {

@@ -29,6 +29,7 @@ class Alone : public Question {
   BasisCoefficients law_sd(const Evidence& evidence, const std::string& effect, const BasisCoefficients& change,
                            double law_factor) const override;
   LawPrior law_prior(const ModelDiscrepancy& discrepancy) const override;
+  bool weighs_from_priors() const override { return false; }
   BasisCoefficients effects_discrepancy_sd(const Fitter& fitter, const Hypothesis& hypothesis,
                                            const Fit& fit) const override;
   Eigen::VectorXd next_effects(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit,

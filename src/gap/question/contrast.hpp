@@ -39,6 +39,7 @@ class Contrast : public Question {
                            double law_factor) const override;
   /// That of ModelDiscrepancy::session.
   LawPrior law_prior(const ModelDiscrepancy& discrepancy) const override;
+  bool weighs_from_priors() const override { return true; }
   /// Includes the deviations of the effects' laws.
   BasisCoefficients effects_discrepancy_sd(const Fitter& fitter, const Hypothesis& hypothesis,
                                            const Fit& fit) const override;

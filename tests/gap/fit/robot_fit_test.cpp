@@ -128,6 +128,29 @@ TEST_F(RobotFits, WeighsHypothesesWithScalesOfTheirOwn) {
   EXPECT_GE(unknown.posterior.log_evidence, without - 1e-6);
 }
 
+// Expectation-maximisation leads from far scales to another maximum, or stops on the way.
+TEST_F(RobotFits, WeighsAContrastAlsoFromThePriorsOfItsScales) {
+  const auto made = synthetic_flights(4, synthetic_law);
+  const Hypothesis none(*priors_, {});
+  for (const auto& f : made) f->fly(none.vehicle(none.start()));
+  const Flights flights = as_flights(made, 2);
+  const Flights references{flights.references, {}};
+  ModelDiscrepancy discrepancy = read_model_discrepancy();
+  discrepancy.session = read_session_variation();
+  const RobotFit contrast(question_of(flights),
+                          RobotFit::of_references(question_of(references), references, *priors_, discrepancy, {}, 2),
+                          flights);
+  const Scales near = contrast.fitter().scales();
+  Scales far = near;
+  far.session *= 1e4;
+  for (std::size_t b = 0; b < kBlocks; ++b)
+    if (block_of_tests(b)) far.blocks[b] *= 1e4;
+  const auto log_evidence = [&](const Scales& start) {
+    return contrast.weigh(contrast.no_effects(), contrast.parameters(), start).posterior.log_evidence;
+  };
+  EXPECT_NEAR(log_evidence(far), log_evidence(near), 0.5);
+}
+
 // The same by a search for the scale t that makes magnitudes most probable as background: -log N(0, (t sd)^2), and the cost of t.
 TEST_F(RobotFits, SaysHowMuchMoreProbableMagnitudesAreAsAnEffect) {
   const ModelDiscrepancy discrepancy = read_model_discrepancy();
