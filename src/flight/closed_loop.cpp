@@ -71,6 +71,9 @@ FLAPPY_INLINE void act(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episo
   store_rows(episode, s.flight.episode, first);
 }
 
+/// Number of a draw that a flight makes once; draws of samples and control periods have smaller ones.
+constexpr std::uint32_t kOfFlight = 0xFFFFFFFF;
+
 /// Until the present action acts, the one before does. Inference and transport take another time for each.
 template <class T>
 FLAPPY_INLINE void come_late(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episode<L<T>>& episode, int first) {
@@ -81,12 +84,16 @@ FLAPPY_INLINE void come_late(const FlightSpace<T>& s, const FlightPlan<T>& plan,
     const std::uint32_t since = f.tick[first + i] % plan.action_repeat;
     if (since == 0) {
       using One = Lanes<T, 1>;
-      const T share = sim::uniforms<One>(plan.seed, static_cast<std::uint32_t>(sim::Stream::inference),
-                                         f.tick[first + i], f.flapper + first + i, f.flight + first + i)
-                          .u[0]
-                          .raw[0];
-      const auto late = static_cast<std::uint32_t>(share * static_cast<T>(plan.late_most + 1));
-      periods[i] = static_cast<T>(late < plan.late_most ? late : plan.late_most);
+      const auto at_most = [&](std::uint32_t most, std::uint32_t number) {
+        const T share = sim::uniforms<One>(plan.seed, static_cast<std::uint32_t>(sim::Stream::inference), number,
+                                           f.flapper + first + i, f.flight + first + i)
+                            .u[0]
+                            .raw[0];
+        const auto count = static_cast<std::uint32_t>(share * static_cast<T>(most + 1));
+        return count < most ? count : most;
+      };
+      const std::uint32_t most = plan.late_drawn ? at_most(plan.late_most, kOfFlight) : plan.late_most;
+      periods[i] = static_cast<T>(at_most(most, f.tick[first + i]));
     }
     waits[i] = static_cast<T>(since) < periods[i] ? T(1) : T(0);
   }
@@ -209,11 +216,15 @@ FLAPPY_INLINE void delay(const FlightSpace<T>& s, const FlightPlan<T>& plan, con
   T* rows = s.queue + static_cast<std::ptrdiff_t>(correction.slot) * kMocapRows * kLanes<T>;
   const auto pose = load_rows<MocapSample<L<T>>>(slot(s.queue, correction.slot, kMocapRows), first);
   L<T> late = effect_parameter<MocapDelay>(s.effects, 0, first);
-  if (plan.mocap.jitter_s > 0)
-    late += jitter_of(plan.mocap,
-                      sim::uniforms<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::mocap),
-                                          3 * correction.index + 2, s.flight.flapper + first, s.flight.flight + first)
-                          .u[1]);
+  if (plan.mocap.jitter_s > 0) {
+    const auto draw = [&](std::uint32_t number) {
+      return sim::uniforms<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::mocap), number,
+                                 s.flight.flapper + first, s.flight.flight + first)
+          .u[1];
+    };
+    const L<T> sample = jitter_of(plan.mocap, draw(3 * correction.index + 2));
+    late += plan.mocap.drawn > 0 ? L<T>(sample * draw(kOfFlight)) : sample;
+  }
   const L<T> age = L<T>(L<T>(correction.age_s) + late) / L<T>(plan.task.tick_s);
   const auto truth = load_rows<Truth<L<T>>>(s.flight.truth, first);
   const auto past = past_truth<T>(s.effects, s.flight.tick + first, truth, age, plan.task.tick_s, first);

@@ -16,24 +16,25 @@ FlightConstants flight_constants(const FleetOptions& options) {
   const double period_s = static_cast<double>(std::lround(1 / (options.control_hz * step_s))) * step_s;
   const auto& at = s.imu.position_m;
   const EstimatorNoise& f = s.estimator;
-  FlightConstants k{period_s,
-                    {{at.x, at.y, at.z},
-                     s.imu.gyro_noise_rad_s,
-                     s.imu.accel_noise_m_s2,
-                     low_pass_share(s.imu.low_pass_hz, 1 / s.imu.rate_hz),
-                     gravity},
-                    {s.mocap.position_noise_m, s.mocap.attitude_noise_rad, s.mocap.loss_probability,
-                     1 / s.mocap.loss_length, s.mocap.jitter_s, s.mocap.jitter_exponential ? 1.0 : 0.0},
-                    {square(s.imu.gyro_noise_rad_s) / s.imu.rate_hz + square(f.angle_drift_rad_sqrt_s),
-                     square(f.gyro_bias_drift_rad_s_sqrt_s),
-                     square(s.imu.accel_noise_m_s2) / s.imu.rate_hz + square(f.velocity_drift_m_s_sqrt_s),
-                     square(f.accel_bias_drift_m_s2_sqrt_s),
-                     square(s.mocap.attitude_noise_rad),
-                     square(s.mocap.position_noise_m),
-                     gravity,
-                     {at.x, at.y, at.z}},
-                    c.constants,
-                    options.task.constants};
+  FlightConstants k{
+      period_s,
+      {{at.x, at.y, at.z},
+       s.imu.gyro_noise_rad_s,
+       s.imu.accel_noise_m_s2,
+       low_pass_share(s.imu.low_pass_hz, 1 / s.imu.rate_hz),
+       gravity},
+      {s.mocap.position_noise_m, s.mocap.attitude_noise_rad, s.mocap.loss_probability, 1 / s.mocap.loss_length,
+       s.mocap.jitter_s, s.mocap.jitter_exponential ? 1.0 : 0.0, s.mocap.jitter_drawn ? 1.0 : 0.0},
+      {square(s.imu.gyro_noise_rad_s) / s.imu.rate_hz + square(f.angle_drift_rad_sqrt_s),
+       square(f.gyro_bias_drift_rad_s_sqrt_s),
+       square(s.imu.accel_noise_m_s2) / s.imu.rate_hz + square(f.velocity_drift_m_s_sqrt_s),
+       square(f.accel_bias_drift_m_s2_sqrt_s),
+       square(s.mocap.attitude_noise_rad),
+       square(s.mocap.position_noise_m),
+       gravity,
+       {at.x, at.y, at.z}},
+      c.constants,
+      options.task.constants};
   with_controller(c.kind, [&]<class C>(C) {
     static_cast<LoopConstants<double>&>(k.controller.of<C>()) = {low_pass_share(c.velocity_low_pass_hz, period_s),
                                                                  low_pass_share(c.body_rate_low_pass_hz, period_s),

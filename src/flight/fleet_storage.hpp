@@ -95,6 +95,7 @@ struct Fleet<T>::Storage {
     plan.sets_voltages = options.task.sets_voltages();
     plan.action_repeat = options.task.action_repeat;
     plan.late_most = options.task.action_late_most;
+    plan.late_drawn = options.task.action_late_drawn;
     const auto all = static_cast<int>(options.task.observation().size());
     plan.observed = all / static_cast<int>(options.task.history);
     plan.past = all - plan.observed;

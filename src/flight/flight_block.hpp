@@ -88,6 +88,7 @@ struct FlightPlan {
   policy::ActorView<T> actor;
   std::uint32_t action_repeat;  // control periods per action
   std::uint32_t late_most;      // most control periods by which an action acts later
+  bool late_drawn;              // each flight draws a late_most of its own
   std::uint32_t period;  // control periods since the fleet began: counter of the exploration noise's random numbers
   bool explores;
   T noise_kept, noise_fresh;        // weights of the last noise and of a new standard normal in the next noise

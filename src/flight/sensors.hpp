@@ -28,8 +28,8 @@ inline constexpr double kJitterCut = 8;
 template <class T>
 struct MocapConstants {
   T position_noise_m, attitude_noise_rad;
-  T loss_begins, loss_ends;  // probabilities at each sample
-  T jitter_s, exponential;   // how late samples are beyond the latency: MocapSensor; 0 or 1
+  T loss_begins, loss_ends;        // probabilities at each sample
+  T jitter_s, exponential, drawn;  // how late samples are beyond the latency: MocapSensor; 0 or 1; 0 or 1
 };
 
 inline namespace FLAPPY_ISA {

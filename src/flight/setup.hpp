@@ -25,6 +25,7 @@ struct MocapSensor {
   double loss_length = 1;                               ///< mean number of samples in a burst
   double jitter_s = 0;              ///< most by which a sample is later than latency_s; its mean if exponential
   bool jitter_exponential = false;  ///< law of that lateness: exponential, else uniform from 0
+  bool jitter_drawn = false;        ///< each flight draws a jitter of its own, uniform from 0 to jitter_s
 
   double longest_jitter_s() const { return jitter_exponential ? kJitterCut * jitter_s : jitter_s; }
 };

@@ -140,6 +140,7 @@ struct Task {
   std::uint32_t action_repeat = 1;  ///< control periods per action of the policy
   /// Most control periods by which an action acts later: each draws its own number from 0 to this, uniform.
   std::uint32_t action_late_most = 0;
+  bool action_late_drawn = false;  ///< each flight draws its own action_late_most, uniform from 0 to this one
   ActionKind action_kind = ActionKind::wing_beat;
   /// Unit of the first three wing-beat inputs; "1" for vehicles without motors, which mix them.
   std::string input_unit = "V";

@@ -148,7 +148,8 @@ class Reader {
   FlyConfig read() {
     root_.schema(1);
     root_.accept({"schema", "precision", "flight", "world", "constant_input", "excitation", "log", "vehicle", "task",
-                  "sensors", "controller", "randomisation", "drawn_effects", "actor", "dds", "changes"});
+                  "sensors", "controller", "randomisation", "drawn_effects", "drawn_jitter", "actor", "dds",
+                  "changes"});
     c_.precision = root_.choice("precision", {"float", "double"});
     read_flight();
     c_.fleet.batch.world = read_world(root_);
@@ -161,6 +162,7 @@ class Reader {
       c_.drawn_effects = read_drawn_effects(*t, c_.vehicle, c_.fleet.batch.world.has_ground());
       c_.vehicle_sha256.clear();
     }
+    if (const auto t = root_.optional_table("drawn_jitter")) read_drawn_jitter(*t);
     if (root_.has("actor")) c_.actor = fitting_actor(root_, c_.fleet.task);
     root_.finish();
     if (c_.fleet.task.sets_voltages()) refuse_inputs();
@@ -244,6 +246,28 @@ class Reader {
     }
   }
 
+  /// Each flight draws how much the latencies of poses and actions vary in it.
+  void read_drawn_jitter(const io::Table& t) {
+    t.accept({"mocap_s", "action_s"});
+    const auto take = [&](const char* key, bool fixed, const char* where, double most) {
+      const double value = t.number_or(key, 0, io::non_negative(most));
+      if (value > 0 && fixed) t.fail(key, std::string("is drawn, but ") + where + " is fixed", "one of both");
+      return value;
+    };
+    flight::MocapSensor& mocap = c_.fleet.sensors.mocap;
+    if (const double s = take("mocap_s", mocap.jitter_s > 0, "mocap.jitter_s of the sensors", 0.1); s > 0)
+      mocap.jitter_s = s, mocap.jitter_drawn = true;
+    flight::Task& task = c_.fleet.task;
+    const double action_s = take("action_s", task.action_late_most > 0, "action.jitter_s of the task", 1);
+    const double periods = action_s * c_.fleet.control_hz;
+    if (std::abs(periods - std::round(periods)) > 1e-6 || std::round(periods) >= task.action_repeat)
+      t.fail("action_s", "is no whole number of control periods below action.repeat_s of the task",
+             "n x " + io::shortest_digits(1 / c_.fleet.control_hz) + " s, less than " +
+                 io::shortest_digits(task.action_repeat / c_.fleet.control_hz) + " s");
+    if (action_s > 0)
+      task.action_late_most = static_cast<std::uint32_t>(std::lround(periods)), task.action_late_drawn = true;
+  }
+
   /// Throws io::InputError if the task's actions are motor voltages and a controller or an excitation is given as well.
   void refuse_inputs() const {
     const std::string sets =
@@ -313,17 +337,19 @@ class Reader {
                    "a shorter step, or a slower sensor");
     const flight::MocapSensor& mocap = o.sensors.mocap;
     const double room_s = longest_lateness_s(o);
-    if (mocap.jitter_s > 0 && mocap.longest_jitter_s() > room_s)
-      for_file("sensors", [&] {
-        files_.at("sensors").root().fail(
-            "mocap.jitter_s",
-            "lets poses be " + io::format("%.4g", mocap.longest_jitter_s()) +
-                " s late, and the motion is remembered for " + std::to_string(model::MocapDelay::kSlots) +
-                " control periods",
-            mocap.jitter_exponential ? "at most " + io::format("%.3g", std::max(0.0, room_s / flight::kJitterCut))
-                                     : "at most " + io::format("%.3g", std::max(0.0, room_s)));
+    if (mocap.jitter_s > 0 && mocap.longest_jitter_s() > room_s) {
+      const auto fail = [&](const io::Table& table, const char* key) {
+        const double most_s = mocap.jitter_exponential ? room_s / flight::kJitterCut : room_s;
+        table.fail(key,
+                   "lets poses be " + io::format("%.4g", mocap.longest_jitter_s()) +
+                       " s late, and the motion is remembered for " + std::to_string(model::MocapDelay::kSlots) +
+                       " control periods",
+                   "at most " + io::format("%.3g", std::max(0.0, most_s)));
         return 0;
-      });
+      };
+      if (mocap.jitter_drawn) fail(root_, "drawn_jitter.mocap_s");
+      else for_file("sensors", [&] { return fail(files_.at("sensors").root(), "mocap.jitter_s"); });
+    }
     if (const auto fault = model::contact_fault(c_.vehicle, step))
       for_file("vehicle", [&] {
         files_.at("vehicle").root().fail(fault->path, fault->what, fault->accepted);

@@ -260,6 +260,27 @@ TEST(FlyConfig, RefusesJitterThatCannotBeRemembered) {
       "64 control periods; accepted: at most 0.0118");
 }
 
+TEST(FlyConfig, DrawsAJitterOfEachFlight) {
+  const rollout::FlyConfig c = rollout::read_fly_config(source_path("configs/fly/escape_robust.toml"));
+  EXPECT_TRUE(c.fleet.sensors.mocap.jitter_drawn && c.fleet.task.action_late_drawn);
+  EXPECT_EQ(c.fleet.sensors.mocap.jitter_s, 0.01);
+  EXPECT_EQ(c.fleet.task.action_late_most, 3U);
+  const auto refused = [](const std::vector<std::string>& o) {
+    return message([&] { rollout::read_fly_config(source_path("configs/fly/escape_robust.toml"), o); });
+  };
+  EXPECT_EQ(refused({"sensors.mocap.jitter_s=0.01"}),
+            source_path("configs/fly/escape_robust.toml") +
+                ":27:11: drawn_jitter.mocap_s: is drawn, but mocap.jitter_s of the sensors is fixed; accepted: one of "
+                "both");
+  EXPECT_EQ(refused({"drawn_jitter.action_s=0.01"}),
+            "--set drawn_jitter.action_s=0.01: drawn_jitter.action_s: is no whole number of control periods below "
+            "action.repeat_s of the task; accepted: n x 0.002 s, less than 0.01 s");
+  EXPECT_EQ(refused({"drawn_jitter.mocap_s=0.1"}),
+            "--set drawn_jitter.mocap_s=0.1: drawn_jitter.mocap_s: lets poses be 0.1 s late, and the motion is "
+            "remembered for 64 control periods; accepted: at most 0.094");
+  EXPECT_EQ(refused({"drawn_jitter.mocap_s=0", "drawn_jitter.action_s=0"}), "accepted");
+}
+
 TEST(FlyConfig, ReadsShapesAndLetsVehiclesWithPointsTouch) {
   const auto read = [](const std::vector<std::string>& o) {
     return rollout::read_fly_config(source_path("configs/fly/landing.toml"), o);

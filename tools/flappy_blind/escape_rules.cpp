@@ -61,7 +61,8 @@ EscapeRules read_escape_rules(const fs::path& policy_file, const fs::path& confi
     throw io::InputError(policy_file.string() + ": is no policy; accepted: " + policy::kPolicyFiles);
   std::vector<std::string> overrides;
   if (kind == ".json") overrides.push_back("actor=" + io::toml_string(fs::absolute(policy_file).string()));
-  const rollout::FlyConfig config = rollout::read_fly_config(config_file, overrides);
+  rollout::FlyConfig config = rollout::read_fly_config(config_file, overrides);
+  if (config.fleet.task.action_late_drawn) config.fleet.task.action_late_most = 0;  // robots have jitter of their own
   const flight::FleetOptions& fleet = config.fleet;
   const bool sees_wings = fleet.task.parts >> static_cast<int>(flight::Part::wings) & 1;
   if (fleet.controller.kind != flight::kind_of<flight::PidController>() || fleet.task.path.size() != 1 || sees_wings ||
