@@ -55,7 +55,7 @@ Directions Fitter::axes(const Hypothesis& hypothesis) {
 }
 
 Fit Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directions directions,
-                      const std::vector<BasisCoefficients>& known, bool forward) const {
+                      const std::vector<SharedColumn>& known, bool forward) const {
   std::vector<VehicleHypothesis> vehicles = {hypothesis.vehicle(at)};
   std::vector<double> spans;
   const auto first = static_cast<Index>(known.size());
@@ -79,7 +79,7 @@ Fit Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directio
   for (Index d = first; d < l.directions.reach.size(); ++d) {
     const BasisCoefficients* linear = linear_column(hypothesis, d);
     if (linear == nullptr) flown.push_back(l.columns.size());
-    l.columns.push_back(linear == nullptr ? BasisCoefficients() : *linear);
+    l.columns.emplace_back(linear == nullptr ? BasisCoefficients() : *linear);
   }
   // residuals are reduced as they come
   std::vector<BasisCoefficients> of_sides(sides * flown.size());
@@ -94,7 +94,8 @@ Fit Fitter::linearise(const Hypothesis& hypothesis, const VectorXd& at, Directio
   const BasisCoefficients here = forward ? evidence_->basis_coefficients(l.residual) : BasisCoefficients();
   for (std::size_t n = 0; n < flown.size(); ++n) {
     const BasisCoefficients &to = of_sides[sides * n], &from = forward ? here : of_sides[sides * n + 1];
-    if (to.size() > 0 && from.size() > 0 && spans[n] != 0) l.columns[flown[n]] = (from - to) / spans[n];
+    if (to.size() > 0 && from.size() > 0 && spans[n] != 0)
+      l.columns[flown[n]] = BasisCoefficients((from - to) / spans[n]);
   }
   l.statistics = evidence_->statistics(l.residual);
   average(std::move(there), shifts, l);
@@ -110,7 +111,7 @@ const BasisCoefficients* Fitter::linear_column(const Hypothesis& hypothesis, Ind
 
 /// Steps along the directions to points around `at`; adds the vehicles of these points.
 std::vector<VectorXd> Fitter::around(const Hypothesis& hypothesis, const VectorXd& at, const Directions& directions,
-                                     const std::vector<BasisCoefficients>& known,
+                                     const std::vector<SharedColumn>& known,
                                      std::vector<VehicleHypothesis>& vehicles) const {
   std::vector<VectorXd> shifts;
   const Index k = std::min(directions.reach.size(), hypothesis.shared());
@@ -140,7 +141,7 @@ void Fitter::average(std::vector<SufficientStatistics> around, const std::vector
     if (around[i].sums.empty()) return;
     BasisCoefficients back = BasisCoefficients::Zero(kGroups, evidence_->basis().size());
     for (Index d = 0; d < shifts[i].size(); ++d)
-      if (shifts[i][d] != 0) back += shifts[i][d] * fit.columns[static_cast<std::size_t>(d)];
+      if (shifts[i][d] != 0) back += shifts[i][d] * *fit.columns[static_cast<std::size_t>(d)];
     evidence_->add(1, back, around[i]);
   });
   double n = 1;
@@ -198,9 +199,11 @@ Fitter Fitter::with_scales(Scales scales) const {
   f.scales_ = std::move(scales);
   for (Nuisance& n : f.nuisances_) {
     const auto effect = static_cast<std::size_t>(n.effect);
+    const double before = n.scale;
     if (n.effect >= 0)
       n.scale = effect < f.scales_.effects.size() ? f.scales_.effects[effect] : f.scales_.prior_scale(n.prior);
-    n.scaled = n.scale * n.column;
+    if (n.scale == before && n.scaled.size() > 0) continue;  // shared
+    n.scaled = BasisCoefficients(n.scale * *n.column);
   }
   return f;
 }
@@ -345,7 +348,7 @@ Directions Fitter::joint_directions(const Hypothesis& hypothesis, const Fit& par
   return d;
 }
 
-std::vector<BasisCoefficients> Fitter::shared_columns(const Hypothesis& hypothesis, const Fit& parameters) {
+std::vector<SharedColumn> Fitter::shared_columns(const Hypothesis& hypothesis, const Fit& parameters) {
   const auto& columns = parameters.columns;
   return {columns.begin(), columns.begin() + static_cast<std::ptrdiff_t>(hypothesis.shared())};
 }

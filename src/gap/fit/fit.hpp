@@ -31,6 +31,19 @@ struct Directions {
   Eigen::VectorXd reach;  ///< [direction] distance from the point to each side of the difference
 };
 
+/// [group][basis] A column that copies share: the fits of a robot's hypotheses have those of its parameters in common.
+class SharedColumn {
+ public:
+  SharedColumn(BasisCoefficients column = {})  // NOLINT(google-explicit-constructor): a column is one that is shared
+      : column_(std::make_shared<const BasisCoefficients>(std::move(column))) {}
+  operator const BasisCoefficients&() const { return *column_; }  // NOLINT(google-explicit-constructor)
+  const BasisCoefficients& operator*() const { return *column_; }
+  Eigen::Index size() const { return column_->size(); }
+
+ private:
+  std::shared_ptr<const BasisCoefficients> column_;
+};
+
 /// A hypothesis linearised at given coordinates, and its posterior there.
 struct Fit {
   Eigen::VectorXd at;  ///< [coordinate]
@@ -39,7 +52,7 @@ struct Fit {
   SufficientStatistics statistics;  ///< statistics of the residual, averaged over points around `at`
   /// [direction][group][basis] change of the prediction per unit along the direction; empty if the simulation diverges
   /// there.
-  std::vector<BasisCoefficients> columns;
+  std::vector<SharedColumn> columns;
   double law_factor = 1;  ///< factor on how far the laws of its effects may deviate from the catalogue's (law_sd)
   Posterior posterior;    ///< [direction], relative to `at`; its log evidence is with the fitter's scales, in nats
   bool flown() const { return !residual.empty(); }
@@ -148,7 +161,7 @@ class Fitter {
   /// flown() if the simulation at `at` diverges. `forward`: simulates one side alone, and no points around `at`; for
   /// points on the way to the last one of a fit.
   Fit linearise(const Hypothesis& hypothesis, const Eigen::VectorXd& at, Directions directions,
-                const std::vector<BasisCoefficients>& known = {}, bool forward = false) const;
+                const std::vector<SharedColumn>& known = {}, bool forward = false) const;
   /// One direction for each coordinate, with the reach of first differences.
   static Directions axes(const Hypothesis& hypothesis);
   /// A fit from `start` on, [coordinate], where no columns are known yet. At most `max_iterations` iterations; 0 or 1:
@@ -174,26 +187,26 @@ class Fitter {
   /// Null: the direction is not a linear magnitude.
   const BasisCoefficients* linear_column(const Hypothesis& hypothesis, Eigen::Index direction) const;
   static Directions joint_directions(const Hypothesis& hypothesis, const Fit& parameters);
-  static std::vector<BasisCoefficients> shared_columns(const Hypothesis& hypothesis, const Fit& parameters);
+  static std::vector<SharedColumn> shared_columns(const Hypothesis& hypothesis, const Fit& parameters);
   static Directions principal(const Hypothesis& hypothesis, const Fit& fit);
   /// Whether columns are of a fit's own point, and by which differences.
   enum class Columns { elsewhere, forward, central };
   Fit improve(const Hypothesis& hypothesis, Fit fit, int max_iterations, const Fit* parameters, Columns columns) const;
   std::vector<Eigen::VectorXd> around(const Hypothesis& hypothesis, const Eigen::VectorXd& at,
-                                      const Directions& directions, const std::vector<BasisCoefficients>& known,
+                                      const Directions& directions, const std::vector<SharedColumn>& known,
                                       std::vector<VehicleHypothesis>& vehicles) const;
   void average(std::vector<SufficientStatistics> around, const std::vector<Eigen::VectorXd>& shifts, Fit& fit) const;
   Reduced reduce(const Fit& fit, const Regressors& regressors) const;
   Posterior solve(const Fit& fit, const Regressors& regressors, Reduced reduced, double damping = 0) const;
 
   struct Nuisance {
-    BasisCoefficients column;
+    SharedColumn column;
     double prior_mean;
     int effect;  ///< in effects_; -1: none
     ScalePrior prior;
     std::size_t place;  ///< as NuisanceMean::place
     double scale = 1;
-    BasisCoefficients scaled = {};
+    SharedColumn scaled = {};
   };
   void add_nuisances(bool scaled, Regressors& to) const;
 

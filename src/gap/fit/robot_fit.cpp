@@ -159,7 +159,7 @@ std::vector<Background> RobotFit::session_changes(const SessionVariation& sessio
     BasisCoefficients change = BasisCoefficients::Zero(kGroups, basis.size());
     for (std::size_t d = 0; d < parameters_.columns.size(); ++d)
       if (parameters_.columns[d].size() > 0)
-        change += parameters_.directions.axes(j, static_cast<Eigen::Index>(d)) * parameters_.columns[d];
+        change += parameters_.directions.axes(j, static_cast<Eigen::Index>(d)) * *parameters_.columns[d];
     list.push_back({kSessionParameters, sd * basis.in_tests(change), {{"", j, sd}}});
   }
   for (std::size_t i = 0; i < sensor_errors_.size(); ++i) {

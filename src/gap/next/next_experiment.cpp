@@ -38,7 +38,7 @@ std::vector<Rival> rivals_of(const Question& question, const Inference& d, const
 std::optional<Expected> expect(const Question& question, const Rival& rival, const Fitter& fitter,
                                std::optional<Fit>& first) {
   const bool with_parameters = rival.directions.reach.size() > 0;
-  std::vector<BasisCoefficients> known;
+  std::vector<SharedColumn> known;
   if (with_parameters) known = question.known_columns(rival, first);
   const Fit l = fitter.linearise(rival.hypothesis, rival.at, rival.directions, known);
   if (l.residual.empty()) return {};

@@ -340,7 +340,7 @@ Rival Alone::rival(const ScoredHypothesis& hypothesis, const Inference& d, const
   return r;
 }
 
-std::vector<BasisCoefficients> Alone::known_columns(const Rival& rival, const std::optional<Fit>& first) const {
+std::vector<SharedColumn> Alone::known_columns(const Rival& rival, const std::optional<Fit>& first) const {
   if (!first) return {};
   return turned(*first, rival.directions, rival.hypothesis.shared());
 }

@@ -74,7 +74,7 @@ class Alone : public Question {
                                      const Inference& d, int threads) const override;
   Rival rival(const ScoredHypothesis& hypothesis, const Inference& d, const sim::Randomisation& uncertain,
               const sim::Randomisation& as_filed) const override;
-  std::vector<BasisCoefficients> known_columns(const Rival& rival, const std::optional<Fit>& first) const override;
+  std::vector<SharedColumn> known_columns(const Rival& rival, const std::optional<Fit>& first) const override;
 
  protected:
   /// Largest number of iterations of a fit of effects with the parameters. Choice.

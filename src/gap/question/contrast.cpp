@@ -365,8 +365,8 @@ Rival Contrast::rival(const ScoredHypothesis& hypothesis, const Inference& d, co
 }
 
 /// The parameters are certain: no columns.
-std::vector<BasisCoefficients> Contrast::known_columns(const Rival& rival, const std::optional<Fit>& /*first*/) const {
-  return std::vector<BasisCoefficients>(static_cast<std::size_t>(rival.hypothesis.shared()));
+std::vector<SharedColumn> Contrast::known_columns(const Rival& rival, const std::optional<Fit>& /*first*/) const {
+  return std::vector<SharedColumn>(static_cast<std::size_t>(rival.hypothesis.shared()));
 }
 
 }  // namespace flappy::gap

@@ -101,7 +101,7 @@ class Contrast : public Question {
   Rival rival(const ScoredHypothesis& hypothesis, const Inference& d, const sim::Randomisation& uncertain,
               const sim::Randomisation& as_filed) const override;
   /// Empty columns: the parameters are certain.
-  std::vector<BasisCoefficients> known_columns(const Rival& rival, const std::optional<Fit>& first) const override;
+  std::vector<SharedColumn> known_columns(const Rival& rival, const std::optional<Fit>& first) const override;
 
  private:
   double min_step_nats_;

@@ -88,7 +88,7 @@ class Question : public FitRules {
   virtual std::vector<SeenQuantity> seen(const RobotFit& /*robot*/) const { return {}; }
   /// [direction] Columns of a rival's parameters that are known without simulation. `first`: linearisation of the first
   /// rival with parameters; none: there is none yet.
-  virtual std::vector<BasisCoefficients> known_columns(const Rival& rival, const std::optional<Fit>& first) const = 0;
+  virtual std::vector<SharedColumn> known_columns(const Rival& rival, const std::optional<Fit>& first) const = 0;
 };
 
 /// The question that these flights answer: by the kind of vehicle, and whether there are references and tests.

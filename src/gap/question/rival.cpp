@@ -44,8 +44,8 @@ Rival fitted_rival(const ScoredHypothesis& a, const Inference& d, const sim::Ran
 }
 
 /// Columns along a rival's directions for the shared parameters, from another rival's columns: spares simulations.
-std::vector<BasisCoefficients> turned(const Fit& l, const Directions& directions, Index shared) {
-  std::vector<BasisCoefficients> columns;
+std::vector<SharedColumn> turned(const Fit& l, const Directions& directions, Index shared) {
+  std::vector<SharedColumn> columns;
   const MatrixXd turn =
       l.directions.axes.topLeftCorner(shared, shared).transpose() * directions.axes.topLeftCorner(shared, shared);
   for (Index d = 0; d < shared; ++d) {
@@ -56,7 +56,7 @@ std::vector<BasisCoefficients> turned(const Fit& l, const Directions& directions
       if (sum.size() == 0) sum = BasisCoefficients::Zero(column.rows(), column.cols());
       sum += turn(i, d) * column;
     }
-    columns.push_back(std::move(sum));
+    columns.emplace_back(std::move(sum));
   }
   return columns;
 }

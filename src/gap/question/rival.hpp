@@ -30,6 +30,6 @@ Rival certain_rival(const ScoredHypothesis& hypothesis, const Hypothesis& h, con
 Rival fitted_rival(const ScoredHypothesis& hypothesis, const Inference& d, const sim::Randomisation& uncertain);
 /// [direction] Derivatives of the prediction along the first `shared` of `directions`: linear combinations of those of
 /// `l`, without a simulation, as both sets of directions span the same coordinates.
-std::vector<BasisCoefficients> turned(const Fit& l, const Directions& directions, Eigen::Index shared);
+std::vector<SharedColumn> turned(const Fit& l, const Directions& directions, Eigen::Index shared);
 
 }  // namespace flappy::gap
