@@ -1,6 +1,8 @@
 #include "gap/replay/residuals.hpp"
 
 #include <algorithm>
+#include <atomic>
+#include <functional>
 #include <iterator>
 #include <map>
 #include <numeric>
@@ -11,7 +13,7 @@
 namespace flappy::gap {
 namespace {
 
-/// So many flights of a block has each thread to fly before residuals are used: more would need more memory, and with
+/// So many references of a block has each thread to fly before residuals are used: more would need more memory, and with
 /// fewer, threads would wait for each other. Size: of a loop.
 constexpr std::size_t kJobsOfThread = 4;
 
@@ -22,20 +24,30 @@ EffectValues sensors_of(const VehicleHypothesis& h) {
   return sensors;
 }
 
-/// Residuals of vehicles with their effects. Blocks are filled whatever the errors of the sensors.
-std::vector<Residuals> compare(const FlightList& flights, const std::vector<const VehicleHypothesis*>& vehicles,
-                               int threads) {
+/// Calls use(i, residual) with the residual of each vehicle with its effects, on any thread, as soon as the last flight
+/// of its block is flown: so few residuals are held at a time. Blocks are filled whatever the errors of the sensors.
+void compare_each(const FlightList& flights, const std::vector<const VehicleHypothesis*>& vehicles, int threads,
+                  const std::function<void(std::size_t, Residuals)>& use) {
   std::vector<ComparedVehicle> compared;
   for (const VehicleHypothesis* v : vehicles) compared.push_back({v, sensors_of(*v)});
   const std::size_t blocks = (vehicles.size() + kVehicles - 1) / kVehicles;
-  std::vector<Residuals> list(vehicles.size(), Residuals(flights.size()));
+  std::vector<Residuals> open(vehicles.size(), Residuals(flights.size()));
+  std::vector<std::atomic<std::size_t>> flown(blocks);
   io::parallel_for(blocks * flights.size(), threads, [&](std::size_t job) {
-    const std::size_t flight = job % flights.size(), first = job / flights.size() * kVehicles;
+    const std::size_t flight = job % flights.size(), block = job / flights.size(), first = block * kVehicles;
     const std::size_t last = std::min(first + kVehicles, vehicles.size());
     std::vector<Rows> rows = flights[flight]->compare(
         {compared.begin() + static_cast<std::ptrdiff_t>(first), compared.begin() + static_cast<std::ptrdiff_t>(last)});
-    for (std::size_t i = 0; i < rows.size(); ++i) list[first + i][flight] = std::move(rows[i]);
+    for (std::size_t i = first; i < last; ++i) open[i][flight] = std::move(rows[i - first]);
+    if (flown[block].fetch_add(1) + 1 < flights.size()) return;
+    for (std::size_t i = first; i < last; ++i) use(i, std::move(open[i]));
   });
+}
+
+std::vector<Residuals> compare(const FlightList& flights, const std::vector<const VehicleHypothesis*>& vehicles,
+                               int threads) {
+  std::vector<Residuals> list(vehicles.size(), Residuals(flights.size()));
+  compare_each(flights, vehicles, threads, [&](std::size_t i, Residuals residual) { list[i] = std::move(residual); });
   return list;
 }
 
@@ -81,21 +93,23 @@ void for_residuals(const Flights& flights, const std::vector<VehicleHypothesis>&
   std::ranges::stable_partition(order, [&](std::size_t i) {
     return sensor_effects(vehicles[i].vehicle.effects).size() == vehicles[i].vehicle.effects.size();
   });
-  const std::size_t flown = (flights.tests.empty() ? flights.references : flights.tests).size(),
-                    jobs = kJobsOfThread * static_cast<std::size_t>(io::thread_count(threads));
-  const std::size_t at_once = std::max<std::size_t>(1, jobs / std::max<std::size_t>(1, flown)) * kVehicles;
+  // references are kept for a while, so only some vehicles are flown at once
+  const std::size_t jobs = kJobsOfThread * static_cast<std::size_t>(io::thread_count(threads)),
+                    blocks = std::max<std::size_t>(1, jobs / std::max<std::size_t>(1, flights.references.size())),
+                    at_once = flights.references.empty() ? order.size() : blocks * kVehicles;
   for (std::size_t first = 0; first < order.size(); first += at_once) {
     std::vector<const VehicleHypothesis*> these;
     for (std::size_t i = first; i < std::min(first + at_once, order.size()); ++i) these.push_back(&vehicles[order[i]]);
     const std::vector<OfReferences> of_references = compare_references(flights.references, these, threads);
-    std::vector<Residuals> of_tests = compare(flights.tests, these, threads);
-    io::parallel_for(these.size(), threads, [&](std::size_t i) {
+    const auto join = [&](std::size_t i, Residuals of_tests) {
       Residuals all;
       for (const auto& rows : of_references[i]) all.push_back(*rows);
-      std::ranges::move(of_tests[i], std::back_inserter(all));
+      std::ranges::move(of_tests, std::back_inserter(all));
       if (std::ranges::any_of(all, &Rows::empty)) all.clear();
       use(order[first + i], std::move(all));
-    });
+    };
+    if (flights.tests.empty()) io::parallel_for(these.size(), threads, [&](std::size_t i) { join(i, {}); });
+    else compare_each(flights.tests, these, threads, join);
   }
 }
 
