@@ -33,7 +33,7 @@ Section speed_section(const std::filesystem::path& file);
 
 Section run_section(const std::filesystem::path& folder);  ///< a run of flappy-train, or several (--seeds)
 
-/// A scored blind benchmark: its folder, or score.csv alone, such as docs/results/blind_reported.csv; reads predictions
+/// A scored blind benchmark: its folder, or score.csv alone, such as docs/results/blind_alone.csv; reads predictions
 /// next to it. The block "cases": {"cases": [{"number", "part", "truth", "verdict", "named",
 /// "probability", "right", "details": [[name, text]], "rivals": [[name, probability]]}]}.
 Section benchmark_section(const std::filesystem::path& path);

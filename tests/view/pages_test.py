@@ -463,9 +463,9 @@ def main() -> None:
         check_cases(browser)
         check_screen(browser, "benchmark")
 
-        browser.open(report("reported", SOURCE / "docs/results/blind_reported.csv"))
+        browser.open(report("reported", SOURCE / "docs/results/blind_alone.csv"))
         check_page(browser, "reported benchmark")
-        rows = len((SOURCE / "docs/results/blind_reported.csv").read_text().splitlines()) - 1
+        rows = len((SOURCE / "docs/results/blind_alone.csv").read_text().splitlines()) - 1
         told = browser.run("return document.querySelector('.cases').textContent")
         assert f"{rows} of {rows} cases" in told, told[:200]
 
