@@ -216,8 +216,10 @@ TEST(ControllerHeader, FliesAnEscapeAsTheLanesDo) {
   EXPECT_EQ(seen.updates, flights * 3000);
 }
 
-/// Above a PID with a notch.
-TEST(ControllerHeader, FiltersTheWingBeatAsTheLanesDo) { fly_beside(config_of("escape_robust"), 4, 400, true); }
+/// Above a PID with a notch. Actions come at once, as from the exported C.
+TEST(ControllerHeader, FiltersTheWingBeatAsTheLanesDo) {
+  fly_beside(config_of("escape_robust", {"drawn_jitter.action_s=0"}), 4, 400, true);
+}
 
 TEST(ControllerHeader, HandsBackWhereItArrives) {
   // each with limits that decide: some arrive, some are handed back to at the time
