@@ -71,7 +71,7 @@ FLAPPY_INLINE void act(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episo
   store_rows(episode, s.flight.episode, first);
 }
 
-/// Number of a draw that a flight makes once; draws of samples and control periods have smaller ones.
+/// Counter of the draw that each flight makes once; those of samples and control periods never reach it.
 constexpr std::uint32_t kOfFlight = 0xFFFFFFFF;
 
 /// Until the present action acts, the one before does. Inference and transport take another time for each.

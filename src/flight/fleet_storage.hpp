@@ -107,8 +107,8 @@ struct Fleet<T>::Storage {
     const double period_s = period_steps * options.batch.step_s, jitter_s = options.sensors.mocap.longest_jitter_s();
     const double remembered_s = (model::MocapDelay::kSlots - 1) * period_s;
     if (jitter_s > 0 && schedule.longest_wait_s() + jitter_s > remembered_s)
-      throw std::invalid_argument("mocap.jitter_s: poses up to " + std::to_string(jitter_s) + " s late are more than " +
-                                  std::to_string(model::MocapDelay::kSlots) +
+      throw std::invalid_argument("jitter of motion capture: poses up to " + std::to_string(jitter_s) +
+                                  " s late are more than " + std::to_string(model::MocapDelay::kSlots) +
                                   " control periods remember; accepted: less, a lower mocap.latency_s or control rate");
     const auto own = v.effects.find(model::MocapDelay::kInfo.id);
     if (own == v.effects.end()) return;

@@ -29,7 +29,8 @@ template <class T>
 struct MocapConstants {
   T position_noise_m, attitude_noise_rad;
   T loss_begins, loss_ends;        // probabilities at each sample
-  T jitter_s, exponential, drawn;  // how late samples are beyond the latency: MocapSensor; 0 or 1; 0 or 1
+  T jitter_s;            // as MocapSensor::jitter_s
+  T exponential, drawn;  // 0 or 1: its law; whether each flight draws its own
 };
 
 inline namespace FLAPPY_ISA {

@@ -12,6 +12,7 @@
 //   [[world.cylinder]] from_m, to_m (ends of its axis), radius_m
 //   [constant_input]  and [[excitation]]: excitation.hpp
 //   [drawn_effects]   effects of the catalogue that each vehicle draws: drawn_effects.hpp
+//   [drawn_jitter]    mocap_s, action_s (0): most jitter of poses and actions; each flight draws its own, uniform from 0
 //   [changes]         what was done to the robot on purpose: model/changes.hpp
 //   [log.power]       battery_nominal_V, rate_hz, latency_s, voltage_noise_V, current_noise_A
 //   [log.wings]       rate_hz, noise_rad

@@ -74,20 +74,28 @@ TEST(LateActions, MayHaveALargestDelayOfEachFlight) {
   FleetOptions options = late_options();
   options.task.action_late_drawn = true;
   Fleet<float> fleet(kFlappers, test::nominal(), options);
-  start(fleet, kFlappers);
-  std::vector<std::size_t> latest(kFlappers), flights(6);
-  float before = 0;
-  for (int n = 0; n < 30; ++n) {
-    const float now = n % 2 == 0 ? 0.8F : -0.8F;
-    act_alike(fleet, kFlappers, now);
-    const std::vector<std::size_t> late = periods_late(fleet, kFlappers, before, now);
-    for (std::size_t i = 0; i < kFlappers; ++i) latest[i] = std::max(latest[i], late[i]);
-    before = now;
-  }
-  for (const std::size_t periods : latest) ++flights[periods];
+  const auto latest_of = [&](std::uint32_t episode) {
+    start(fleet, kFlappers, episode);
+    std::vector<std::size_t> latest(kFlappers);
+    float before = 0;
+    for (int n = 0; n < 30; ++n) {
+      const float now = n % 2 == 0 ? 0.8F : -0.8F;
+      act_alike(fleet, kFlappers, now);
+      const std::vector<std::size_t> late = periods_late(fleet, kFlappers, before, now);
+      for (std::size_t i = 0; i < kFlappers; ++i) latest[i] = std::max(latest[i], late[i]);
+      before = now;
+    }
+    return latest;
+  };
+  const std::vector<std::size_t> one = latest_of(0), other = latest_of(1);
+  std::vector<std::size_t> flights(6);
+  for (const std::size_t periods : one) ++flights[periods];
   // in 30 draws the largest of five numbers is missed in 1 of 800 flights; a standard deviation is 9
   for (std::size_t periods = 0; periods < 5; ++periods)
     EXPECT_NEAR(static_cast<double>(flights[periods]), kFlappers / 5.0, 36) << periods;
+  std::size_t same = 0;  // a flapper draws anew for each flight
+  for (std::size_t i = 0; i < kFlappers; ++i) same += one[i] == other[i] ? 1 : 0;
+  EXPECT_NEAR(static_cast<double>(same), kFlappers / 5.0, 36);
 }
 
 TEST(LateActions, ArePartOfHashAndMemory) {

@@ -272,6 +272,10 @@ TEST(FlyConfig, DrawsAJitterOfEachFlight) {
             source_path("configs/fly/escape_robust.toml") +
                 ":27:11: drawn_jitter.mocap_s: is drawn, but mocap.jitter_s of the sensors is fixed; accepted: one of "
                 "both");
+  EXPECT_NE(
+      refused({"task.action.jitter_s=0.002"}).find("action_s: is drawn, but action.jitter_s of the task is fixed"),
+      std::string::npos);
+  EXPECT_NE(refused({"drawn_jitter.action_s=0.003"}).find("is no whole number of control periods"), std::string::npos);
   EXPECT_EQ(refused({"drawn_jitter.action_s=0.01"}),
             "--set drawn_jitter.action_s=0.01: drawn_jitter.action_s: is no whole number of control periods below "
             "action.repeat_s of the task; accepted: n x 0.002 s, less than 0.01 s");

@@ -62,7 +62,7 @@ EscapeRules read_escape_rules(const fs::path& policy_file, const fs::path& confi
   std::vector<std::string> overrides;
   if (kind == ".json") overrides.push_back("actor=" + io::toml_string(fs::absolute(policy_file).string()));
   rollout::FlyConfig config = rollout::read_fly_config(config_file, overrides);
-  if (config.fleet.task.action_late_drawn) config.fleet.task.action_late_most = 0;  // robots have jitter of their own
+  if (config.fleet.task.action_late_drawn) config.fleet.task.action_late_most = 0;  // they act at once
   const flight::FleetOptions& fleet = config.fleet;
   const bool sees_wings = fleet.task.parts >> static_cast<int>(flight::Part::wings) & 1;
   if (fleet.controller.kind != flight::kind_of<flight::PidController>() || fleet.task.path.size() != 1 || sees_wings ||

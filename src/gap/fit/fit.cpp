@@ -202,7 +202,7 @@ Fitter Fitter::with_scales(Scales scales) const {
     const double before = n.scale;
     if (n.effect >= 0)
       n.scale = effect < f.scales_.effects.size() ? f.scales_.effects[effect] : f.scales_.prior_scale(n.prior);
-    if (n.scale == before && n.scaled.size() > 0) continue;  // shared
+    if (n.scale == before && n.scaled.size() > 0) continue;  // unchanged: shared with the other fitter
     n.scaled = BasisCoefficients(n.scale * *n.column);
   }
   return f;

@@ -34,7 +34,7 @@ struct Directions {
 /// [group][basis] A column that copies share: the fits of a robot's hypotheses have those of its parameters in common.
 class SharedColumn {
  public:
-  SharedColumn(BasisCoefficients column = {})  // NOLINT(google-explicit-constructor): a column is one that is shared
+  SharedColumn(BasisCoefficients column = {})  // NOLINT(google-explicit-constructor): stands wherever a column does
       : column_(std::make_shared<const BasisCoefficients>(std::move(column))) {}
   operator const BasisCoefficients&() const { return *column_; }  // NOLINT(google-explicit-constructor)
   const BasisCoefficients& operator*() const { return *column_; }

@@ -390,21 +390,20 @@ ScaledEvidence RobotFit::weigh(const Hypothesis& hypothesis, const Fit& fit, con
     w.posterior.log_evidence -= 0.5 * std::pow(std::log(law_factor) / law.spread, 2);
     return w;
   };
-  // each law factor: from the best scales so far, and from further starts
-  std::vector<Scales> starts = further_starts(hypothesis, start);
-  const auto best_of = [&](double law_factor, const Scales& from) {
+  // another law factor starts from the best scales so far, in a contrast also from further starts
+  const std::vector<Scales> starts = further_starts(hypothesis, start), none;
+  const auto best_of = [&](double law_factor, const Scales& from, const std::vector<Scales>& others) {
     ScaledEvidence best = with(law_factor, from);
-    for (const Scales& further : starts)
+    for (const Scales& further : others)
       if (ScaledEvidence w = with(law_factor, further); w.posterior.log_evidence > best.posterior.log_evidence)
         best = std::move(w);
     return best;
   };
-  ScaledEvidence best = best_of(1, start);
+  ScaledEvidence best = best_of(1, start, starts);
   if (!fitter_.law_may_deviate(hypothesis, fit)) return best;
-  if (!rules().weighs_from_priors()) starts.clear();
   for (const double step : {std::min(kLawStep, law.most), 1 / std::min(kLawStep, law.most)})
     for (double law_factor = step; law_factor <= law.most && law_factor >= 1 / law.most; law_factor *= step) {
-      ScaledEvidence other = best_of(law_factor, best.scales);
+      ScaledEvidence other = best_of(law_factor, best.scales, rules().weighs_from_priors() ? starts : none);
       if (other.posterior.log_evidence < best.posterior.log_evidence) break;
       best = std::move(other);
     }

@@ -74,8 +74,8 @@ class RobotFit {
   std::vector<SensorFinding> sensors(const Fitter& fitter, const Hypothesis& hypothesis, const Fit& fit) const;
 
   /// Evidence of a hypothesis with its own scales, and with the most probable law factor if the law of an effect may
-  /// deviate. It includes the priors of both. The scales are searched from `start` and from further_starts(); the best
-  /// ones count. `unknown_penalty_nats`: as in Evidence::weigh.
+  /// deviate. It includes the priors of both. The scales are searched from `start` and from priors of some of them;
+  /// the best ones count. `unknown_penalty_nats`: as in Evidence::weigh.
   ScaledEvidence weigh(const Hypothesis& hypothesis, const Fit& fit, const Scales& start,
                        std::optional<double> unknown_penalty_nats = {}) const;
   /// As fitter(), with the priors of another model discrepancy; for contrasts.
@@ -121,7 +121,7 @@ class RobotFit {
     fitter_ = fitter_.with_evidence(std::make_shared<const Evidence>(std::move(evidence)));
   }
   /// Where weigh() also begins: with the backgrounds of the effects of `hypothesis` at their prior scales; in a contrast,
-  /// also with all scales of test flights and backgrounds there.
+  /// also with those of the test flights and of all backgrounds.
   std::vector<Scales> further_starts(const Hypothesis& hypothesis, const Scales& start) const;
   BasisCoefficients change(Residuals there, double steps) const;  ///< [group][basis]
 

@@ -13,8 +13,8 @@
 namespace flappy::gap {
 namespace {
 
-/// So many references of a block has each thread to fly before residuals are used: more would need more memory, and with
-/// fewer, threads would wait for each other. Size: of a loop.
+/// With references, so many flights of a block has each thread to fly before the next vehicles: more would need more
+/// memory, and with fewer, threads would wait for each other. Size: of a loop.
 constexpr std::size_t kJobsOfThread = 4;
 
 /// Errors undone in the log: none for a beat-averaged vehicle, which predicts with its effects of sensors.
@@ -93,9 +93,10 @@ void for_residuals(const Flights& flights, const std::vector<VehicleHypothesis>&
   std::ranges::stable_partition(order, [&](std::size_t i) {
     return sensor_effects(vehicles[i].vehicle.effects).size() == vehicles[i].vehicle.effects.size();
   });
-  // references are kept for a while, so only some vehicles are flown at once
+  // residuals of references are kept until the tests are flown, so only some vehicles are flown at once
   const std::size_t jobs = kJobsOfThread * static_cast<std::size_t>(io::thread_count(threads)),
-                    blocks = std::max<std::size_t>(1, jobs / std::max<std::size_t>(1, flights.references.size())),
+                    flown = (flights.tests.empty() ? flights.references : flights.tests).size(),
+                    blocks = std::max<std::size_t>(1, jobs / std::max<std::size_t>(1, flown)),
                     at_once = flights.references.empty() ? order.size() : blocks * kVehicles;
   for (std::size_t first = 0; first < order.size(); first += at_once) {
     std::vector<const VehicleHypothesis*> these;

@@ -21,8 +21,8 @@ using TestResiduals = std::vector<Rows>;
 /// variates must have the same parameters.
 /// `threads`: as for io::parallel_for.
 std::vector<Residuals> residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads);
-/// The same, but only for a few blocks of vehicles at a time, so that not all residuals are in memory. Calls use(index
-/// of the vehicle, its residuals) for each vehicle, in any order, and on several threads at once.
+/// The same, but hands over the residuals of a block of vehicles as soon as its last flight is flown, so that few are in
+/// memory. Calls use(index of the vehicle, its residuals) for each vehicle, in any order, and on several threads at once.
 void for_residuals(const Flights& flights, const std::vector<VehicleHypothesis>& vehicles, int threads,
                    const std::function<void(std::size_t, Residuals)>& use);
 /// Returns `residual`, which must not be empty, without the reference flights.
