@@ -28,9 +28,9 @@ inline constexpr double kJitterCut = 8;
 template <class T>
 struct MocapConstants {
   T position_noise_m, attitude_noise_rad;
-  T loss_begins, loss_ends;        // probabilities at each sample
-  T jitter_s;            // as MocapSensor::jitter_s
-  T exponential, drawn;  // 0 or 1: its law; whether each flight draws its own
+  T loss_begins, loss_ends;  // probabilities at each sample
+  T jitter_s;                // as MocapSensor::jitter_s
+  T exponential, drawn;      // 0 or 1: its law; whether each flight draws its own
 };
 
 inline namespace FLAPPY_ISA {
