@@ -116,8 +116,9 @@ TEST(LateActions, ArePartOfHashAndMemory) {
 }
 
 TEST(LateActions, AreLateAlikeOnEveryInstructionSet) {
-  const auto hash = [](const std::string& set, const std::string& jitter) {
+  const auto hash = [](const std::string& set, const std::string& jitter, bool drawn = false) {
     FleetOptions o = late_options(jitter);
+    o.task.action_late_drawn = drawn;
     o.batch.instruction_set = set;
     Fleet<float> fleet(20, test::nominal(), o);
     start(fleet, 20);
@@ -128,8 +129,10 @@ TEST(LateActions, AreLateAlikeOnEveryInstructionSet) {
     return fleet.hash();
   };
   const std::vector<std::string> sets = sim::instruction_sets();
-  for (const std::string& set : sets)
-    EXPECT_EQ(hash(set, "jitter_s = 0.006\n"), hash(sets[0], "jitter_s = 0.006\n")) << set;
+  for (const bool drawn : {false, true})
+    for (const std::string& set : sets)
+      EXPECT_EQ(hash(set, "jitter_s = 0.006\n", drawn), hash(sets[0], "jitter_s = 0.006\n", drawn)) << set;
+  EXPECT_NE(hash("", "jitter_s = 0.006\n", true), hash("", "jitter_s = 0.006\n"));
   EXPECT_EQ(hash("", "jitter_s = 0.0\n"), hash("", ""));
   EXPECT_NE(hash("", "jitter_s = 0.006\n"), hash("", ""));
 }
