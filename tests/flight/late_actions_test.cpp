@@ -68,7 +68,7 @@ TEST(LateActions, AreLateByADrawOfTheirOwn) {
   periods_late(fleet, kFlappers, 0, 0.3F);  // after a new start, no action of the flight before acts
 }
 
-// Of five largest delays, each flight draws one: none of its actions is later, and those of the largest reach all five.
+// Each flight draws a largest delay from 0 to 4 control periods. No action of the flight is later, and some are as late.
 TEST(LateActions, MayHaveALargestDelayOfEachFlight) {
   constexpr std::size_t kFlappers = 512;
   FleetOptions options = late_options();

@@ -24,8 +24,8 @@ EffectValues sensors_of(const VehicleHypothesis& h) {
   return sensors;
 }
 
-/// Calls use(i, residual) with the residual of each vehicle with its effects, on any thread, as soon as the last flight
-/// of its block is flown: so few residuals are held at a time. Blocks are filled whatever the errors of the sensors.
+/// Calls use(i, residual) with the residual of each vehicle with its effects, on any thread. It does so when all flights
+/// of the vehicle's block are flown, so that few blocks are in memory. Vehicles with other errors of sensors share one.
 void compare_each(const FlightList& flights, const std::vector<const VehicleHypothesis*>& vehicles, int threads,
                   const std::function<void(std::size_t, Residuals)>& use) {
   std::vector<ComparedVehicle> compared;
