@@ -24,7 +24,7 @@ ALONE = ["singles", "singles_current", "redeclared", "none", "parameters", "own_
 KINDS = {
     "contrast": ["--contrast"],
     "alone": ["--part", *ALONE],
-    "both": ["--part", "singles", "singles_bench", "own_parameters_bench"],
+    "both": ["--part", "singles", "singles_bench", "own_parameters_bench", "--effects", *OF_THE_BENCH],
     "bench": ["--contrast", "--bench", "--part", "changed", "unchanged", "--effects", *OF_THE_BENCH],
 }
 
