@@ -47,11 +47,17 @@ FLAPPY_INLINE void act(const FlightSpace<T>& s, const FlightPlan<T>& plan, Episo
   }
   if (!any_due) return;
   const auto acts = L<T>::load(due) > L<T>(0);
-  L<T> observation[kMaxHistory * kMaxObservation], action[kMaxActions];
+  L<T> observation[kMaxHistory * kMaxObservation], action[kMaxActions], memory[policy::kMaxMemory];
   for (int i = 0; i < plan.observed; ++i) observation[i] = L<T>::load(f.observation[i] + first);
   L<T>* const past = observation + plan.observed;
   for (int i = 0; i < plan.past; ++i) past[i] = L<T>::load(s.past + i * kLanes<T> + first);
-  evaluate(plan.actor, observation, action);
+  const int units = plan.actor.memory();
+  for (int k = 0; k < units; ++k) memory[k] = L<T>::load(s.memory + k * kLanes<T> + first);
+  evaluate(plan.actor, observation, action, memory);
+  for (int k = 0; k < units; ++k) {
+    T* const kept = s.memory + k * kLanes<T> + first;
+    where(acts, memory[k], L<T>::load(kept)).store(kept);
+  }
   for (int i = 0; i < plan.past; ++i) where(acts, observation[i], past[i]).store(s.past + i * kLanes<T> + first);
   if (plan.explores) {
     const auto fresh = sim::normals<L<T>>(plan.seed, static_cast<std::uint32_t>(sim::Stream::exploration), plan.period,

@@ -124,6 +124,10 @@ void Fleet<T>::set_actor(const std::shared_ptr<const policy::Actor>& actor) {
     for (const std::vector<double>* list : {&actor->weights, &actor->mean, &actor->scale})
       for (const double x : *list) s.actor_numbers.push_back(static_cast<T>(x));
   s.point_to_actor();
+  const std::size_t size = static_cast<std::size_t>(s.plan.actor.memory()) * kLanes<T>;
+  if (size == s.recalled_size) return;  // else another network acts, which remembers nothing yet
+  s.recalled_size = size;
+  s.recalled.assign(s.blocks.size() * size, T(0));
 }
 
 template <class T>
@@ -238,7 +242,8 @@ void Fleet<T>::fly_block(std::size_t b) {
                 {&s.ring[(b + 1) * s.ring_size], s.ring_size * sizeof(T)},
                 {&s.queue[(b + 1) * s.queue_size], s.queue_size * sizeof(T)}}};
     s.fly({body.blocks[b], body.effects_of(b), s.blocks[b], &s.ring[b * s.ring_size], &s.queue[b * s.queue_size],
-           s.remembered.data() + b * s.past_size, s.late.data() + b * s.late_size, tap, ahead},
+           s.remembered.data() + b * s.past_size, s.recalled.data() + b * s.recalled_size,
+           s.late.data() + b * s.late_size, tap, ahead},
           plan);
   }
 }
@@ -365,6 +370,13 @@ void Fleet<T>::observation(std::size_t i, T* row) const {
   for (int k = 0; k < plan.past; ++k) row[plan.observed + k] = *storage_->past_at(i, k);
 }
 template <class T>
+std::vector<T> Fleet<T>::actor_memory(std::size_t i) const {
+  Storage& s = *storage_;
+  std::vector<T> all;
+  for (int k = 0; k < s.plan.actor.memory(); ++k) all.push_back(*Storage::number_at(s.recalled, s.recalled_size, i, k));
+  return all;
+}
+template <class T>
 std::array<T, kMaxActions> Fleet<T>::action(std::size_t i) const {
   const auto [f, lane] = storage_->at(i);
   std::array<T, kMaxActions> action;
@@ -463,6 +475,7 @@ std::vector<std::span<std::byte>> Fleet<T>::memory() {
       std::as_writable_bytes(std::span(body.blocks)), std::as_writable_bytes(std::span(s.blocks)),
       std::as_writable_bytes(std::span(s.ring)), std::as_writable_bytes(std::span(s.queue))};
   if (!s.remembered.empty()) all.push_back(std::as_writable_bytes(std::span(s.remembered)));
+  if (!s.recalled.empty()) all.push_back(std::as_writable_bytes(std::span(s.recalled)));
   if (!s.late.empty()) all.push_back(std::as_writable_bytes(std::span(s.late)));
   if (!body.lane_effects.empty()) {
     all.push_back(std::as_writable_bytes(std::span(body.lane_effects)));
@@ -517,6 +530,7 @@ std::uint64_t Fleet<T>::hash(std::size_t first, std::size_t last) const {
     add(storage_->ring, storage_->ring_size);
     add(storage_->queue, storage_->queue_size);
     add(storage_->remembered, storage_->past_size);
+    add(storage_->recalled, storage_->recalled_size);
     add(storage_->late, storage_->late_size);
     all = sim::mixed(all, h);
   }
@@ -526,7 +540,9 @@ std::uint64_t Fleet<T>::hash(std::size_t first, std::size_t last) const {
 template <class T>
 std::size_t Fleet<T>::bytes_per_flapper() const {
   const Storage& s = *storage_;
-  return (sizeof(FlightBlock<T>) + (s.ring_size + s.queue_size + s.past_size + s.late_size) * sizeof(T)) / kLanes<T>;
+  return (sizeof(FlightBlock<T>) +
+          (s.ring_size + s.queue_size + s.past_size + s.recalled_size + s.late_size) * sizeof(T)) /
+         kLanes<T>;
 }
 
 template class Fleet<float>;

@@ -92,6 +92,9 @@ class Fleet {
   void start(std::size_t i, std::uint32_t episode, const Snapshot<T>& snapshot);
   Snapshot<T> snapshot(std::size_t i) const;
 
+  /// What a recurrent actor remembers of flapper `i`; empty for another one.
+  std::vector<T> actor_memory(std::size_t i) const;
+
   /// Sets the actor that acts from now on. With no actor the last actions stay in force. Throws std::invalid_argument
   /// unless its observation and action are those of the task.
   void set_actor(const std::shared_ptr<const policy::Actor>& actor);

@@ -40,7 +40,8 @@ struct Fleet<T>::Storage {
   std::vector<T> ring, queue;  // [block][slot][row][lane]
   std::vector<T> remembered;   // earlier observations: [block][action ago][row of the observation][lane]
   std::vector<T> late;         // [block]: FlightSpace::late
-  std::size_t ring_size, queue_size, past_size, late_size;
+  std::vector<T> recalled;     // [block]: FlightSpace::memory
+  std::size_t ring_size, queue_size, past_size, late_size, recalled_size = 0;
   std::vector<Segment<T>> path;
   std::shared_ptr<const policy::Actor> actor;
   std::vector<T> actor_numbers;
@@ -236,6 +237,8 @@ void Fleet<T>::Storage::start_lane(std::size_t i, std::uint32_t episode, const T
   Episode<double> fresh{};
   for (int k = 0; k < plan.actions; ++k) fresh.adds[k] = scaled(k, 0);
   put(fresh, f.episode, lane);
+  for (std::size_t k = static_cast<std::size_t>(lane); k < recalled_size; k += kLanes<T>)
+    recalled[i / kLanes<T> * recalled_size + k] = T(0);
   if (late_size > 0)
     for (int k = 0; k < kMaxActions; ++k) *number_at(late, late_size, i, k) = static_cast<T>(fresh.adds[k]);
 }

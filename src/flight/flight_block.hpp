@@ -46,9 +46,10 @@ struct FlightSpace {
   sim::Block<T>& body;
   sim::BlockEffects<T> effects;
   FlightBlock<T>& flight;
-  T* ring;   // IMU increments that the estimator may still apply, [slot][row of Increment][lane]
-  T* queue;  // motion-capture poses in transit, [slot][row of MocapSample][lane]
-  T* past;   // earlier observations, [action ago][row of the observation][lane]; unused without a history
+  T* ring;    // IMU increments that the estimator may still apply, [slot][row of Increment][lane]
+  T* queue;   // motion-capture poses in transit, [slot][row of MocapSample][lane]
+  T* past;    // earlier observations, [action ago][row of the observation][lane]; unused without a history
+  T* memory;  // of a recurrent actor, [unit][lane]; unused without one
   // [kLateRows][lane]: the offsets or voltages that act now, then the delay of the last action in control periods. It is
   // used only if late_most > 0.
   T* late;

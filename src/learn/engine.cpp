@@ -117,7 +117,8 @@ class TorchEngine : public LearnerEngine {
   }
   void set_actor(const policy::Actor& a) override {
     if (a.widths != blank_.widths || a.hidden != blank_.hidden || a.layer_norm != blank_.layer_norm ||
-        a.linear != blank_.linear || actor_at_ + a.weights.size() != learner_->count())
+        a.linear != blank_.linear || a.recurrent != blank_.recurrent ||
+        actor_at_ + a.weights.size() != learner_->count())
       throw std::invalid_argument("the actor's layers are not those of the learner");
     for (const TorchLearner::Kind kind : {TorchLearner::Kind::weights, TorchLearner::Kind::targets}) {
       std::vector<double> all = numbers(kind);

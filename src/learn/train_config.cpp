@@ -14,8 +14,8 @@ namespace {
 using Overrides = std::vector<std::string>;
 
 /// Keys of the training configuration itself; overrides of other keys apply to the configuration of its flights.
-const Overrides kOwn = {"schema",  "fly",    "seed",  "threads",  "observation", "networks",
-                        "collect", "reward", "learn", "evaluate", "checkpoint",  "dds"};
+const Overrides kOwn = {"schema", "fly",   "seed",     "threads",    "observation", "networks", "collect",
+                        "reward", "learn", "evaluate", "checkpoint", "student",     "dds"};
 
 std::pair<Overrides, Overrides> routed(const Overrides& overrides) {
   std::pair<Overrides, Overrides> own_and_flown;
@@ -50,7 +50,7 @@ class Reader {
       : main_(io::Config::load(path, own)), root_(main_.root()) {
     root_.schema(1);
     root_.accept({"schema", "fly", "seed", "threads", "networks", "observation", "collect", "reward", "learn",
-                  "evaluate", "checkpoint", "dds"});
+                  "evaluate", "checkpoint", "student", "dds"});
     c_.fly = rollout::read_fly_config(root_.file("fly"), flown);
   }
 
@@ -64,6 +64,7 @@ class Reader {
     read_networks();
     read_collection();
     read_learning();
+    if (const auto student = root_.optional_table("student")) read_student(*student);
     if (root_.has("dds")) c_.fly.dds = io::read_dds_config(root_);
     root_.finish();
     c_.fly.fleet.batch.threads = c_.threads;
@@ -176,6 +177,29 @@ class Reader {
     const io::Table p = root_.table("checkpoint");
     c_.checkpoint_every = whole_steps(p, "every");
     c_.keep = static_cast<std::size_t>(p.integer_or("keep", 2, 1, 1000));
+  }
+
+  void read_student(const io::Table& t) {
+    const auto whole = [&](const char* key, std::int64_t least, std::int64_t most) {
+      return static_cast<std::size_t>(t.integer(key, least, most));
+    };
+    if (!has_libtorch())
+      root_.fail("student", "learns by LibTorch, which this build has not",
+                 "the package flappy-torch, or a build with libtorch-dev installed");
+    StudentOptions s;
+    s.teachers = whole("teachers", 1, 100'000);
+    s.teacher_updates = static_cast<std::uint64_t>(whole("teacher_updates", 1, 1'000'000'000));
+    s.memory = static_cast<int>(whole("memory", 0, policy::kMaxMemory));
+    s.hidden = widths(t, "hidden");
+    s.rounds = whole("rounds", 1, 1'000'000);
+    s.flights = whole("flights", 1, 1 << 20);
+    s.steps = whole("steps", 1, 1'000'000);
+    s.batch = whole("batch", 1, 1 << 20);
+    s.kept = whole("kept", 1, 10'000);
+    s.led = whole("led", 0, 1'000'000);
+    s.rate = t.number("rate", io::positive(1));
+    s.last_rate = t.number_or("last_rate", 1, {0, 1});
+    c_.student = s;
   }
 
   void keep_texts() {

@@ -9,7 +9,7 @@
 #include "io/parallel.hpp"
 #include "io/sha256.hpp"
 #include "learn/collector.hpp"
-#include "learn/metrics.hpp"
+#include "learn/student.hpp"
 #include "rollout/evaluation.hpp"
 
 namespace flappy::learn {
@@ -48,7 +48,7 @@ class Trainer {
   TrainSummary run() {
     const fs::path& folder = options_.folder;
     if (options_.from) resume(Checkpoint(*options_.from));
-    else if (writes()) write_config();
+    else if (writes()) write_config(config_, folder);
     if (writes()) {
       Metrics::check(folder, kColumns, records_);  // what is refused removes nothing
       if (options_.from) forget_after(updates());  // before records are cut that later checkpoints need
@@ -62,7 +62,7 @@ class Trainer {
     }
     publish();
     if (!options_.from) save();  // from now on the run can be resumed if it is killed
-    if (writes() && !fs::exists(folder / "run.json")) write_start();
+    if (writes() && !fs::exists(folder / "run.json")) write_start(config_, options_, learner_.describe());
     start_ = last_ = mark();
     bool going = true;
     while (going && updates() < config_.updates) {
@@ -250,28 +250,6 @@ class Trainer {
     if (!writes()) return;
     policy::write_actor(options_.folder / "best.json", best_);
     policy::write_actor(options_.folder / "last.json", policy_);
-  }
-
-  void write_config() {
-    fs::create_directories(options_.folder / "config");
-    for (const auto& [name, text] : config_.resolved) io::write_atomically(options_.folder / "config" / name, text);
-  }
-
-  void write_start() {
-    const TrainCosts costs = costs_of(config_);
-    const nlohmann::ordered_json run = {{"schema", 1},
-                                        {"task", config_.fly.fleet.task.name},
-                                        {"seed", config_.seed},
-                                        {"commit", options_.commit},
-                                        {"processor", processor()},
-                                        {"instruction_set", sim::best_instruction_set()},
-                                        {"engine", learner_.describe()},
-                                        {"config_sha256", config_.sha256},
-                                        {"init", options_.init != nullptr},
-                                        {"init_sha256", options_.init ? options_.init->sha256 : ""},
-                                        {"memory_bytes", costs.memory_bytes},
-                                        {"disk_bytes", costs.disk_bytes}};
-    io::write_atomically(options_.folder / "run.json", run.dump(2) + "\n");
   }
 
   void save() {
@@ -515,7 +493,37 @@ std::optional<fs::path> unfinished_run_in(const fs::path& folder) {
   return newest_checkpoint(folder).path();
 }
 
+void write_summary(const fs::path& folder, TrainSummary& summary) {
+  summary.policy_sha256 = io::sha256(io::read_text(folder / "best.json"));
+  io::write_atomically(folder / "summary.json", json_of(summary).dump(2) + "\n");
+}
+
+const MetricsColumns& train_columns() { return kColumns; }
+
+void write_config(const TrainConfig& config, const fs::path& folder) {
+  fs::create_directories(folder / "config");
+  for (const auto& [name, text] : config.resolved) io::write_atomically(folder / "config" / name, text);
+}
+
+void write_start(const TrainConfig& config, const TrainOptions& options, const std::string& engine) {
+  const TrainCosts costs = costs_of(config);
+  const nlohmann::ordered_json run = {{"schema", 1},
+                                      {"task", config.fly.fleet.task.name},
+                                      {"seed", config.seed},
+                                      {"commit", options.commit},
+                                      {"processor", processor()},
+                                      {"instruction_set", sim::best_instruction_set()},
+                                      {"engine", engine},
+                                      {"config_sha256", config.sha256},
+                                      {"init", options.init != nullptr},
+                                      {"init_sha256", options.init ? options.init->sha256 : ""},
+                                      {"memory_bytes", costs.memory_bytes},
+                                      {"disk_bytes", costs.disk_bytes}};
+  io::write_atomically(options.folder / "run.json", run.dump(2) + "\n");
+}
+
 TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
+  if (config.student) return train_student(config, options);
   if (options.init && !options.from) refuse_other_networks(config, *options.init);
   io::make_folder(options.folder);
   const bool writes = io::writes(options.ranks);
@@ -524,9 +532,7 @@ TrainSummary train(const TrainConfig& config, const TrainOptions& options) {
   if (writes && !options.from) refuse_run_in(options.folder);
   Trainer trainer(config, options);
   TrainSummary summary = trainer.run();
-  if (!writes) return summary;
-  summary.policy_sha256 = io::sha256(io::read_text(options.folder / "best.json"));
-  io::write_atomically(options.folder / "summary.json", json_of(summary).dump(2) + "\n");
+  if (writes) write_summary(options.folder, summary);
   return summary;
 }
 

@@ -18,6 +18,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 
+#include "learn/metrics.hpp"
 #include "learn/train_config.hpp"
 
 namespace flappy::learn {
@@ -53,6 +54,7 @@ struct TrainOptions {
   std::string commit;          ///< commit of the program
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();  ///< start of the process
   std::function<bool(const TrainProgress&)> keep_going;  ///< called after each step; false: save a checkpoint and stop
+  bool goes_on = false;                                  ///< of a student: the folder may hold this run already
 };
 
 struct TrainSummary {
@@ -73,6 +75,14 @@ struct TrainSummary {
 };
 inline constexpr double kSuccessLevels[4] = {0.5, 0.8, 0.9, 0.95};
 
+/// Columns of a run's records.
+const MetricsColumns& train_columns();
+/// Writes config/ and run.json. `engine`: LearnerEngine::describe().
+void write_config(const TrainConfig& config, const std::filesystem::path& folder);
+/// Writes summary.json, with the hash of best.json.
+void write_summary(const std::filesystem::path& folder, TrainSummary& summary);
+void write_start(const TrainConfig& config, const TrainOptions& options, const std::string& engine);
+
 /// Memory of a run, and upper bound of its files on disk.
 struct TrainCosts {
   std::size_t memory_bytes = 0, disk_bytes = 0;
@@ -92,7 +102,8 @@ void refuse_other_run_in(const std::filesystem::path& folder, const TrainConfig&
 nlohmann::ordered_json finished_run_in(const std::filesystem::path& folder);
 /// The newest checkpoint of a run that is not finished; empty if there is none.
 std::optional<std::filesystem::path> unfinished_run_in(const std::filesystem::path& folder);
-/// Throws io::InputError for another run in the folder, an unfit checkpoint, a full disk, or diverged learning.
+/// Throws io::InputError for another run in the folder, an unfit checkpoint, a full disk, or diverged learning. Of a
+/// configuration with a student, train_student() (student.hpp).
 TrainSummary train(const TrainConfig& config, const TrainOptions& options);
 TrainCosts costs_of(const TrainConfig& config);
 /// Processor type of this machine, as in /proc/cpuinfo.

@@ -16,9 +16,14 @@ using Json = nlohmann::ordered_json;
 
 }  // namespace
 
-std::size_t weight_count(const std::vector<int>& widths, bool layer_norm) {
-  std::size_t n = 0;
-  for (std::size_t i = 0; i + 1 < widths.size(); ++i)
+std::size_t weight_count(const std::vector<int>& widths, bool layer_norm, bool recurrent) {
+  std::size_t n = 0, first = 0;
+  if (recurrent) {
+    const auto inputs = static_cast<std::size_t>(widths[0]), units = static_cast<std::size_t>(widths[1]);
+    n = 3 * units * (inputs + 1 + units + 1);
+    first = 1;
+  }
+  for (std::size_t i = first; i + 1 < widths.size(); ++i)
     n += static_cast<std::size_t>(widths[i] + 1 + (layer_norm && i + 2 < widths.size() ? 2 : 0)) *
          static_cast<std::size_t>(widths[i + 1]);
   return n;
@@ -59,6 +64,7 @@ Actor read_actor(const std::filesystem::path& path) {
       if (output != "tanh" && output != "linear") refuse(path, "output is \"" + output + "\"", "tanh or linear");
       a.linear = output == "linear";
     }
+    if (json.contains("recurrent")) a.recurrent = json.at("recurrent").get<bool>();
     a.mean = json.at("mean").get<std::vector<double>>();
     a.scale = json.at("scale").get<std::vector<double>>();
     a.clip = json.at("clip").get<double>();
@@ -69,6 +75,9 @@ Actor read_actor(const std::filesystem::path& path) {
   const auto layers = static_cast<int>(a.widths.size()) - 1;
   if (layers < 1 || layers > kMaxLayers)
     refuse(path, "has " + std::to_string(layers) + " layers", "1 to " + std::to_string(kMaxLayers));
+  if (a.recurrent && (layers < 2 || a.widths[1] > kMaxMemory))
+    refuse(path, "is recurrent with " + (layers < 2 ? "one layer" : std::to_string(a.widths[1]) + " units"),
+           "two layers or more, 1 to " + std::to_string(kMaxMemory) + " units");
   if (!(a.clip > 0 && a.clip <= 1e30))
     refuse(path, "clip is " + io::shortest_digits(a.clip), "a number above 0, at most 1e30");
   const auto count = [&](const char* name, std::size_t have, std::size_t want) {
@@ -82,7 +91,7 @@ Actor read_actor(const std::filesystem::path& path) {
   if (a.action.empty() || a.action.size() > kMaxActions)
     refuse(path, "action has " + std::to_string(a.action.size()) + " entries", "1 to " + std::to_string(kMaxActions));
   count("action", a.action.size(), static_cast<std::size_t>(a.widths.back()));
-  count("weights", a.weights.size(), weight_count(a.widths, a.layer_norm));
+  count("weights", a.weights.size(), weight_count(a.widths, a.layer_norm, a.recurrent));
   for (const auto* numbers : {&a.mean, &a.scale, &a.weights})
     for (const double x : *numbers)
       if (!(std::abs(x) <= static_cast<double>(std::numeric_limits<float>::max())))
@@ -98,6 +107,7 @@ void write_actor(const std::filesystem::path& path, const Actor& a) {
                {"weights", a.weights}};
   if (a.layer_norm) json["layer_norm"] = true;
   if (a.linear) json["output"] = "linear";
+  if (a.recurrent) json["recurrent"] = true;
   io::write_atomically(path, json.dump() + "\n");
 }
 

@@ -16,6 +16,7 @@ struct Actor {
   Activation hidden = Activation::relu;
   bool layer_norm = false;  ///< layer norm before each hidden activation
   bool linear = false;      ///< the last layer is clamped to [-1, 1], without tanh
+  bool recurrent = false;   ///< the first layer is a GRU
   std::vector<double> weights, mean, scale;
   double clip = 10;
 };
@@ -24,7 +25,8 @@ struct Actor {
 Actor read_actor(const std::filesystem::path& path);
 void write_actor(const std::filesystem::path& path, const Actor& actor);
 
-/// Number of weights of a network with these widths; with layer norm, gains and shifts included.
-std::size_t weight_count(const std::vector<int>& widths, bool layer_norm = false);
+/// Number of weights of a network with these widths; with layer norm, gains and shifts included. `recurrent`: the first
+/// layer is a GRU.
+std::size_t weight_count(const std::vector<int>& widths, bool layer_norm = false, bool recurrent = false);
 
 }  // namespace flappy::policy

@@ -22,8 +22,8 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kOnnxPlugin = "onnx";
 
 /// Runs under python3 with the file and the number of observations. It says in one line of JSON what the file is, then
-/// answers each int64 count and float[count][observations] by int64 size and float[size], or by minus the size of a
-/// complaint and the complaint.
+/// answers each int64 count and float[count][width] by int64 size and float[size], or by minus the size of a complaint
+/// and the complaint. A row holds an observation and, if the file has a second input, the memory; so do answers.
 constexpr const char* kOnnxRuntime = R"(
 import json, signal, struct, sys
 signal.signal(signal.SIGINT, signal.SIG_IGN)  # who asks decides
@@ -47,10 +47,13 @@ except Exception as e:
 def sides(values):
     return [{"name": v.name, "type": v.type, "shape": [n if isinstance(n, int) else -1 for n in v.shape]} for v in values]
 say(inputs=sides(session.get_inputs()), outputs=sides(session.get_outputs()))
-seen, width = session.get_inputs()[0], int(sys.argv[2])
-single = seen.shape[0] == 1
+seen, width = session.get_inputs(), int(sys.argv[2])
+single, split = seen[0].shape[0] == 1, [width][: len(seen) - 1]
+width += sum(v.shape[1] for v in seen[1:] if isinstance(v.shape[1], int))
 def act(rows):
-    return session.run([session.get_outputs()[0].name], {seen.name: rows})[0]
+    parts = [numpy.ascontiguousarray(part) for part in numpy.split(rows, split, 1)]
+    made = session.run([v.name for v in session.get_outputs()], {v.name: part for v, part in zip(seen, parts)})
+    return numpy.concatenate(made, 1) if split else made[0]
 while len(head := ours.read(8)) == 8:
     count = struct.unpack("=q", head)[0]
     rows = numpy.frombuffer(ours.read(4 * count * width), numpy.float32).reshape(count, width)
@@ -103,9 +106,10 @@ class OnnxRuntime : public Policy {
     std::string complaint;
     try {
       python_.write(&rows, sizeof rows);
-      python_.write(observation, count * static_cast<std::size_t>(observations()) * sizeof(float));
+      python_.write(observation, count * static_cast<std::size_t>(observations() + memory()) * sizeof(float));
       python_.read(&size, sizeof size);
-      if (size == rows * actions()) return python_.read(action, static_cast<std::size_t>(size) * sizeof(float));
+      if (size == rows * (actions() + memory()))
+        return python_.read(action, static_cast<std::size_t>(size) * sizeof(float));
       complaint.resize(size < 0 ? static_cast<std::size_t>(-size) : 0);
       python_.read(complaint.data(), complaint.size());
     } catch (const std::runtime_error& e) {
@@ -114,6 +118,9 @@ class OnnxRuntime : public Policy {
     if (size < 0) refuse(path_, "cannot be evaluated: " + reason(complaint), sizes());
     refuse(path_, "makes " + std::to_string(size) + " numbers of " + std::to_string(count) + " observations", sizes());
   }
+
+  /// A file that is recurrent: its second input is the memory.
+  void set_memory(int units) { memory_ = units; }
 
   std::string sizes() const {
     return "float[n][" + std::to_string(observations()) + "] to float[n][" + std::to_string(actions()) +
@@ -159,15 +166,25 @@ std::unique_ptr<const Policy> load_onnx(const fs::path& path, int observations, 
     refuse(path, "cannot be flown: python3: " + file["missing"].get<std::string>(), runtime);
   if (file.contains("refused"))
     refuse(path, "is not read by onnxruntime: " + reason(file["refused"]), "an ONNX file of an opset that it knows");
+  const bool recurrent = file.at("inputs").size() == 2 && file.at("outputs").size() == 2;
+  int units = 0;
   for (const auto& [side, width] : {std::pair("inputs", observations), std::pair("outputs", actions)}) {
     const Json& values = file.at(side);
-    if (values.size() != 1)
-      refuse(path, "has " + std::to_string(values.size()) + " " + side, "one input and one output, " + policy->sizes());
+    if (values.size() != 1 && !recurrent)
+      refuse(path, "has " + std::to_string(values.size()) + " " + side,
+             "one input and one output, " + policy->sizes() + "; or two of each, with the memory second");
     if (!fits(values[0], width))
       refuse(path, values[0].at("name").get<std::string>() + " is " + shape_of(values[0]), policy->sizes());
+    if (!recurrent) continue;
+    const Json& shape = values[1].at("shape");
+    if (units == 0 && shape.size() == 2) units = std::max(0, shape[1].get<int>());
+    if (units == 0 || shape.size() != 2 || shape[1] != units || !fits(values[1], units))
+      refuse(path, values[1].at("name").get<std::string>() + " is " + shape_of(values[1]),
+             "a memory of float[n][units], as wide before as after");
   }
-  const std::vector<float> nothing(2 * static_cast<std::size_t>(observations));
-  std::vector<float> action(2 * static_cast<std::size_t>(actions));
+  policy->set_memory(units);
+  const std::vector<float> nothing(2 * static_cast<std::size_t>(observations + units));
+  std::vector<float> action(2 * static_cast<std::size_t>(actions + units));
   policy->act(2, nothing.data(), action.data());
   return policy;
 }

@@ -21,13 +21,14 @@ using OnnxMetadata = std::vector<std::pair<std::string, std::string>>;
 /// Whether this build or installation has the ONNX library's plugin.
 bool writes_onnx();
 
-/// The bytes of an ONNX file from `observation`, float[n][inputs], to `action`, float[n][outputs]: raw numbers in their
+/// The bytes of an ONNX file from `observation`, float[n][observations], to `action`, float[n][actions]: raw numbers in their
 /// units, normalisation, clip and output range inside; zeros for an observation with a NaN. Equal arguments give equal
-/// bytes. Throws std::invalid_argument without the plugin.
+/// bytes. A recurrent policy has the further input `memory` and output `next_memory`, float[n][units]. Throws
+/// std::invalid_argument without the plugin.
 std::string onnx_model(const PolicyNetwork& network, const OnnxMetadata& metadata);
 
 /// load_policy() for ONNX files, of any opset that onnxruntime reads: one input, one output, both float[n][numbers] or
-/// float[1][numbers]. Throws io::InputError, where python3 has no onnxruntime, too.
+/// float[1][numbers]; or two of each, of which the second is the memory. Throws io::InputError, where python3 has no onnxruntime, too.
 std::unique_ptr<const Policy> load_onnx(const std::filesystem::path& path, int observations, int actions);
 
 /// The version of the onnxruntime of python3; empty where it has none.

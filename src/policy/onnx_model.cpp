@@ -103,20 +103,21 @@ std::string write(const PolicyNetwork& n, const OnnxMetadata& metadata) {
   }
   onnx::GraphProto* proto = model.mutable_graph();
   proto->set_name("policy");
-  declare(proto->add_input(), "observation", n.inputs());
-  declare(proto->add_output(), "action", n.outputs());
+  declare(proto->add_input(), "observation", n.observations());
+  if (n.recurrent) declare(proto->add_input(), "memory", n.memory());
+  declare(proto->add_output(), "action", n.actions());
+  if (n.recurrent) declare(proto->add_output(), "next_memory", n.memory());
   Graph graph(*proto);
 
-  graph.node("Sub", {"observation", graph.constant("mean", {n.inputs()}, n.mean)}, "centred");
-  graph.node("Mul", {"centred", graph.constant("scale", {n.inputs()}, n.scale)}, "scaled");
+  graph.node("Sub", {"observation", graph.constant("mean", {n.observations()}, n.mean)}, "centred");
+  graph.node("Mul", {"centred", graph.constant("scale", {n.observations()}, n.scale)}, "scaled");
   graph.node("Clip", {"scaled", graph.constant("lowest", {}, {-n.clip}), graph.constant("highest", {}, {n.clip})},
              "normalised");
   std::string x = "normalised";
   const float* weights = n.weights.data();
   const auto take = [&](std::size_t count) { return std::vector<float>(weights, weights + count); };
-  for (std::size_t layer = 0; layer + 1 < n.widths.size(); ++layer) {
-    const int inputs = n.widths[layer], outputs = n.widths[layer + 1];
-    const std::string number = std::to_string(layer);
+  /// Adds the sums of a layer's outputs over `of` and returns their name.
+  const auto sums = [&](const std::string& of, int inputs, int outputs, const std::string& number) {
     std::vector<float> bias, weight;
     for (int o = 0; o < outputs; ++o) {  // for each output its bias, then one weight for each input
       bias.push_back(*weights++);
@@ -124,11 +125,37 @@ std::string write(const PolicyNetwork& n, const OnnxMetadata& metadata) {
       weights += inputs;
     }
     onnx::NodeProto& sum = graph.node("Gemm",
-                                      {x, graph.constant("weight" + number, {outputs, inputs}, weight),
+                                      {of, graph.constant("weight" + number, {outputs, inputs}, weight),
                                        graph.constant("bias" + number, {outputs}, bias)},
                                       "sum" + number);
     set(sum, "transB", std::int64_t{1});
-    x = "sum" + number;
+    return "sum" + number;
+  };
+  if (n.recurrent) {
+    const int units = n.memory();
+    const std::string seen = sums(x, n.observations(), 3 * units, "_seen");
+    const std::string kept = sums("memory", units, 3 * units, "_kept");
+    for (const std::string& of : {seen, kept}) {
+      onnx::NodeProto& parts = graph.node("Split", {of}, of + "_reset");
+      for (const char* part : {"_update", "_new"}) parts.add_output(of + part);
+      set(parts, "axis", std::int64_t{1});
+    }
+    for (const std::string gate : {"reset", "update"}) {
+      graph.node("Add", {seen + "_" + gate, kept + "_" + gate}, gate + "_sum");
+      graph.node("Sigmoid", {gate + "_sum"}, gate);
+    }
+    graph.node("Mul", {"reset", kept + "_new"}, "recalled");
+    graph.node("Add", {seen + "_new", "recalled"}, "new_sum");
+    graph.node("Tanh", {"new_sum"}, "new");
+    graph.node("Sub", {"memory", "new"}, "change");
+    graph.node("Mul", {"update", "change"}, "stays");
+    graph.node("Add", {"new", "stays"}, "remembered");
+    x = "remembered";
+  }
+  for (std::size_t layer = n.recurrent ? 1 : 0; layer + 1 < n.widths.size(); ++layer) {
+    const int outputs = n.widths[layer + 1];
+    const std::string number = std::to_string(layer);
+    x = sums(x, n.widths[layer], outputs, number);
     const bool last = layer + 2 == n.widths.size();
     if (n.layer_norm && !last) {
       const auto width = static_cast<std::size_t>(outputs);
@@ -146,13 +173,14 @@ std::string write(const PolicyNetwork& n, const OnnxMetadata& metadata) {
   // after tanh too: that of a runtime may be larger than 1 (onnxruntime 1.32: 1.0000002)
   graph.node("Clip", {x, graph.constant("minus_one", {}, {-1}), graph.constant("one", {}, {1})}, "end");
   x = "end";
-  graph.node("Mul", {x, graph.constant("half", {n.outputs()}, n.half)}, "offset");
-  graph.node("Add", {"offset", graph.constant("middle", {n.outputs()}, n.middle)}, "answer");
+  graph.node("Mul", {x, graph.constant("half", {n.actions()}, n.half)}, "offset");
+  graph.node("Add", {"offset", graph.constant("middle", {n.actions()}, n.middle)}, "answer");
   graph.node("IsNaN", {"observation"}, "nan");
   set(graph.node("Cast", {"nan"}, "nan_number"), "to", std::int64_t{onnx::TensorProto::FLOAT});
   set_axes(graph.node("ReduceMax", {"nan_number"}, "any_nan"), 1);
   set(graph.node("Cast", {"any_nan"}, "refused"), "to", std::int64_t{onnx::TensorProto::BOOL});
   graph.node("Where", {"refused", graph.constant("nothing", {}, {0}), "answer"}, "action");
+  if (n.recurrent) graph.node("Where", {"refused", "memory", "remembered"}, "next_memory");
   onnx::checker::check_model(model);
   return model.SerializeAsString();
 }

@@ -26,8 +26,18 @@ using io::refuse;
 constexpr const char* kWrapper = R"(#if !defined FLAPPY_POLICY_OBS || !defined FLAPPY_POLICY_ACT
 #error FLAPPY_POLICY_OBS or FLAPPY_POLICY_ACT is missing
 #endif
+#ifndef FLAPPY_POLICY_MEMORY
+#define FLAPPY_POLICY_MEMORY 0
+#endif
 const int flappy_loaded_observations = FLAPPY_POLICY_OBS, flappy_loaded_actions = FLAPPY_POLICY_ACT;
-void flappy_loaded_step(const float *observation, float *action) { flappy_policy_step(observation, action); }
+const int flappy_loaded_memory = FLAPPY_POLICY_MEMORY;
+void flappy_loaded_step(const float *observation, float *action) {
+#if FLAPPY_POLICY_MEMORY > 0
+  flappy_policy_of(observation, action);
+#else
+  flappy_policy_step(observation, action);
+#endif
+}
 int flappy_loaded_selftest(void) { return flappy_policy_selftest(); }
 )";
 
@@ -70,13 +80,13 @@ std::string first_error(const fs::path& header, const std::string& complaints) {
 class Header : public Policy {
  public:
   using Step = void (*)(const float*, float*);
-  Header(io::SharedLibrary library, int observations, int actions, Step step)
-      : Policy(observations, actions), library_(std::move(library)), step_(step) {}
+  Header(io::SharedLibrary library, int observations, int actions, int memory, Step step)
+      : Policy(observations, actions, memory), library_(std::move(library)), step_(step) {}
 
   void act(std::size_t count, const float* observation, float* action) const override {
     for (std::size_t i = 0; i < count; ++i)
-      step_(observation + i * static_cast<std::size_t>(observations()),
-            action + i * static_cast<std::size_t>(actions()));
+      step_(observation + i * static_cast<std::size_t>(observations() + memory()),
+            action + i * static_cast<std::size_t>(actions() + memory()));
   }
 
  private:
@@ -102,10 +112,11 @@ std::unique_ptr<const Policy> load_header(const fs::path& path, int observations
   }
   const auto symbol = [&, &from = *loaded](const char* name) { return from.symbol((prefix + name).c_str()); };
   const auto number = [&](const char* name) { return *static_cast<const int*>(symbol(name)); };
-  const int has_observations = number("_loaded_observations"), has_actions = number("_loaded_actions");
+  const int has_observations = number("_loaded_observations"), has_actions = number("_loaded_actions"),
+            memory = number("_loaded_memory");
   const auto step = reinterpret_cast<Header::Step>(symbol("_loaded_step"));
   const auto selftest = reinterpret_cast<int (*)()>(symbol("_loaded_selftest"));
-  auto policy = std::make_unique<Header>(std::move(*loaded), has_observations, has_actions, step);
+  auto policy = std::make_unique<Header>(std::move(*loaded), has_observations, has_actions, memory, step);
   if (policy->observations() != observations || policy->actions() != actions)
     refuse(header,
            "has " + std::to_string(policy->observations()) + " inputs and " + std::to_string(policy->actions()) +

@@ -17,22 +17,26 @@ class Policy {
 
   int observations() const { return observations_; }
   int actions() const { return actions_; }
-  /// `observation`: float[count][observations()]; `action`: float[count][actions()]. Call it from one thread at a time.
+  int memory() const { return memory_; }  ///< numbers that a recurrent policy remembers; 0 before a flight
+  /// `observation`: float[count][observations() + memory()]; `action`: float[count][actions() + memory()], behind each
+  /// action the next memory. Call it from one thread at a time.
   virtual void act(std::size_t count, const float* observation, float* action) const = 0;
 
  protected:
-  Policy(int observations, int actions) : observations_(observations), actions_(actions) {}
+  Policy(int observations, int actions, int memory = 0)
+      : observations_(observations), actions_(actions), memory_(memory) {}
 
- private:
-  int observations_, actions_;
+  int observations_, actions_, memory_;
 };
 
 /// Loads a TorchScript file (.pt) whose forward(float[n][observations]) gives float[n][actions], an ONNX file (.onnx,
-/// load_onnx()) or a C header (.h) that defines
+/// load_onnx()) or a C header (.h). A recurrent TorchScript has an integer attribute "memory", and its
+/// forward(float[n][observations], float[n][memory]) gives action and next memory. A header defines
 ///   FLAPPY_POLICY_OBS, FLAPPY_POLICY_ACT
 ///   void flappy_policy_step(const float obs[FLAPPY_POLICY_OBS], float action[FLAPPY_POLICY_ACT])
 ///   int flappy_policy_selftest(void)    0: passed; it is run on loading
-/// or these names with another prefix than "flappy". Throws io::InputError, one line, if the file is of no such kind,
+/// or these names with another prefix than "flappy". A recurrent one has FLAPPY_POLICY_MEMORY above 0 and, in place of the
+/// step, flappy_policy_of(const float in[OBS + MEMORY], float out[ACT + MEMORY]). Throws io::InputError, one line, if the file is of no such kind,
 /// has other sizes, does not compile or fails its self-test.
 std::unique_ptr<const Policy> load_policy(const std::filesystem::path& path, int observations, int actions);
 

@@ -23,7 +23,8 @@ template <class T>
 Rollout<T>::Rollout(FlyConfig config, std::size_t count, const policy::Policy* policy, Hover* hover)
     : config_(std::move(config)),
       fleet_(count, config_.vehicle, options_of(config_, count, policy != nullptr)),
-      policy_(policy) {
+      policy_(policy),
+      memory_(policy == nullptr ? 0 : count * static_cast<std::size_t>(policy->memory()), 0) {
   Hover own;
   if (hover == nullptr) hover = &own;
   const bool settled = config_.fleet.task.start.settled;
@@ -74,21 +75,26 @@ template <class T>
 void Rollout<T>::act() {
   std::vector<std::size_t> acting;
   std::vector<float> observation;
+  const auto units = static_cast<std::size_t>(policy_->memory());
   for (std::size_t i = 0; i < fleet_.size(); ++i) {
     if (fleet_.handed_back(i)) continue;
     acting.push_back(i);
     for (const double x : fleet_.observation(i)) observation.push_back(static_cast<float>(x));
+    const float* const memory = memory_.data() + i * units;
+    observation.insert(observation.end(), memory, memory + units);
   }
   if (acting.empty()) return;
-  if (observation.size() != acting.size() * static_cast<std::size_t>(policy_->observations()) ||
+  if (observation.size() != acting.size() * (static_cast<std::size_t>(policy_->observations()) + units) ||
       policy_->actions() != config_.fleet.task.actions())
     throw std::invalid_argument("the policy's observation or action is not that of the task");
-  const auto outputs = static_cast<std::size_t>(policy_->actions());
+  const auto actions = static_cast<std::size_t>(policy_->actions()), outputs = actions + units;
   std::vector<float> action(acting.size() * outputs);
   policy_->act(acting.size(), observation.data(), action.data());
-  const std::vector<double> adds(action.begin(), action.end());
-  for (std::size_t row = 0; row < acting.size(); ++row)
-    fleet_.set_adds(acting[row], std::span(adds).subspan(row * outputs, outputs));
+  for (std::size_t row = 0; row < acting.size(); ++row) {
+    const float* const from = action.data() + row * outputs;
+    fleet_.set_adds(acting[row], std::vector<double>(from, from + actions));
+    std::copy_n(from + actions, units, memory_.data() + acting[row] * units);
+  }
 }
 
 template <class T>

@@ -21,7 +21,11 @@ class Rollout {
   Rollout(FlyConfig config, std::size_t count, const policy::Policy* policy = nullptr, Hover* hover = nullptr);
   /// A copy flies on from the same state, to the same bytes; it records nothing.
   Rollout(const Rollout& other)
-      : config_(other.config_), fleet_(other.fleet_), policy_(other.policy_), tick_(other.tick_) {}
+      : config_(other.config_),
+        fleet_(other.fleet_),
+        policy_(other.policy_),
+        memory_(other.memory_),
+        tick_(other.tick_) {}
 
   /// Starts an episode of flapper `i` from the snapshot `hover`, or if null from the task's start with its vehicle.
   static void start(flight::Fleet<T>& fleet, const FlyConfig& config, std::size_t i, std::uint32_t episode,
@@ -52,6 +56,7 @@ class Rollout {
   FlyConfig config_;
   flight::Fleet<T> fleet_;
   const policy::Policy* policy_;
+  std::vector<float> memory_;  // [flight][unit]: what a recurrent policy remembers
   std::vector<Recorder<T>> recorders_;
   std::int64_t tick_ = 0;
 };

@@ -17,7 +17,7 @@ namespace flappy::flight::actor_test {
 namespace {
 
 policy::Actor random_actor(std::vector<int> widths, policy::Activation hidden, std::uint32_t seed,
-                           bool layer_norm = false) {
+                           bool layer_norm = false, bool recurrent = false) {
   std::mt19937 engine(seed);
   std::normal_distribution<double> normal;
   policy::Actor a;
@@ -26,9 +26,17 @@ policy::Actor random_actor(std::vector<int> widths, policy::Activation hidden, s
   a.hidden = hidden;
   a.layer_norm = layer_norm;
   a.linear = hidden == policy::Activation::elu;
-  for (std::size_t layer = 0; layer + 1 < a.widths.size(); ++layer) {
-    for (int o = 0; o < a.widths[layer + 1]; ++o)
-      for (int i = 0; i <= a.widths[layer]; ++i) a.weights.push_back(normal(engine) / std::sqrt(a.widths[layer] + 1.0));
+  a.recurrent = recurrent;
+  const auto add = [&](int inputs, int outputs) {
+    for (int o = 0; o < outputs; ++o)
+      for (int i = 0; i <= inputs; ++i) a.weights.push_back(normal(engine) / std::sqrt(inputs + 1.0));
+  };
+  if (recurrent) {
+    add(a.widths[0], 3 * a.widths[1]);
+    add(a.widths[1], 3 * a.widths[1]);
+  }
+  for (std::size_t layer = recurrent ? 1 : 0; layer + 1 < a.widths.size(); ++layer) {
+    add(a.widths[layer], a.widths[layer + 1]);
     if (!layer_norm || layer + 2 == a.widths.size()) continue;
     for (int o = 0; o < a.widths[layer + 1]; ++o) a.weights.push_back(1 + 0.2 * normal(engine));
     for (int o = 0; o < a.widths[layer + 1]; ++o) a.weights.push_back(0.2 * normal(engine));
@@ -43,17 +51,33 @@ policy::Actor random_actor(std::vector<int> widths, policy::Activation hidden, s
   return a;
 }
 
-std::vector<double> expected(const policy::Actor& a, std::vector<double> x) {
+/// `memory`: of a recurrent actor, changed. Its GRU as torch documents nn.GRUCell, with exponentials.
+std::vector<double> expected(const policy::Actor& a, std::vector<double> x, std::vector<double>* memory = nullptr) {
   for (std::size_t i = 0; i < x.size(); ++i)
     x[i] = std::min(std::max((x[i] - a.mean[i]) * a.scale[i], -a.clip), a.clip);
   std::size_t weight = 0;
-  for (std::size_t layer = 1; layer < a.widths.size(); ++layer) {
+  const auto sums = [&](const std::vector<double>& of, std::size_t count) {
     std::vector<double> y;
-    for (int o = 0; o < a.widths[layer]; ++o) {
+    for (std::size_t o = 0; o < count; ++o) {
       double sum = a.weights[weight++];
-      for (const double in : x) sum += a.weights[weight++] * in;
+      for (const double in : of) sum += a.weights[weight++] * in;
       y.push_back(sum);
     }
+    return y;
+  };
+  if (a.recurrent) {
+    const std::size_t units = memory->size();
+    const std::vector<double> seen = sums(x, 3 * units), kept = sums(*memory, 3 * units);
+    for (std::size_t k = 0; k < units; ++k) {
+      const double r = 1 / (1 + std::exp(-seen[k] - kept[k]));
+      const double z = 1 / (1 + std::exp(-seen[units + k] - kept[units + k]));
+      const double n = std::tanh(seen[2 * units + k] + r * kept[2 * units + k]);
+      (*memory)[k] = (1 - z) * n + z * (*memory)[k];
+    }
+    x = *memory;
+  }
+  for (std::size_t layer = a.recurrent ? 2 : 1; layer < a.widths.size(); ++layer) {
+    std::vector<double> y = sums(x, static_cast<std::size_t>(a.widths[layer]));
     const bool last = layer + 1 == a.widths.size();
     if (a.layer_norm && !last) {
       const double n = static_cast<double>(y.size());
@@ -134,6 +158,43 @@ void lanes_agree() {
 TEST(Actor, LanesOfFloatAreTheNetwork) { lanes_agree<float, 4>(); }
 TEST(Actor, LanesOfDoubleAreTheNetwork) { lanes_agree<double, 2>(); }
 
+/// Ten steps, as the memory carries roundings on: ten times the 40 ulp of above. Measured: 4.
+template <class T, int N>
+void memory_agrees() {
+  using L = model::Lanes<T, N>;
+  std::mt19937 engine(6);
+  std::normal_distribution<double> normal(0, 2);
+  for (const std::vector<int>& widths : {std::vector<int>{3, 1, 4}, {29, 16, 32, 4}, {5, 64, 4}}) {
+    const policy::Actor a = random_actor(widths, policy::Activation::relu, 3, false, true);
+    const Numbers<T> numbers(a);
+    const auto units = static_cast<std::size_t>(widths[1]);
+    std::vector<L> memory(units, L(0)), in(static_cast<std::size_t>(widths[0]));
+    std::vector<std::vector<double>> alone(N, std::vector<double>(units, 0));
+    double largest = 0;
+    for (int step = 0; step < 10; ++step) {
+      for (L& row : in)
+        for (int i = 0; i < N; ++i) row.raw[i] = static_cast<T>(normal(engine));
+      L out[kMaxActions];
+      evaluate(numbers.view, in.data(), out, memory.data());
+      for (std::size_t i = 0; i < N; ++i) {
+        std::vector<double> seen;
+        for (const L& row : in) seen.push_back(row.raw[i]);
+        const std::vector<double> y = expected(a, seen, &alone[i]);
+        for (std::size_t k = 0; k < y.size(); ++k)
+          EXPECT_NEAR(out[k].raw[i], y[k], 400 * std::numeric_limits<T>::epsilon()) << "step " << step;
+        for (std::size_t k = 0; k < units; ++k) {
+          EXPECT_NEAR(memory[k].raw[i], alone[i][k], 400 * std::numeric_limits<T>::epsilon()) << "step " << step;
+          largest = std::max(largest, std::abs(alone[i][k]));
+        }
+      }
+    }
+    EXPECT_GT(largest, 0.5);
+    EXPECT_LE(largest, 1);
+  }
+}
+TEST(Actor, LanesOfFloatRemember) { memory_agrees<float, 4>(); }
+TEST(Actor, LanesOfDoubleRemember) { memory_agrees<double, 2>(); }
+
 TEST(Actor, ClipsItsInputs) {
   const policy::Actor a = random_actor({3, 5, 4}, policy::Activation::tanh, 7);
   const Numbers<double> numbers(a);
@@ -150,8 +211,9 @@ FleetOptions hovering() {
   return fleet_options(sensors("paper"), controller("pid"), read_task(text.root(), 0.002));
 }
 
-policy::Actor fitting(const Task& task) {
-  policy::Actor a = random_actor({static_cast<int>(task.observation().size()), 16, 4}, policy::Activation::relu, 9);
+policy::Actor fitting(const Task& task, bool recurrent = false) {
+  policy::Actor a =
+      random_actor({static_cast<int>(task.observation().size()), 16, 4}, policy::Activation::relu, 9, false, recurrent);
   a.observation.clear(), a.action.clear();
   for (const Signal& s : task.observation()) a.observation.push_back(s.name);
   for (const Signal& s : task.action()) a.action.push_back(s.name);
@@ -186,6 +248,35 @@ TEST(Actor, ActsInAFleetOnWhatItObserves) {
     by_hand.step();
     for (std::size_t i = 0; i < 3; ++i) ASSERT_NEAR(with.input(i).bias_V, by_hand.input(i).bias_V, 1e-9);
   }
+}
+
+TEST(Actor, RemembersInAFleetFromItsStart) {
+  FleetOptions o = hovering();
+  o.task.action_repeat = 2;
+  const auto actor = std::make_shared<policy::Actor>(fitting(o.task, true));
+  Fleet<double> fleet(2, test::nominal(), o);
+  fleet.set_actor(actor);
+  std::vector<double> memory(actor->widths[1], 0), other = memory;
+  for (std::uint32_t tick = 0; tick < 20; ++tick) {
+    if (tick == 7) {  // its flight begins anew, the other's goes on
+      fleet.start(1, 1);
+      other.assign(other.size(), 0);
+    }
+    std::vector<double> acted;
+    if (tick % 2 == 0) acted = expected(*actor, fleet.observation(0), &memory);
+    if ((tick < 7 ? tick : tick - 7) % 2 == 0) expected(*actor, fleet.observation(1), &other);
+    const Fleet<double> copy = fleet;
+    fleet.step();
+    for (std::size_t k = 0; k < acted.size(); ++k) ASSERT_NEAR(fleet.action(0)[k], acted[k], 1e-12) << tick;
+    for (std::size_t k = 0; k < memory.size(); ++k) {
+      ASSERT_NEAR(fleet.actor_memory(0)[k], memory[k], 1e-12) << tick;
+      ASSERT_NEAR(fleet.actor_memory(1)[k], other[k], 1e-12) << tick;
+    }
+    ASSERT_NE(copy.hash(0, 1), fleet.hash(0, 1));
+  }
+  EXPECT_NE(memory, other);
+  fleet.set_actor(std::make_shared<policy::Actor>(fitting(o.task)));
+  EXPECT_TRUE(fleet.actor_memory(0).empty());
 }
 
 TEST(Actor, HoldsItsActionAndGathersWhatItEarns) {
@@ -284,6 +375,9 @@ TEST(ActorFile, ReadsBackWhatWasWritten) {
   EXPECT_FALSE(c.linear);
   write_actor(file_name(), random_actor({18, 5, 4}, policy::Activation::elu, 11));
   EXPECT_TRUE(policy::read_actor(file_name()).linear);
+  write_actor(file_name(), random_actor({18, 5, 4}, policy::Activation::relu, 11, false, true));
+  EXPECT_TRUE(policy::read_actor(file_name()).recurrent);
+  EXPECT_EQ(policy::weight_count({18, 5, 4}, false, true), 3u * 5 * (19 + 6) + 6 * 4);
 }
 
 std::string refused(const std::string& text) {
@@ -322,6 +416,12 @@ TEST(ActorFile, RefusesWhatIsNoActor) {
   has(with([](policy::Actor& a) { a.widths = {3, -5, 4}; }), "-5 wide");
   has(with([](policy::Actor& a) { a.widths = {3, 5, 3}; }), "action has 4 entries; accepted: 3 of them");
   has(with([](policy::Actor& a) { a.action.emplace_back("more"), a.widths = {3, 5, 5}; }), "accepted: 1 to 4");
+  has(with([](policy::Actor& a) { a.recurrent = true; }), "weights has 44 entries; accepted: 174 of them");
+  has(with([](policy::Actor& a) { a.recurrent = true, a.widths = {3, 4}; }), "recurrent with one layer");
+  has(with([](policy::Actor& a) {
+        a.recurrent = true, a.widths = {3, 65, 4};
+      }),
+      "65 units; accepted: two layers or more");
   has(with([](policy::Actor& a) { a.weights[7] = std::numeric_limits<double>::quiet_NaN(); }),
       "weights has null in it; accepted: numbers");
   has(with([](policy::Actor& a) { a.mean[1] = std::numeric_limits<double>::infinity(); }),

@@ -53,6 +53,29 @@ TEST(Onnx, ActsOnRows) {
   EXPECT_EQ(model.metadata_props(0).key() + " " + model.metadata_props(0).value(), "task a task");
 }
 
+/// One unit whose sums are worked out by hand: seen (0, 0, x), kept (0, 0, h).
+TEST(Onnx, Remembers) {
+  const Folder folder;
+  PolicyNetwork n;
+  n.widths = {1, 1, 1};
+  n.recurrent = true;
+  n.mean = {0}, n.scale = {1}, n.clip = 10;
+  n.weights = {0, 0, 0, 0, 0, 1, /**/ 0, 0, 0, 0, 0, 1, /**/ 0, 1};
+  n.middle = {0}, n.half = {2};
+  const auto policy = load_policy(folder.write("p.onnx", onnx_model(n, {})), 1, 1);
+  ASSERT_EQ(policy->memory(), 1);
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<float> seen = {1, 0.5F, nan, 0.25F};
+  std::vector<float> made(4);
+  policy->act(2, seen.data(), made.data());
+  // both gates are 1/2: new = tanh(x + h / 2), next = (new + h) / 2
+  const double next = (std::tanh(1.25) + 0.5) / 2;
+  EXPECT_NEAR(made[1], next, 1e-6);
+  EXPECT_NEAR(made[0], 2 * std::tanh(next), 1e-6);
+  EXPECT_EQ(made[2], 0);      // refused
+  EXPECT_EQ(made[3], 0.25F);  // and remembered as it was
+}
+
 /// Also from 8.2 to 9, where the runtime's own tanh is larger than 1.
 TEST(Onnx, StaysWithinTheRangeOfActions) {
   const Folder folder;

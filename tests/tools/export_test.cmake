@@ -118,6 +118,19 @@ if(TORCH)
   expect_equal("flights of the deep header" "${of_deep_header}" "${of_deep}")
   expect_refused("--int8: whole numbers hold no layer norm, linear output, elu or silu; accepted: a policy of relu or tanh without them"
     ${WORK}/deep --out ${WORK}/deep_int8 --int8)
+
+  # a policy with a memory
+  execute_process(COMMAND ${TRAIN} ${SOURCE}/configs/train/escape_student.toml ${small} --set learn.updates=600 --init ${WORK}/run
+    --set fly=../fly/escape.toml --set student.teachers=2 --set student.teacher_updates=60 --set student.rounds=4 --set student.flights=64
+    --set student.steps=20 --set student.batch=16 --set evaluate.every=60 --set checkpoint.every=60 --out ${WORK}/student
+    OUTPUT_QUIET ERROR_VARIABLE err RESULT_VARIABLE code)
+  expect_equal("exit code of flappy-train: ${err}" "${code}" 0)
+  run(${WORK}/student --out ${WORK}/student_out --int8)
+  expect_equal("stderr" "${err}" "")
+  expect_match("stdout" "${out}" " passed +0 +20000 +0\n.* passed +0 +20000 +0\n")
+  flown(of_student ${WORK}/student)
+  flown(of_student_header ${WORK}/student_out/flappy_policy.h --config ${WORK}/student/config/fly.toml)
+  expect_equal("flights of the header with a memory" "${of_student_header}" "${of_student}")
 endif()
 
 flown(of_int8 ${WORK}/out/flappy_policy_int8.h --config ${WORK}/run/config/fly.toml)

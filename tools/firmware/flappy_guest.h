@@ -68,6 +68,7 @@ typedef struct {
   int wishes_world, in_world;
   flappy_vector from_m;   /* place of the task's beginning in the autopilot's frame */
   flappy_quaternion back; /* turns the autopilot's frame into the task's */
+  flappy_policy_state policy;
   float observation[FLAPPY_POLICY_OBS], action[4];
   float inputs[FLAPPY_CONTROLLER_INPUTS];
 } flappy_guest;
@@ -162,6 +163,7 @@ static inline void flappy_guest_watch(flappy_guest *g, uint32_t now_us, const fl
     flappy_guest_return(g, FLAPPY_GUEST_HANDED_BACK);
   } else if (g->state == FLAPPY_GUEST_HOVERING && now_us - g->began_us >= FLAPPY_GUEST_HOVER_US) {
     flappy_controller_begin(&g->controller);
+    flappy_policy_reset(&g->policy);
     g->began_us = now_us;
     g->state = FLAPPY_GUEST_ACTING;
   }
@@ -184,7 +186,7 @@ static inline int flappy_guest_tick(flappy_guest *g, uint32_t now_us, const flap
   if (flappy_controller_policy_due(&g->controller)) {
     flappy_controller_observe(&g->controller, g->observation);
     ++g->inferences;
-    if (flappy_policy_step(g->observation, g->action) != 0) {
+    if (flappy_policy_step_with(&g->policy, g->observation, g->action) != 0) {
       flappy_guest_return(g, FLAPPY_GUEST_NOT_FINITE);
       return 0;
     }

@@ -113,7 +113,7 @@ void write_for_runtimes(Export& e, const Request& request, const learn::Finished
   const policy::PolicyNetwork loud = deploy::louder(network);
   std::vector<deploy::Agreement> rows;
   const auto far_out = [&](const std::string& file, const std::string& runtime, const policy::PolicyNetwork& of) {
-    const auto policy = policy::load_policy(work / file, of.inputs(), of.outputs());
+    const auto policy = policy::load_policy(work / file, of.observations(), of.actions());
     deploy::Agreement asked;
     deploy::ask_far_out(asked, *policy, of, deploy::saturating(of, e.flown));
     if (asked.beyond_range > 0) throw std::runtime_error(file + " leaves the range of actions in " + runtime);
@@ -122,16 +122,16 @@ void write_for_runtimes(Export& e, const Request& request, const learn::Finished
   const auto try_out = [&](const std::string& name, const std::string& runtime, const char* key,
                            const std::string& loud_bytes) {
     io::write_atomically(work / name, e.files[name]);
-    const auto policy = policy::load_policy(work / name, network.inputs(), network.outputs());
+    const auto policy = policy::load_policy(work / name, network.observations(), network.actions());
     std::vector<float> acts(e.flown.action.size());
     policy->act(e.flown.rows(), e.flown.observation.data(), acts.data());
-    const OutputError error = output_error(acts, e.flown.action, network.half);
+    const OutputError error = output_error(acts, e.flown.action, network.output_half());
     print((runtime + " differs by at most").c_str(), error, action);
     json[key] = json_of(error);
     if (*std::ranges::max_element(error.largest) > kMaxError)
       throw std::runtime_error(runtime + " does not act as the actor does");
     if (!request.prove) return;
-    deploy::Agreement& row = rows.emplace_back(deploy::compare(name, runtime, *policy, network.half, vectors));
+    deploy::Agreement& row = rows.emplace_back(deploy::compare(name, runtime, *policy, network.output_half(), vectors));
     io::write_atomically(work / ("louder_" + name), loud_bytes);
     row.saturated = far_out(name, runtime, network) + far_out("louder_" + name, runtime, loud);
     std::printf(
@@ -223,7 +223,7 @@ void run(const Request& request, const io::Program& program) {
     own.action = evaluate(whole, own.observation);
     e.files["flappy_policy_int8.h"] = deploy::policy_header(run.fly, run.info, whole, own);
     e.proofs["flappy_policy_int8.h"] = for_proof(e, whole);
-    const OutputError error = output_error(evaluate(whole, e.flown.observation), e.flown.action, network.half);
+    const OutputError error = output_error(evaluate(whole, e.flown.observation), e.flown.action, network.output_half());
     print("8 bits differ by at most", error, run.fly.fleet.task.action());
     json["int8_error"] = json_of(error);
   }

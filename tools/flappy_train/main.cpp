@@ -249,7 +249,8 @@ int main(int argc, char** argv) {
     options.commit = io::commit();
     options.started = train::started;
     const auto train_it = [&](const learn::TrainConfig& config) {
-      if (!options.from) learn::refuse_run_in(options.folder);  // refuse on all ranks, before they meet
+      if (!options.from && !options.goes_on)
+        learn::refuse_run_in(options.folder);  // refuse on all ranks, before they meet
       std::string agreed =
           "configuration: " + config.sha256 + "\ninit: " + (options.init ? options.init->sha256 : "") + "\n";
       if (options.from) agreed += "checkpoint: " + learn::Checkpoint(*options.from).payload_sha256() + "\n";
@@ -275,7 +276,8 @@ int main(int argc, char** argv) {
       const learn::TrainConfig config =
           io::read_of_run(resume, [&] { return learn::read_train_config(config_file, with_threads({})); });
       options.folder = resume;
-      options.from = from.empty() ? learn::newest_checkpoint(resume).path() : fs::path(resume) / from;
+      if (config.student) options.goes_on = true;
+      else options.from = from.empty() ? learn::newest_checkpoint(resume).path() : fs::path(resume) / from;
       return train_it(config);
     }
     if (!init.empty()) options.init = learn::read_train_init(init);

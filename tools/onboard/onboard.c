@@ -133,6 +133,7 @@ static void begin_manoeuvre(onboard *o, uint32_t now_us) {
     return;
   }
   flappy_controller_begin(&o->controller);
+  flappy_policy_reset(&o->policy);
   o->act_us = now_us;
   o->state = ONBOARD_ACTING;
 }
@@ -141,7 +142,7 @@ static void let_policy_act(onboard *o) {
   if (!flappy_controller_policy_due(&o->controller)) return;
   flappy_controller_observe(&o->controller, o->observation);
   ++o->inferences;
-  if (flappy_policy_step(o->observation, o->action) != 0) {
+  if (flappy_policy_step_with(&o->policy, o->observation, o->action) != 0) {
     drop_policy(o, ONBOARD_POLICY_REFUSED);
     return;
   }

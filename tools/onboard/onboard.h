@@ -137,6 +137,7 @@ typedef struct {
   onboard_pose_sample pose;   /* the last good sample */
   int has_imu, has_pose;
   uint32_t inferences; /* of the policy; what it got and gave at the last one */
+  flappy_policy_state policy;
   float observation[FLAPPY_POLICY_OBS], action[FLAPPY_POLICY_ACT];
 } onboard;
 

@@ -29,7 +29,7 @@ static inline const float *flappy_policy_layer(const float *weights, const float
     out[o + 2] = s2;
     out[o + 3] = s3;
   }
-  for (; o < outputs; ++o) {
+  for (o = outputs & ~3U; o < outputs; ++o) { /* from there, or gcc 12 sees no end of it */
     float sum = *weights++;
     for (i = 0; i < inputs; ++i) sum = flappy_fma(*weights++, in[i], sum);
     out[o] = sum;
@@ -55,20 +55,35 @@ static inline const float *flappy_policy_normalise(const float *gains, float *x,
 }
 #endif
 
-/* Observation in, action out, both in the units of the tables above. An observation with a NaN in it is refused: it returns 1
-   and all actions are 0. Otherwise it returns 0. */
+/* Observation in, action out, both in the units of the tables above. An observation with a NaN in it is refused: it returns 1,
+   all actions are 0, and a state is left as it is. Otherwise it returns 0. */
+#if FLAPPY_POLICY_MEMORY > 0
+static inline int flappy_policy_step_with(flappy_policy_state *state, const float obs[FLAPPY_POLICY_OBS],
+                                          float action[FLAPPY_POLICY_ACT]) {
+#else
 static inline int flappy_policy_step(const float obs[FLAPPY_POLICY_OBS], float action[FLAPPY_POLICY_ACT]) {
+#endif
   static const uint32_t widths[FLAPPY_POLICY_LAYERS + 1] = FLAPPY_POLICY_WIDTHS;
   float values[2][FLAPPY_POLICY_WIDEST];
   const float *weights = flappy_policy_weights;
   uint32_t layer, i;
   int refused = 0;
+#if FLAPPY_POLICY_MEMORY > 0
+  float seen[3 * FLAPPY_POLICY_MEMORY], kept[3 * FLAPPY_POLICY_MEMORY];
+#endif
   for (i = 0; i < FLAPPY_POLICY_OBS; ++i) {
     const float x = (obs[i] - flappy_policy_mean[i]) * flappy_policy_scale[i];
     refused |= flappy_is_nan(x);
     values[0][i] = flappy_clamp(x, -FLAPPY_POLICY_CLIP, FLAPPY_POLICY_CLIP);
   }
-  for (layer = 0; layer < FLAPPY_POLICY_LAYERS; ++layer) {
+#if FLAPPY_POLICY_MEMORY > 0
+  weights = flappy_policy_layer(weights, values[0], FLAPPY_POLICY_OBS, seen, 3 * FLAPPY_POLICY_MEMORY);
+  weights = flappy_policy_layer(weights, state->unit, FLAPPY_POLICY_MEMORY, kept, 3 * FLAPPY_POLICY_MEMORY);
+  for (i = 0; i < FLAPPY_POLICY_MEMORY; ++i) values[1][i] = state->unit[i];
+  flappy_policy_remember(seen, kept, values[1]);
+  for (i = 0; i < FLAPPY_POLICY_MEMORY; ++i) state->unit[i] = refused ? state->unit[i] : values[1][i];
+#endif
+  for (layer = FLAPPY_POLICY_MEMORY > 0; layer < FLAPPY_POLICY_LAYERS; ++layer) {
     float *out = values[(layer + 1) % 2];
     weights = flappy_policy_layer(weights, values[layer % 2], widths[layer], out, widths[layer + 1]);
 #if FLAPPY_POLICY_LAYER_NORM

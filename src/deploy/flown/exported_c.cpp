@@ -18,7 +18,12 @@ using io::refuse;
 
 /// Compiled after both headers. Its names stand for static inline functions, which no library shows.
 constexpr const char* kWrapper = R"(
-unsigned flown_state_bytes(void) { return (unsigned)sizeof(flappy_controller); }
+typedef struct {
+  flappy_controller controller;
+  flappy_policy_state policy;
+} flown_state;
+static void flown_reset(flappy_controller *c) { flappy_policy_reset(&((flown_state *)c)->policy); }
+unsigned flown_state_bytes(void) { return (unsigned)sizeof(flown_state); }
 int flown_selftests(void) {
   return flappy_policy_selftest() != 0 ? 1 : flappy_controller_selftest() != 0 ? 2 : 0;
 }
@@ -35,6 +40,7 @@ static flappy_quaternion flown_quaternion(const float *x) {
 }
 void flown_start(flappy_controller *c, uint32_t now_us, const float *x) {
   flappy_controller_start(c, now_us, flappy_vector_from(x), flown_quaternion(x + 3));
+  flown_reset(c);
 }
 unsigned flown_remembered(void) {
   return (unsigned)((sizeof(flappy_estimator) + sizeof(flappy_motion) + sizeof(flappy_feedback)) / sizeof(float));
@@ -50,7 +56,10 @@ void flown_recall(flappy_controller *c, const float *x, uint32_t phase) {
 }
 void flown_hover(flappy_controller *c) { flappy_controller_hover(c); }
 void flown_stay(flappy_controller *c) { flappy_controller_stay(c); }
-void flown_begin(flappy_controller *c) { flappy_controller_begin(c); }
+void flown_begin(flappy_controller *c) {
+  flappy_controller_begin(c);
+  flown_reset(c);
+}
 int flown_imu(flappy_controller *c, uint32_t taken_us, const float *x) {
   return flappy_controller_imu(c, taken_us, flappy_vector_from(x), flappy_vector_from(x + 3));
 }
@@ -65,11 +74,12 @@ void flown_observe(const flappy_controller *c, float *obs) { flappy_controller_o
 void flown_forget(flappy_controller *c) {
 #if FLAPPY_CONTROLLER_PAST > 0
   c->remembers = 0;
-#else
-  (void)c;
 #endif
+  flown_reset(c);
 }
-int flown_policy(const float *obs, float *action) { return flappy_policy_step(obs, action); }
+int flown_policy(flappy_controller *c, const float *obs, float *action) {
+  return flappy_policy_step_with(&((flown_state *)c)->policy, obs, action);
+}
 void flown_act(flappy_controller *c, const float *action) { flappy_controller_act(c, action); }
 void flown_steer(flappy_controller *c, float *input) {
   flappy_controller_steer(c);
@@ -168,6 +178,7 @@ Contract read_contract(const fs::path& folder) {
     c.mocap_Hz = sensors.at("mocap_Hz");
     c.mocap_latency_s = sensors.at("mocap_latency_s");
     c.history = json.at("history");
+    c.memory = json.value("memory", 0);
     for (const auto& i : json.at("inputs"))
       c.inputs.push_back({i.at("name"), i.at("neutral"), i.at("low"), i.at("high"), i.at("mix")});
     const auto signals = [](const nlohmann::json& list) {

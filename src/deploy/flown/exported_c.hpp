@@ -37,6 +37,7 @@ struct Contract {
   double control_s = 0, policy_s = 0, driver_s = 0;
   double imu_Hz = 0, mocap_Hz = 0, imu_latency_s = 0, mocap_latency_s = 0;
   std::uint32_t history = 1;
+  int memory = 0;  ///< numbers that a recurrent policy remembers
   std::vector<Signal> observation, action;
   std::vector<Input> inputs;       ///< empty: two motors
   std::vector<float> mean, scale;  ///< [observation]
@@ -75,8 +76,9 @@ class ExportedC {
   void (*set_handed_back)(void* state, int handed_back);
   std::uint32_t (*ticks)(const void* state);  ///< control periods since begin()
   void (*observe)(const void* state, float* observation);
-  void (*forget)(void* state);  ///< the history
-  int (*policy)(const float* observation, float* action);
+  void (*forget)(void* state);  ///< the history, and the memory of a recurrent policy
+  /// Only the memory of `state` is used.
+  int (*policy)(void* state, const float* observation, float* action);
   void (*act)(void* state, const float* action);
   void (*steer)(void* state, float* input);  ///< V, V, V, split cycle, before they are clipped
   void (*drive)(void* state, const float* input,

@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kSame = 0.99, kFollows = 0.95, kOfRange = 0.01;
 constexpr int kDithers = 8;
+constexpr double kPause = 3;        ///< policy periods without an inference, after which a policy has been reset
 constexpr double kRounding = 1e-6;  ///< of an output's range: single precision rounds the policy's sums
 
 /// Where each number of the contract is in a row of the log.
@@ -56,18 +57,26 @@ Inferences check_inferences(const std::filesystem::path& folder, const Contract&
   std::vector<std::size_t> follow(inputs.size(), 0);
   std::mt19937 random(1);
   std::vector<float> observation((kDithers + 1) * seen), action((kDithers + 1) * acts);
+  // a recurrent policy remembers; each dithered sequence of observations has a state of its own
+  std::vector<std::vector<std::uint64_t>> states(kDithers + 1,
+                                                 std::vector<std::uint64_t>(exported.state_bytes() / 8 + 1));
+  double last_s = 0;
   for (std::size_t row = 0; row < log.inferences.size(); ++row) {
     const auto number = [&](std::size_t k) { return log.inferences[row].numbers[at[k]]; };
     bool begun = false;  // before its first inference all numbers are 0
     for (std::size_t k = 0; k < seen; ++k) begun = begun || number(k) != 0;
     if (!begun) continue;
+    if (contract.memory > 0 && (row == 0 || log.inferences[row].t_s - last_s > kPause * contract.policy_s))
+      for (auto& state : states) exported.begin(state.data());
+    last_s = log.inferences[row].t_s;
     ++found.rows;
     for (std::size_t d = 0; d <= kDithers; ++d)  // the digits that the log has lost
       for (std::size_t k = 0; k < seen; ++k) {
         const double share = d == 0 ? 0 : static_cast<double>(random()) / 0x1p32 - 0.5;
         observation[d * seen + k] = static_cast<float>(number(k) + share * log.policy_steps[at[k]]);
       }
-    for (std::size_t d = 0; d <= kDithers; ++d) exported.policy(&observation[d * seen], &action[d * acts]);
+    for (std::size_t d = 0; d <= kDithers; ++d)
+      exported.policy(states[d].data(), &observation[d * seen], &action[d * acts]);
     bool same = true;
     for (std::size_t k = 0; k < acts; ++k) {
       const Contract::Signal& signal = contract.action[k];

@@ -193,6 +193,9 @@ void add_observations(List& list, const Contract& contract) {
   list.add(kStage, "scale_left_out", "the normalisation's scale is left out", [](Wiring& w) { w.scale = false; });
   list.add(kStage, "normalisation_left_out", "the normalisation is left out",
            [](Wiring& w) { w.mean = w.scale = false; });
+  if (contract.memory > 0)
+    list.add(kStage, "memory_not_kept", "the policy's memory is reset before each inference",
+             [](Wiring& w) { w.history = false; });
   if (contract.history > 1)
     list.add(kStage, "history_not_kept", "earlier observations are not kept", [](Wiring& w) { w.history = false; });
   std::vector<Parameters> around;

@@ -173,7 +173,7 @@ class Loop {
       if (!w_.history) c_.forget(state());
       c_.observe(state(), observation_.data());
       std::vector<float> seen = observed();
-      c_.policy(otherwise_normalised(seen).data(), action);
+      c_.policy(state(), otherwise_normalised(seen).data(), action);
       if (!log_.policy_numbers.empty()) {
         seen.insert(seen.end(), action, action + contract_.action.size());
         inferences_.push_back({now_s, {}});

@@ -118,6 +118,10 @@ std::string contract_text(const FlyConfig& config, const policy::RunInfo& run) {
                ? "previous_* is the last action; strokes and their rates are those of encoders on the wings.\n"
                : "added_* is what the last action added, trim_* what the controller has learnt to hold.\n")
        << "Ranges are those expected; other values are allowed.\n\n";
+  if (config.actor && config.actor->recurrent)
+    text << "It remembers " << config.actor->widths[1]
+         << " numbers from inference to inference: flappy_policy_reset() before each task, then\n"
+         << "flappy_policy_step_with().\n\n";
   list(text, "observation", config.fleet.task.observation());
   text << "\n";
   list(text, "action", config.fleet.task.action());
@@ -131,6 +135,7 @@ std::uint32_t contract_crc32(const FlyConfig& config) {
        << config.fleet.task.name << "\n"
        << p.control_us << " " << p.policy_us << "\n"
        << holds_trim(config) << "\n";
+  if (config.actor && config.actor->recurrent) text << "memory " << config.actor->widths[1] << "\n";
   for (const auto& signals : {config.fleet.task.observation(), config.fleet.task.action()})
     for (const Signal& s : signals) text << s.name << " " << s.unit << " " << s.frame << "\n";
   std::vector<float> letters;  // one number per letter, because only equality matters
@@ -167,6 +172,7 @@ std::string contract_json(const FlyConfig& config, const policy::RunInfo& run, c
         {"mocap_Hz", s.mocap.rate_hz},
         {"mocap_latency_s", s.mocap.latency_s}}},
       {"history", task.history},
+      {"memory", network.memory()},
       {"observation", json_of(task.observation())},
       {"normalisation", {{"mean", network.mean}, {"scale", network.scale}, {"clip", network.clip}}},
       {"action", json_of(task.action())},
@@ -179,6 +185,8 @@ std::string contract_json(const FlyConfig& config, const policy::RunInfo& run, c
 
 std::string wiring_text(const FlyConfig& config, const policy::RunInfo& run, bool with_controller) {
   const Periods p = periods_of(config);
+  const bool remembers = config.actor && config.actor->recurrent;
+  const std::string step = remembers ? "flappy_policy_step_with()" : "flappy_policy_step()";
   std::ostringstream text;
   text
       << "# A policy of the task " << run.task << ", exported by flappy-export\n\n"
@@ -194,7 +202,7 @@ std::string wiring_text(const FlyConfig& config, const policy::RunInfo& run, boo
          << "   B: x forward, y left, z up; poses of the torso's origin in W, z up, attitude as w, x, y, z from B to "
             "W.\n"
          << "4. `flappy_controller_start()` with the pose; then, every " << p.control_us << " us, in this order:\n"
-         << "   - if `flappy_controller_policy_due()`: `_observe()`, `flappy_policy_step()`, `_act()`\n"
+         << "   - if `flappy_controller_policy_due()`: `_observe()`, `" << step << "`, `_act()`\n"
          << (model::mixed_inputs(config.vehicle).empty()
                  ? "   - `_steer()`, and from then on `_drive()` every " + std::to_string(p.driver_us) +
                        " us: the motors' voltages\n"
@@ -208,12 +216,14 @@ std::string wiring_text(const FlyConfig& config, const policy::RunInfo& run, boo
                  : "5. `flappy_controller_hover()` until the trim is learnt, then `flappy_controller_begin()`: the "
                    "policy "
                    "acts.\n")
+         << (remembers ? "   `flappy_policy_reset()` at each begin: the policy remembers its task alone.\n" : "")
          << "6. Log what the sensors said and what was set, with their times: `flappy-gap check --flown`\n"
          << "   says whether the robot flew this, or which mistake of its firmware explains what it did.\n";
   } else {
     text << "3. Every " << p.policy_us
          << " us, fill the observation in the order of `contract.json`, raw, in its units:\n"
-         << "   `flappy_policy_step()` normalises it. What it returns holds until the next call.\n"
+         << "   `" << step << "` normalises it. What it returns holds until the next call.\n"
+         << (remembers ? "   `flappy_policy_reset()` before each task: the policy remembers it alone.\n" : "")
          << "4. If it returns 1, a number was none: do not use the action.\n";
   }
   return text.str();

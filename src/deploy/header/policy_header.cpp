@@ -63,6 +63,7 @@ class Numbers {
 struct Kind {
   const char *title, *code, *hidden;
   std::size_t scratch_bytes;  ///< scratch memory for each neuron of the widest layer
+  std::size_t memory_bytes;   ///< more of it for each unit of the memory
   Numbers numbers;
 };
 
@@ -76,7 +77,8 @@ void add_common(const Network& n, Numbers& to) {
 
 Kind kind_of(const policy::PolicyNetwork& n) {
   static constexpr const char* kHidden[] = {"flappy_max(x, 0.0F)", "flappy_tanh(x)", "flappy_elu(x)", "flappy_silu(x)"};
-  Kind kind{"A trained policy", "policy.h", kHidden[static_cast<int>(n.hidden)], 2 * sizeof(float), {}};
+  Kind kind{"A trained policy", "policy.h",        kHidden[static_cast<int>(n.hidden)],
+            2 * sizeof(float),  6 * sizeof(float), {}};
   add_common(n, kind.numbers);
   kind.numbers.add("weights", "WEIGHTS", n.weights);
   return kind;
@@ -87,6 +89,7 @@ Kind kind_of(const QuantisedNetwork& n) {
             "policy_int8.h",
             n.relu ? "flappy_max(x, 0.0F)" : "127.0F * flappy_tanh(x)",
             1 + sizeof(std::int32_t),
+            3 * sizeof(std::int32_t) + 7 * sizeof(float),
             {}};
   add_common(n, kind.numbers);
   kind.numbers.add("multiplier", "NEURONS", n.multiplier);
@@ -103,9 +106,14 @@ std::string header(const rollout::FlyConfig& config, const policy::RunInfo& run,
   const int widest = *std::ranges::max_element(n.widths);
   int neurons = 0, multiply_adds = 0;
   std::string widths;
+  const int units = n.memory();
+  if (units > 0) {
+    neurons = 6 * units;
+    multiply_adds = 3 * units * n.inputs();
+  }
   for (std::size_t i = 0; i < n.widths.size(); ++i) {
     widths += (i > 0 ? ", " : "") + std::to_string(n.widths[i]);
-    if (i == 0) continue;
+    if (i == 0 || (i == 1 && units > 0)) continue;
     neurons += n.widths[i];
     multiply_adds += n.widths[i - 1] * n.widths[i];
   }
@@ -119,12 +127,16 @@ std::string header(const rollout::FlyConfig& config, const policy::RunInfo& run,
        << "#ifndef FLAPPY_POLICY_H\n#define FLAPPY_POLICY_H\n\n#include <stdint.h>\n\n"
        << kEmbedded.at("begin.h") << "\n"
        << contract_macros("FLAPPY_POLICY_", config, run);
-  define("OBS", inputs);
-  define("ACT", outputs);
+  define("OBS", n.observations());
+  define("ACT", n.actions());
+  define("MEMORY", units);
+  define("IN", inputs);
+  define("OUT", outputs);
   define("WEIGHTS", n.weights.size());
   define("MULTIPLY_ADDS", multiply_adds);
   define("CONSTANT_BYTES", kind.numbers.bytes());
-  define("SCRATCH_BYTES", static_cast<std::size_t>(widest) * kind.scratch_bytes);
+  define("SCRATCH_BYTES",
+         static_cast<std::size_t>(widest) * kind.scratch_bytes + static_cast<std::size_t>(units) * kind.memory_bytes);
   define("CRC32", std::to_string(kind.numbers.crc()) + "U");
   define("LAYERS", n.widths.size() - 1);
   define("NEURONS", neurons);
@@ -145,19 +157,21 @@ std::string header(const rollout::FlyConfig& config, const policy::RunInfo& run,
        << "/* The first layer's input is (observation - mean) scale, clipped; the output is middle + half * the last "
           "layer's. */\n"
        << kind.numbers.text() << "\n"
+       << kEmbedded.at("policy_memory.h") << "\n"
        << kEmbedded.at(kind.code)
        << "\n/* Test vectors: observations of flights and corners of their range, and what was computed for them. */\n";
   std::vector<float> tolerance;
   for (const float half : n.half) tolerance.push_back(2 * half * kTolerance);
-  text << c_array<float>("static const float flappy_policy_tolerance[FLAPPY_POLICY_ACT]", tolerance);
+  tolerance.insert(tolerance.end(), static_cast<std::size_t>(units), 2 * kTolerance);
+  text << c_array<float>("static const float flappy_policy_tolerance[FLAPPY_POLICY_OUT]", tolerance);
   const auto table = [&](const char* name, const char* width, const std::vector<float>& numbers, std::size_t columns) {
     text << "static const float flappy_policy_test_" << name << "[FLAPPY_POLICY_VECTORS][" << width << "] = {\n";
     for (std::size_t row = 0; row < vectors.rows(); ++row)
       text << c_row<float>(std::span(numbers).subspan(row * columns, columns)) << ",\n";
     text << "};\n";
   };
-  table("obs", "FLAPPY_POLICY_OBS", vectors.observation, inputs);
-  table("action", "FLAPPY_POLICY_ACT", vectors.action, outputs);
+  table("obs", "FLAPPY_POLICY_IN", vectors.observation, inputs);
+  table("action", "FLAPPY_POLICY_OUT", vectors.action, outputs);
   text << "\n"
        << kEmbedded.at("selftest.h") << "\n"
        << kEmbedded.at("end.h") << "\n"

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "rollout/rollout.hpp"
@@ -26,6 +27,7 @@ policy::PolicyNetwork network_of(const rollout::FlyConfig& config) {
                           a.hidden,
                           a.layer_norm,
                           a.linear,
+                          a.recurrent,
                           static_cast<float>(a.clip),
                           cast<float>(a.mean),
                           cast<float>(a.scale),
@@ -43,16 +45,18 @@ policy::PolicyNetwork network_of(const rollout::FlyConfig& config) {
 
 std::vector<float> evaluate(const policy::PolicyNetwork& n, const std::vector<float>& observation) {
   const auto view = policy::view_of(n, n.weights.data(), n.mean.data(), n.scale.data());
-  const auto inputs = static_cast<std::size_t>(n.inputs()), outputs = static_cast<std::size_t>(n.outputs());
+  const auto inputs = static_cast<std::size_t>(n.inputs()), actions = static_cast<std::size_t>(n.actions());
   std::vector<float> action;
-  std::vector<Lane> in(inputs), out(outputs);
+  std::vector<Lane> in(inputs), out(actions);
+  const std::span memory = std::span(in).subspan(static_cast<std::size_t>(n.observations()));
   for (std::size_t row = 0; row < observation.size(); row += inputs) {
     for (std::size_t i = 0; i < inputs; ++i) in[i] = Lane::load(&observation[row + i]);
-    policy::evaluate(view, in.data(), out.data());
-    for (std::size_t i = 0; i < outputs; ++i) {
+    policy::evaluate(view, in.data(), out.data(), memory.data());
+    for (std::size_t i = 0; i < actions; ++i) {
       const Lane adds = Lane::load(&n.middle[i]) + Lane::load(&n.half[i]) * clamp(out[i], Lane(-1), Lane(1));
       action.push_back(adds.raw[0]);
     }
+    for (const Lane& next : memory) action.push_back(next.raw[0]);
   }
   return action;
 }
@@ -61,10 +65,11 @@ policy::PolicyVectors roll_out(const rollout::FlyConfig& given, std::size_t firs
   rollout::FlyConfig config = given;
   config.fleet.first_flapper = kRolloutFlappers + static_cast<std::uint32_t>(first);
   config.excitation = {};
+  config.fleet.task.action_late_most = 0;  // what the network says, not how late it acts
   rollout::Rollout<float> flights(std::move(config), count);
   const flight::Fleet<float>& fleet = flights.fleet();
   const flight::Task& task = fleet.options().task;
-  const auto inputs = task.observation().size(), outputs = static_cast<std::size_t>(task.actions());
+  const auto inputs = task.observation().size();
   std::vector<policy::PolicyVectors> each(count);
   while (!flights.over()) {
     const bool acts = flights.tick() % task.action_repeat == 0;
@@ -76,14 +81,20 @@ policy::PolicyVectors roll_out(const rollout::FlyConfig& given, std::size_t firs
       std::vector<float>& seen = each[i].observation;
       seen.resize(seen.size() + inputs);
       fleet.observation(i, &seen[seen.size() - inputs]);
+      const std::vector<float> memory = fleet.actor_memory(i);
+      seen.insert(seen.end(), memory.begin(), memory.end());
     }
     flights.step();
     for (const std::size_t i : acting) {
       const auto adds = fleet.adds(i);
-      each[i].action.insert(each[i].action.end(), adds.begin(), adds.begin() + outputs);
+      std::vector<float>& done = each[i].action;
+      done.insert(done.end(), adds.begin(), adds.begin() + task.actions());
+      const std::vector<float> memory = fleet.actor_memory(i);
+      done.insert(done.end(), memory.begin(), memory.end());
     }
   }
-  policy::PolicyVectors all{static_cast<int>(inputs), task.actions(), {}, {}};
+  const policy::PolicyNetwork network = network_of(given);
+  policy::PolicyVectors all{network.inputs(), network.outputs(), {}, {}};
   for (const policy::PolicyVectors& v : each) append(all, v);
   return all;
 }
@@ -150,7 +161,9 @@ policy::PolicyVectors saturating(const policy::PolicyNetwork& network, const pol
   policy::PolicyVectors v{network.inputs(), network.outputs(), {}, {}};
   for (float far = 1; far < 1000; far *= kStep)
     for (std::size_t k = 0; k < some.observation.size(); ++k) {
-      const float middle = network.mean[k % network.mean.size()];
+      const std::size_t i = k % static_cast<std::size_t>(network.inputs());
+      const bool of_memory = i >= network.mean.size();  // it never leaves its range
+      const float middle = of_memory ? some.observation[k] : network.mean[i];
       v.observation.push_back(middle + far * (some.observation[k] - middle));
     }
   v.action = evaluate(network, v.observation);
@@ -160,13 +173,17 @@ policy::PolicyVectors saturating(const policy::PolicyNetwork& network, const pol
 policy::PolicyVectors corners(const policy::PolicyNetwork& network, const std::vector<flight::Signal>& observation) {
   policy::PolicyVectors v{network.inputs(), network.outputs(), {}, {}};
   for (const float reach : {0.0F, 1.0F, 1000.0F, 1e30F})  // distance from the middle, in units of half the range
-    for (unsigned pattern = 0; pattern < 4 && (reach > 0 || pattern == 0); ++pattern)
+    for (unsigned pattern = 0; pattern < 4 && (reach > 0 || pattern == 0); ++pattern) {
+      const auto high = [&](std::size_t i) { return (pattern < 2 ? pattern : (i + pattern) % 2) == 1; };
       for (std::size_t i = 0; i < observation.size(); ++i) {
         const auto middle = static_cast<float>((observation[i].low + observation[i].high) / 2);
         const auto half = static_cast<float>((observation[i].high - observation[i].low) / 2);
-        const bool high = (pattern < 2 ? pattern : (i + pattern) % 2) == 1;
-        v.observation.push_back(middle + (high ? reach : -reach) * half);
+        v.observation.push_back(middle + (high(i) ? reach : -reach) * half);
       }
+      const float kept = std::min(reach, 1.0F);
+      for (std::size_t i = 0; i < static_cast<std::size_t>(network.memory()); ++i)
+        v.observation.push_back(high(i) ? kept : -kept);
+    }
   v.action = evaluate(network, v.observation);
   return v;
 }

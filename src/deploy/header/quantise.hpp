@@ -5,6 +5,8 @@
 //   sum = bias + W q         y = sum multiplier                     for each output of a layer
 //   q = round(clamp(max(y, 0), 127))   or   round(127 tanh y)       hidden layers: relu, tanh
 //   action = middle + half tanh y                                   last layer
+//
+// The gates of a GRU are of y, as they are; its memory enters sums as round(127 h).
 #pragma once
 
 #include <cstdint>
@@ -15,15 +17,20 @@ namespace flappy::deploy {
 
 struct QuantisedNetwork {
   std::vector<int> widths;
-  bool relu = true;
+  bool relu = true, recurrent = false;
   std::vector<float> mean, scale;
-  std::vector<std::int8_t> weights;  ///< [layer][output][input]
-  std::vector<std::int32_t> bias;    ///< [layer][output]
-  std::vector<float> multiplier;     ///< [layer][output]
+  /// [layer][output][input]; a recurrent first layer is two: three outputs of each unit from the observation, then from the
+  /// memory
+  std::vector<std::int8_t> weights;
+  std::vector<std::int32_t> bias;  ///< [layer][output]
+  std::vector<float> multiplier;   ///< [layer][output]
   std::vector<float> middle, half;
 
-  int inputs() const { return widths.front(); }
-  int outputs() const { return widths.back(); }
+  int observations() const { return widths.front(); }
+  int actions() const { return widths.back(); }
+  int memory() const { return recurrent ? widths[1] : 0; }
+  int inputs() const { return observations() + memory(); }
+  int outputs() const { return actions() + memory(); }
 };
 
 /// Scales fit `observation`, float[n][inputs]: inputs the largest values seen, activations the least mean square error.

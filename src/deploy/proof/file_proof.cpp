@@ -51,7 +51,8 @@ void ask_far_out(Agreement& row, const policy::Policy& policy, const policy::Pol
   std::vector<float> action(vectors.action.size());
   policy.act(vectors.rows(), vectors.observation.data(), action.data());
   for (std::size_t i = 0; i < action.size(); ++i) {
-    const std::size_t k = i % network.half.size();
+    const std::size_t k = i % static_cast<std::size_t>(network.outputs());
+    if (k >= network.half.size()) continue;  // the memory may be at the end of its range
     const float low = network.middle[k] - network.half[k], high = network.middle[k] + network.half[k];
     row.saturated += vectors.action[i] <= low || vectors.action[i] >= high;
     row.beyond_range += !(action[i] >= low && action[i] <= high);

@@ -23,7 +23,7 @@ struct Agreement {
   double largest_distance_m = 0;
 };
 
-/// Compares outputs alone. `half`: of each output's range; `vectors`: with the actor's actions.
+/// Compares outputs alone. `half`: of each output's range (output_half()); `vectors`: with the actor's actions.
 Agreement compare(const std::string& file, const std::string& runtime, const policy::Policy& policy,
                   const std::vector<float>& half, const policy::PolicyVectors& vectors);
 

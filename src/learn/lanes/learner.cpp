@@ -300,7 +300,8 @@ void Learner<T>::set_actor(const policy::Actor& a) {
   Storage& s = *storage_;
   const NetworkShape& net = s.plan.actor;
   if (!std::ranges::equal(a.widths, std::span(net.widths).first(static_cast<std::size_t>(net.layers) + 1)) ||
-      a.hidden != net.hidden || a.linear || a.layer_norm || a.weights.size() != policy::weight_count(a.widths))
+      a.hidden != net.hidden || a.recurrent || a.linear || a.layer_norm ||
+      a.weights.size() != policy::weight_count(a.widths))
     throw std::invalid_argument("the actor's layers are not those of the learner");
   std::size_t next = 0;
   each_weight(net, [&](int, int, int, std::ptrdiff_t place) {

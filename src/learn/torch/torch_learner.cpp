@@ -274,6 +274,6 @@ std::string version() {
 
 }  // namespace
 
-const TorchLearnerFunctions flappy_torch_learner_functions = {make, version};
+const TorchLearnerFunctions flappy_torch_learner_functions = {make, make_torch_student, version};
 
 }  // namespace flappy::learn

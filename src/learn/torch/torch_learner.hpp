@@ -6,6 +6,7 @@
 #include <string>
 
 #include "learn/lanes/learner.hpp"
+#include "learn/torch/torch_student.hpp"
 
 namespace flappy::learn {
 
@@ -47,9 +48,13 @@ class TorchLearner {
   virtual void set(Kind kind, std::span<const double> numbers) = 0;
 };
 
+std::unique_ptr<TorchStudent> make_torch_student(const policy::Actor& actor);
+
 struct TorchLearnerFunctions {
   /// `twice`: compute in double precision, for tests. Throws io::InputError for a device that LibTorch does not have.
   std::unique_ptr<TorchLearner> (*make)(const LearnerOptions& options, bool twice);
+  /// `actor`: its shape and first weights; hidden layers of relu or tanh, no layer norm.
+  std::unique_ptr<TorchStudent> (*make_student)(const policy::Actor& actor);
   std::string (*version)();  ///< versions of LibTorch and its BLAS, on which the bits of results depend
 };
 /// The functions of the plugin, which is loaded on the first call. Throws io::InputError in a build without LibTorch.

@@ -27,7 +27,7 @@ using Words = std::vector<std::string>;
 
 /// The escape, or another flight, under an actor of random weights.
 rollout::FlyConfig escape(const std::vector<int>& hidden_widths, Activation hidden, const Words& overrides = {},
-                          bool layer_norm = false, const std::string& name = "escape") {
+                          bool layer_norm = false, const std::string& name = "escape", bool recurrent = false) {
   Words all = {"flight.duration_s=0.7", "task.success.keep.until_s=0.7", "flight.threads=1"};
   all.insert(all.end(), overrides.begin(), overrides.end());
   rollout::FlyConfig config = rollout::read_fly_config(test::source_path("configs/fly/" + name + ".toml"), all);
@@ -49,8 +49,16 @@ rollout::FlyConfig escape(const std::vector<int>& hidden_widths, Activation hidd
   const auto random = [&](double size) {
     a.weights.push_back(static_cast<float>((static_cast<double>(engine()) / 0x1p31 - 1) * size));
   };
-  for (std::size_t layer = 0; layer + 1 < a.widths.size(); ++layer) {
-    for (int i = 0; i < (a.widths[layer] + 1) * a.widths[layer + 1]; ++i) random(std::sqrt(3.0 / a.widths[layer]));
+  a.recurrent = recurrent;
+  const auto add = [&](int inputs, int outputs) {
+    for (int i = 0; i < (inputs + 1) * outputs; ++i) random(std::sqrt(3.0 / inputs));
+  };
+  if (recurrent) {
+    add(a.widths[0], 3 * a.widths[1]);
+    add(a.widths[1], 3 * a.widths[1]);
+  }
+  for (std::size_t layer = recurrent ? 1 : 0; layer + 1 < a.widths.size(); ++layer) {
+    add(a.widths[layer], a.widths[layer + 1]);
     if (layer_norm && layer + 2 < a.widths.size())
       for (int i = 0; i < 2 * a.widths[layer + 1]; ++i) random(1);
   }
@@ -82,8 +90,8 @@ std::string compiled(const Folder& folder, const Words& options, const Words& so
 }
 
 std::vector<float> acts(const policy::Policy& policy, const std::vector<float>& observation) {
-  const std::size_t rows = observation.size() / static_cast<std::size_t>(policy.observations());
-  std::vector<float> action(rows * static_cast<std::size_t>(policy.actions()));
+  const std::size_t rows = observation.size() / static_cast<std::size_t>(policy.observations() + policy.memory());
+  std::vector<float> action(rows * static_cast<std::size_t>(policy.actions() + policy.memory()));
   policy.act(rows, observation.data(), action.data());
   return action;
 }
@@ -97,18 +105,22 @@ std::vector<std::uint32_t> bits(const std::vector<float>& numbers) {
 TEST(PolicyHeader, ActsAsTheLanesToTheBit) {
   const Folder folder;
   const std::vector<int> none;
-  for (const auto& [widths, hidden, layer_norm] : {std::tuple{std::vector<int>{32, 32}, Activation::relu, false},
-                                                   {{7, 40, 3, 5, 9}, Activation::tanh, false},
-                                                   {none, Activation::relu, false},
-                                                   {{12, 9}, Activation::elu, false},
-                                                   {{9, 300, 13}, Activation::silu, true}}) {
-    const rollout::FlyConfig config = escape(widths, hidden, {}, layer_norm);
+  for (const auto& [widths, hidden, layer_norm, recurrent] :
+       {std::tuple{std::vector<int>{32, 32}, Activation::relu, false, false},
+        {{7, 40, 3, 5, 9}, Activation::tanh, false, false},
+        {none, Activation::relu, false, false},
+        {{12, 9}, Activation::elu, false, false},
+        {{9, 300, 13}, Activation::silu, true, false},
+        {{16, 32}, Activation::relu, false, true},
+        {{5}, Activation::tanh, false, true}}) {
+    const rollout::FlyConfig config = escape(widths, hidden, {}, layer_norm, "escape", recurrent);
     const policy::PolicyNetwork network = network_of(config);
     const policy::PolicyVectors flown = roll_out(config, 0, 40);
     ASSERT_GT(flown.action.size(), 4000u);
     EXPECT_EQ(bits(evaluate(network, flown.observation)), bits(flown.action));
     folder.write("p.h", header_of(config, network, flown));
-    const auto policy = policy::load_policy(folder / "p.h", network.inputs(), network.outputs());
+    const auto policy = policy::load_policy(folder / "p.h", network.observations(), network.actions());
+    EXPECT_EQ(policy->memory(), recurrent ? widths[0] : 0);
     EXPECT_EQ(bits(acts(*policy, flown.observation)), bits(flown.action));
     const policy::PolicyVectors wild = corners(network, config.fleet.task.observation());
     EXPECT_EQ(bits(acts(*policy, wild.observation)), bits(wild.action));
@@ -119,7 +131,7 @@ TEST(PolicyHeader, ActsAsTheLanesToTheBit) {
     }
     const QuantisedNetwork whole = quantise(network, flown.observation);
     folder.write("q.h", header_of(config, whole, flown));
-    const auto int8 = policy::load_policy(folder / "q.h", network.inputs(), network.outputs());
+    const auto int8 = policy::load_policy(folder / "q.h", network.observations(), network.actions());
     EXPECT_EQ(bits(acts(*int8, flown.observation)), bits(evaluate(whole, flown.observation)));
     EXPECT_EQ(bits(acts(*int8, wild.observation)), bits(evaluate(whole, wild.observation)));
   }
@@ -127,22 +139,24 @@ TEST(PolicyHeader, ActsAsTheLanesToTheBit) {
 
 TEST(PolicyHeader, FliesEveryEpisodeAsTheRunItCameFrom) {
   const Folder folder;
-  const rollout::FlyConfig config = escape({16}, Activation::relu);
-  const policy::PolicyNetwork network = network_of(config);
-  folder.write("p.h", header_of(config, network, roll_out(config, 0, 4)));
-  const auto policy = policy::load_policy(folder / "p.h", network.inputs(), network.outputs());
-  rollout::Evaluator evaluator(config, {.count = 48});
-  const auto actor = evaluator.fly({config.actor, nullptr}, rollout::Detail::full).flights;
-  const auto header = evaluator.fly({nullptr, policy.get()}, rollout::Detail::full).flights;
-  ASSERT_EQ(actor.size(), 48u);
-  for (std::size_t i = 0; i < actor.size(); ++i) {
-    EXPECT_EQ(actor[i].hash, header[i].hash) << i;
-    EXPECT_EQ(actor[i].captured_s, header[i].captured_s) << i;
-    EXPECT_EQ(actor[i].energy_J, header[i].energy_J) << i;
-    EXPECT_EQ(actor[i].success(), header[i].success()) << i;
+  for (const bool recurrent : {false, true}) {
+    const rollout::FlyConfig config = escape({16, 8}, Activation::relu, {}, false, "escape", recurrent);
+    const policy::PolicyNetwork network = network_of(config);
+    folder.write("p.h", header_of(config, network, roll_out(config, 0, 4)));
+    const auto policy = policy::load_policy(folder / "p.h", network.observations(), network.actions());
+    rollout::Evaluator evaluator(config, {.count = 48});
+    const auto actor = evaluator.fly({config.actor, nullptr}, rollout::Detail::full).flights;
+    const auto header = evaluator.fly({nullptr, policy.get()}, rollout::Detail::full).flights;
+    ASSERT_EQ(actor.size(), 48u);
+    for (std::size_t i = 0; i < actor.size(); ++i) {
+      EXPECT_EQ(actor[i].hash, header[i].hash) << i;
+      EXPECT_EQ(actor[i].captured_s, header[i].captured_s) << i;
+      EXPECT_EQ(actor[i].energy_J, header[i].energy_J) << i;
+      EXPECT_EQ(actor[i].success(), header[i].success()) << i;
+    }
+    // flights that know nothing of each other
+    EXPECT_NE(actor[0].hash, actor[1].hash);
   }
-  // flights that know nothing of each other
-  EXPECT_NE(actor[0].hash, actor[1].hash);
 }
 
 TEST(PolicyHeader, IsTheSameBytesForAnyThreads) {
@@ -227,33 +241,38 @@ TEST(PolicyHeader, CatchesEveryFlippedBit) {
 
 TEST(PolicyHeader, AddsNothingUponNaN) {
   const Folder folder;
-  const rollout::FlyConfig config = escape({8}, Activation::relu);
-  const policy::PolicyNetwork network = network_of(config);
-  const policy::PolicyVectors flown = roll_out(config, 0, 4);
-  folder.write("p.h", header_of(config, network, flown));
-  folder.write("q.h", header_of(config, quantise(network, flown.observation), flown));
-  Words files = {"p.h", "q.h"};
+  for (const bool recurrent : {false, true}) {
+    const rollout::FlyConfig config = escape({8, 6}, Activation::relu, {}, false, "escape", recurrent);
+    const policy::PolicyNetwork network = network_of(config);
+    const policy::PolicyVectors flown = roll_out(config, 0, 4);
+    folder.write("p.h", header_of(config, network, flown));
+    folder.write("q.h", header_of(config, quantise(network, flown.observation), flown));
+    Words files = {"p.h", "q.h"};
 #ifdef FLAPPY_HAVE_TORCH
-  folder.write("p.pt", torch_script(network, ""));
-  files.emplace_back("p.pt");
+    folder.write("p.pt", torch_script(network, ""));
+    files.emplace_back("p.pt");
 #endif
-  for (const std::string& file : files) {
-    const auto policy = policy::load_policy(folder / file, network.inputs(), network.outputs());
-    for (std::size_t i = 0; i < network.mean.size(); ++i) {
-      std::vector<float> seen(flown.observation.begin(), flown.observation.begin() + network.inputs());
-      seen[i] = std::nanf("");
-      EXPECT_EQ(acts(*policy, seen), std::vector<float>(4, 0)) << file << ", input " << i;
-      seen[i] = -INFINITY;
-      for (const float x : acts(*policy, seen)) EXPECT_TRUE(std::isfinite(x)) << file << ", input " << i;
+    for (const std::string& file : files) {
+      const auto policy = policy::load_policy(folder / file, network.observations(), network.actions());
+      for (std::size_t i = 0; i < network.mean.size(); ++i) {
+        std::vector<float> seen(flown.observation.end() - network.inputs(), flown.observation.end());
+        seen[i] = std::nanf("");
+        std::vector<float> wanted(4, 0);  // and the memory as it was
+        wanted.insert(wanted.end(), seen.begin() + network.observations(), seen.end());
+        EXPECT_EQ(acts(*policy, seen), wanted) << file << ", input " << i;
+        seen[i] = -INFINITY;
+        for (const float x : acts(*policy, seen)) EXPECT_TRUE(std::isfinite(x)) << file << ", input " << i;
+      }
     }
+    // a header that lets NaN pass fails its own test
+    std::string blind = header_of(config, network, flown);
+    const std::string check = "refused |= flappy_is_nan(x);";
+    blind.replace(blind.find(check), check.size(), "");
+    folder.write("b.h", blind);
+    EXPECT_NE(
+        flight::message([&] { policy::load_policy(folder / "b.h", network.observations(), 4); }).find("self-test: 3"),
+        std::string::npos);
   }
-  // a header that lets NaN pass fails its own test
-  std::string blind = header_of(config, network, flown);
-  const std::string check = "refused |= flappy_is_nan(x);";
-  blind.replace(blind.find(check), check.size(), "");
-  folder.write("b.h", blind);
-  EXPECT_NE(flight::message([&] { policy::load_policy(folder / "b.h", network.inputs(), 4); }).find("self-test: 3"),
-            std::string::npos);
 }
 
 /// Inputs, weights and activations are rounded by 1/(127 sqrt 12) = 0.23 % of their largest, rms. In a sum of 30 terms of random
@@ -276,7 +295,8 @@ TEST(QuantisedPolicy, StaysNearTheActor) {
 TEST(TorchScriptExport, ActsAsTheLanesWithinRounding) {
   const Folder folder;
   for (const Activation hidden : {Activation::relu, Activation::tanh, Activation::elu, Activation::silu}) {
-    const rollout::FlyConfig config = escape({32, 32}, hidden, {}, hidden == Activation::silu);
+    const bool recurrent = hidden == Activation::tanh;
+    const rollout::FlyConfig config = escape({32, 32}, hidden, {}, hidden == Activation::silu, "escape", recurrent);
     const policy::PolicyNetwork network = network_of(config);
     policy::PolicyVectors all = roll_out(config, 0, 40);
     append(all, corners(network, config.fleet.task.observation()));
@@ -284,9 +304,11 @@ TEST(TorchScriptExport, ActsAsTheLanesWithinRounding) {
     EXPECT_EQ(bytes, torch_script(network, "a contract"));
     EXPECT_NE(bytes.find("a contract"), std::string::npos);
     folder.write("p.pt", bytes);
-    const auto action = acts(*policy::load_policy(folder / "p.pt", network.inputs(), 4), all.observation);
+    const auto action = acts(*policy::load_policy(folder / "p.pt", network.observations(), 4), all.observation);
     for (std::size_t i = 0; i < action.size(); ++i)
-      ASSERT_NEAR(action[i], all.action[i], 1e-5 * 2 * network.half[i % 4]) << i;
+      ASSERT_NEAR(action[i], all.action[i],
+                  1e-5 * 2 * network.output_half()[i % static_cast<std::size_t>(network.outputs())])
+          << i;
   }
 }
 #endif

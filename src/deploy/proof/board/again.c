@@ -5,4 +5,8 @@
 #endif
 
 int flappy_again(const float *obs, float *action);
+#if FLAPPY_POLICY_MEMORY > 0
+int flappy_again(const float *obs, float *action) { return flappy_policy_of(obs, action); }
+#else
 int flappy_again(const float *obs, float *action) { return flappy_policy_step(obs, action); }
+#endif

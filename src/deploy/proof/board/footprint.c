@@ -29,6 +29,13 @@ static int flappy_controller_period(float *obs, float *added) {
 }
 #endif
 
+#if defined FOOTPRINT_STEP && FLAPPY_POLICY_MEMORY > 0
+static flappy_policy_state state;
+static int footprint_step(const float *obs, float *act) { return flappy_policy_step_with(&state, obs, act); }
+#undef FOOTPRINT_STEP
+#define FOOTPRINT_STEP footprint_step
+#endif
+
 /* Its frame and what it calls are the stack that is measured. */
 __attribute__((noinline)) static int footprint(void) {
 #if defined FOOTPRINT_STEP

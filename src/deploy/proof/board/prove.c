@@ -8,15 +8,27 @@
 #include "flappy_controller.h"
 #endif
 
-#if FLAPPY_POLICY_OBS != PROVE_OBS || FLAPPY_POLICY_ACT != PROVE_ACT
+/* A policy with a memory is proven as the function that it is. */
+#if FLAPPY_POLICY_MEMORY > 0
+#define PROVEN_IN FLAPPY_POLICY_IN
+#define PROVEN_OUT FLAPPY_POLICY_OUT
+#else
+#define PROVEN_IN FLAPPY_POLICY_OBS
+#define PROVEN_OUT FLAPPY_POLICY_ACT
+#endif
+#if PROVEN_IN != PROVE_OBS || PROVEN_OUT != PROVE_ACT
 #error "FLAPPY_POLICY_OBS and FLAPPY_POLICY_ACT are not those of the policy it is compared with"
 #endif
 
 typedef int (*Step)(const float *obs, float *action);
 
-static float observation[PROVE_VECTORS][FLAPPY_POLICY_OBS], action[PROVE_VECTORS][FLAPPY_POLICY_ACT];
+static float observation[PROVE_VECTORS][PROVEN_IN], action[PROVE_VECTORS][PROVEN_OUT];
 
+#if FLAPPY_POLICY_MEMORY > 0
+static int step(const float *obs, float *act) { return flappy_policy_of(obs, act); }
+#else
 static int step(const float *obs, float *act) { return flappy_policy_step(obs, act); }
+#endif
 
 static int nothing(const float *obs, float *act) {
   (void)obs;
@@ -38,12 +50,12 @@ static uint32_t duration(Step given) {
 
 int main(void) {
   int32_t code[2] = {0, 0};
-  float error[2] = {0.0F, 0.0F}, each[FLAPPY_POLICY_ACT];
+  float error[2] = {0.0F, 0.0F}, each[PROVEN_OUT];
   uint32_t time[2], v;
   if (!board_read(observation, (unsigned)sizeof observation)) return 1;
   code[0] = (int32_t)flappy_policy_selftest();
   flappy_policy_selftest_errors(each);
-  for (v = 0; v < FLAPPY_POLICY_ACT; ++v)
+  for (v = 0; v < PROVEN_OUT; ++v)
     if (!(each[v] <= error[0])) error[0] = each[v];
 #ifdef PROVE_CONTROLLER
   code[1] = (int32_t)flappy_controller_selftest();

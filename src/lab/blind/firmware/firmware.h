@@ -66,6 +66,7 @@ enum {
 };
 
 static flappy_controller firmware_controller;
+static flappy_policy_state firmware_policy;
 static uint32_t firmware_tick_us, firmware_drive_us, firmware_begin_us, firmware_acted, firmware_samples, firmware_frames;
 static int firmware_ticks, firmware_wants, firmware_acts;
 static double firmware_held[2];
@@ -236,7 +237,7 @@ static void firmware_act(void) {
   if (firmware_acted++ % rarely != 0) return;
   flappy_controller_observe(c, obs);
   firmware_spoil(obs);
-  (void)flappy_policy_step(obs, action);
+  (void)flappy_policy_step_with(&firmware_policy, obs, action);
   if (MISTAKE_IS(policy_difference_sign)) action[1] = -action[1];
   if (MISTAKE_IS(one_period_late) || MISTAKE_IS(two_periods_late)) {
     const uint32_t late = MISTAKE_IS(one_period_late) ? 1 : 2, now = firmware_acted - 1;
@@ -254,6 +255,7 @@ static void firmware_tick(uint32_t now_us) {
   if (firmware_ticks++ > 0) (void)flappy_controller_tick(c, now_us);
   if (firmware_wants) {
     flappy_controller_begin(c);
+    flappy_policy_reset(&firmware_policy);
     firmware_begin_us = now_us;
     firmware_wants = 0;
     firmware_acts = 1;

@@ -1,0 +1,404 @@
+#include "learn/student.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "io/parallel.hpp"
+#include "io/temporary_folder.hpp"
+#include "learn/torch/torch_learner.hpp"
+#include "rollout/evaluation.hpp"
+#include "rollout/rollout.hpp"
+#include "sim/random.hpp"
+
+namespace flappy::learn {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+using Lane = model::Lanes<float, 1>;
+
+constexpr std::size_t kTeacherVehicles = 256;     // settled ones from which a teacher's episodes start
+constexpr std::size_t kTeacherReplay = 200'000;   // transitions
+constexpr std::size_t kTeacherEvaluations = 200;  // flights by which it keeps the better of before and after
+constexpr std::size_t kEvaluations = 20;          // of the student, in the run
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+MetricsColumns columns() {
+  MetricsColumns all = train_columns();
+  all.metrics.emplace_back("imitation_loss");
+  return all;
+}
+
+fs::path teacher_file(const fs::path& folder, std::size_t k) {
+  return folder / "teachers" / (std::to_string(k) + ".json");
+}
+
+/// The robot of teacher `k`, in place of all that are drawn.
+TrainConfig of_teacher(const TrainConfig& config, std::size_t k) {
+  TrainConfig c = config;
+  c.student.reset();
+  c.fly.vehicle = config.fly.vehicle_of(kTeacherFlappers + static_cast<std::uint32_t>(k));
+  c.fly.draw_no_vehicles();
+  c.updates = config.student->teacher_updates;
+  c.evaluate_every = c.checkpoint_every = c.updates;
+  c.evaluate_vehicles = std::min(config.evaluate_vehicles, kTeacherEvaluations);
+  c.vehicles = std::min(config.vehicles, kTeacherVehicles);
+  c.replay = std::min(config.replay, std::max(kTeacherReplay, c.flappers * c.return_steps));
+  c.seed = c.learner.seed = config.seed + 1 + k;
+  return c;
+}
+
+/// An actor in single precision, for one observation at a time.
+class Mind {
+ public:
+  explicit Mind(const policy::Actor& a)
+      : numbers_(a.weights.begin(), a.weights.end()),
+        mean_(a.mean.begin(), a.mean.end()),
+        scale_(a.scale.begin(), a.scale.end()),
+        view_(policy::view_of(a, numbers_.data(), mean_.data(), scale_.data())) {}
+  Mind(Mind&&) = default;
+
+  std::size_t units() const { return static_cast<std::size_t>(view_.memory()); }
+  /// `memory`: of units(), changed.
+  void act(const float* observation, float* memory, float* action) const {
+    Lane in[flight::kMaxHistory * flight::kMaxObservation], kept[policy::kMaxMemory], out[policy::kMaxActions];
+    for (int i = 0; i < view_.widths[0]; ++i) in[i] = Lane::load(observation + i);
+    for (std::size_t k = 0; k < units(); ++k) kept[k] = Lane::load(memory + k);
+    policy::evaluate(view_, in, out, kept);
+    for (std::size_t k = 0; k < units(); ++k) kept[k].store(memory + k);
+    for (int k = 0; k < view_.widths[view_.layers]; ++k) out[k].store(action + k);
+  }
+
+ private:
+  std::vector<float> numbers_, mean_, scale_;
+  policy::ActorView<float> view_;
+};
+
+/// Flies all robots with a teacher at once, each by the student or led by its teacher, and notes what its teacher would
+/// have done.
+class School {
+ public:
+  School(const TrainConfig& config, std::vector<Mind> teachers)
+      : config_(config), fly_(config.fly), teachers_(std::move(teachers)), fleet_(make_fleet()) {
+    const flight::Task& task = fly_.fleet.task;
+    inputs_ = task.observation().size(), outputs_ = static_cast<std::size_t>(task.actions());
+    const auto periods = static_cast<std::size_t>(std::ceil(fly_.duration_s * fly_.fleet.control_hz - 1e-6));
+    actions_ = (periods + task.action_repeat - 1) / task.action_repeat;
+    if (task.start.settled)
+      hover_ = rollout::settle<float>(fleet_.options(), flights(), rollout::kHover_s,
+                                      [&](std::uint32_t flapper) { return robot(flapper - fly_.fleet.first_flapper); });
+  }
+
+  std::size_t flights() const { return config_.student->flights; }
+  std::size_t actions() const { return actions_; }
+
+  /// Flies a round; `led`: share of the flights in which the teacher acts.
+  Lessons fly(std::size_t round, const Mind& student, double led) {
+    const std::size_t n = flights();
+    Lessons all{actions_, n, {}, {}, {}};
+    all.observation.assign(actions_ * n * inputs_, 0);
+    all.wanted.assign(actions_ * n * outputs_, 0);
+    all.counts.assign(actions_ * n, 0);
+    start(static_cast<std::uint32_t>(round));
+    std::vector<float> memory(n * student.units(), 0), done(n * outputs_);
+    for (std::size_t t = 0; t < actions_; ++t) {
+      io::parallel_for(n, config_.threads, [&](std::size_t i) {
+        float* const seen = &all.observation[(t * n + i) * inputs_];
+        float* const wanted = &all.wanted[(t * n + i) * outputs_];
+        float* const action = &done[i * outputs_];
+        const bool counts = fleet_.ended(i) == 0 && !fleet_.handed_back(i);
+        if (!counts) return;
+        all.counts[t * n + i] = 1;
+        fleet_.observation(i, seen);
+        teacher(i).act(seen, nullptr, wanted);
+        student.act(seen, memory.data() + i * student.units(), action);
+        const sim::RandomKey key{config_.seed, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(round),
+                                 sim::Stream::exploration};
+        if (sim::uniform_pair(key, 0).first < led) std::copy_n(wanted, outputs_, action);
+      });
+      if (std::ranges::none_of(std::span(all.counts).subspan(t * n, n), [](float x) { return x > 0; })) {
+        all.actions = t;
+        break;
+      }
+      for (std::size_t b = 0; b < fleet_.blocks(); ++b)
+        fleet_.set_actions(b, &done[fleet_.flappers(b).first * outputs_]);
+      for (std::uint32_t k = 0; k < fly_.fleet.task.action_repeat; ++k) fleet_.step();
+    }
+    all.observation.resize(all.actions * n * inputs_);
+    all.wanted.resize(all.actions * n * outputs_);
+    all.counts.resize(all.actions * n);
+    return all;
+  }
+
+ private:
+  flight::Fleet<float> make_fleet() {
+    fly_.fleet.seed = config_.seed;
+    fly_.fleet.first_flapper = kTeacherFlappers;
+    fly_.fleet.batch.threads = config_.threads;
+    return {flights(), fly_.roomy_vehicle(), fly_.fleet};
+  }
+  const Mind& teacher(std::size_t i) const { return teachers_[i % teachers_.size()]; }
+  model::Vehicle robot(std::size_t i) const {
+    return config_.fly.vehicle_of(kTeacherFlappers + static_cast<std::uint32_t>(i % teachers_.size()));
+  }
+
+  void start(std::uint32_t round) {
+    for (std::size_t i = 0; i < flights(); ++i) {
+      if (!hover_.empty()) {
+        fleet_.start(i, round, hover_[i]);
+        continue;
+      }
+      const flight::Task& task = fleet_.options().task;
+      if (round == 0) fleet_.set_vehicle(i, robot(i));
+      fleet_.start(i, round, task.sample_start({config_.seed, kTeacherFlappers + static_cast<std::uint32_t>(i), round}),
+                   task.start.kind);
+    }
+  }
+
+  const TrainConfig& config_;
+  rollout::FlyConfig fly_;
+  std::vector<Mind> teachers_;
+  flight::Fleet<float> fleet_;
+  std::vector<flight::Snapshot<float>> hover_;
+  std::size_t inputs_ = 0, outputs_ = 0, actions_ = 0;
+};
+
+/// The student before it has learnt anything.
+policy::Actor beginner(const TrainConfig& config) {
+  policy::Actor a = config.blank_actor();
+  const StudentOptions& s = *config.student;
+  a.recurrent = s.memory > 0;
+  a.widths = {config.learner.shape.observation};
+  if (a.recurrent) a.widths.push_back(s.memory);
+  a.widths.insert(a.widths.end(), s.hidden.begin(), s.hidden.end());
+  a.widths.push_back(config.learner.shape.action);
+  a.hidden = config.learner.actor_activation;
+  a.mean = config.learner.input.mean, a.scale = config.learner.input.scale, a.clip = config.learner.input.clip;
+  int number_of_layer = 0;
+  const auto add = [&](int inputs, int outputs, double scale) {
+    std::uint32_t number = 0;
+    for (int o = 0; o < outputs; ++o) {
+      a.weights.push_back(0);
+      for (int i = 0; i < inputs; ++i)
+        a.weights.push_back(first_weight(config.seed, 0, number_of_layer, inputs, number++, scale));
+    }
+    ++number_of_layer;
+  };
+  std::size_t layer = 0;
+  if (a.recurrent) {
+    add(a.widths[0], 3 * s.memory, 1);
+    add(s.memory, 3 * s.memory, 1);
+    layer = 1;
+  }
+  for (; layer + 1 < a.widths.size(); ++layer)
+    add(a.widths[layer], a.widths[layer + 1], layer + 2 == a.widths.size() ? config.learner.last_layer_scale : 1);
+  return a;
+}
+
+class StudentTrainer {
+ public:
+  StudentTrainer(const TrainConfig& config, const TrainOptions& options)
+      : config_(config), options_(options), of_(*config.student), folder_(options.folder) {}
+
+  TrainSummary run() {
+    summary_.seed = config_.seed;
+    const auto init = ancestor();
+    if (init && teach(*init)) learn();
+    summary_.stopped = !finished_;
+    summary_.wall_s = seconds_since(options_.started) - summary_.evaluation_s;
+    if (io::writes(options_.ranks) && finished_) write_summary(folder_, summary_);
+    return summary_;
+  }
+
+ private:
+  /// What all teachers learn on from; null if stopped.
+  std::shared_ptr<const TrainInit> ancestor() {
+    if (options_.init) return options_.init;
+    const fs::path folder = folder_ / "ancestor";
+    if (io::writes(options_.ranks) && finished_run_in(folder).is_null()) {
+      TrainConfig config = config_;
+      config.student.reset();
+      TrainOptions options = options_;
+      options.folder = folder;
+      options.from = unfinished_run_in(folder);
+      options.ranks = nullptr;
+      if (!options.from) fs::remove_all(folder);  // stopped before its first checkpoint
+      if (train(config, options).stopped) return nullptr;
+    }
+    io::wait(options_.ranks);
+    return read_train_init(folder);
+  }
+
+  /// Lets this rank's share of the teachers learn. False: stopped.
+  bool teach(const TrainInit& init) {
+    io::make_folder(folder_ / "teachers");
+    const auto shared = std::make_shared<TrainInit>(init);
+    bool going = true;
+    for (std::size_t k = 0; k < of_.teachers && going; ++k) {
+      const fs::path file = teacher_file(folder_, k);
+      if (fs::exists(file) || !io::is_own(options_.ranks, k)) continue;
+      const io::TemporaryFolder work;
+      TrainOptions options;
+      options.folder = work / "teacher";
+      options.init = shared;
+      options.commit = options_.commit;
+      options.keep_going = [&](const TrainProgress&) { return going = keep_going(k, 0, false); };
+      if (train(of_teacher(config_, k), options).stopped) break;
+      fs::copy_file(options.folder / "best.json", file, fs::copy_options::overwrite_existing);
+    }
+    io::wait(options_.ranks);
+    for (std::size_t k = 0; k < of_.teachers; ++k)
+      if (!fs::exists(teacher_file(folder_, k))) {
+        if (!going || options_.ranks == nullptr) return false;
+        throw io::InputError(teacher_file(folder_, k).string() +
+                             ": is not there; accepted: a folder that all ranks share");
+      }
+    return going;
+  }
+
+  void learn() {
+    if (!io::writes(options_.ranks)) {
+      finished_ = true;
+      return;
+    }
+    std::vector<Mind> teachers;
+    for (std::size_t k = 0; k < of_.teachers; ++k) teachers.emplace_back(policy::read_actor(teacher_file(folder_, k)));
+    School school(config_, std::move(teachers));
+    policy::Actor student = beginner(config_);
+    const auto learner = torch_functions().make_student(student);
+    rollout::Evaluator evaluator(rollout::unwatched(config_.fly),
+                                 {config_.evaluate_vehicles, rollout::kValidationFlappers, 1024, nullptr});
+    Metrics metrics(folder_, columns(), 0);
+    std::vector<Lessons> kept;
+    double loss = 0, best = -1;
+    const std::size_t every = std::max<std::size_t>(1, of_.rounds / kEvaluations);
+    for (std::size_t round = 0; round < of_.rounds; ++round) {
+      const double led =
+          std::max(0.0, 1 - static_cast<double>(round) / static_cast<double>(std::max<std::size_t>(1, of_.led)));
+      Lessons flown = school.fly(round, Mind(student), of_.led == 0 ? 0 : led);
+      for (const float x : flown.counts) summary_.env_steps += x > 0 ? config_.fly.fleet.task.action_repeat : 0;
+      summary_.episodes += school.flights();
+      if (kept.size() < of_.kept) kept.push_back(std::move(flown));
+      else kept[round % of_.kept] = std::move(flown);
+      for (std::size_t step = 0; step < of_.steps; ++step) {
+        const double done = (static_cast<double>(round) + static_cast<double>(step) / static_cast<double>(of_.steps)) /
+                            static_cast<double>(of_.rounds);
+        loss += learner->learn(some_of(kept), of_.rate * (1 + (of_.last_rate - 1) * done)) /
+                static_cast<double>(every * of_.steps);
+        ++summary_.updates;
+      }
+      student.weights = learner->weights();
+      const bool evaluates = (round + 1) % every == 0 || round + 1 == of_.rounds;
+      if (evaluates) {
+        const auto from = Clock::now();
+        const rollout::Summary s = rollout::summarise(
+            evaluator.fly({std::make_shared<policy::Actor>(student), nullptr}, rollout::Detail::success).flights);
+        summary_.evaluation_s += seconds_since(from);
+        record(metrics, s, loss);
+        loss = 0;
+        policy::write_actor(folder_ / "last.json", student);
+        if (s.success.value > best) {
+          best = s.success.value;
+          policy::write_actor(folder_ / "best.json", student);
+          summary_.best_success = best, summary_.best_update = summary_.updates;
+        }
+        success_ = s.success.value;
+      }
+      if (!keep_going(of_.teachers, round + 1, evaluates)) return;
+    }
+    metrics.sync();
+    finished_ = true;
+  }
+
+  void record(Metrics& metrics, const rollout::Summary& s, double loss) {
+    const double none = std::numeric_limits<double>::quiet_NaN();
+    const MetricsColumns names = columns();
+    const auto row = [&](const std::vector<std::string>& of, const std::map<std::string, double>& known) {
+      std::vector<double> values;
+      for (const std::string& name : of) values.push_back(known.contains(name) ? known.at(name) : none);
+      return values;
+    };
+    metrics.record(row(names.metrics, {{"update", static_cast<double>(summary_.updates)},
+                                       {"env_steps", static_cast<double>(summary_.env_steps)},
+                                       {"episodes", static_cast<double>(summary_.episodes)},
+                                       {"success_rate", s.success.value},
+                                       {"capture_rate", s.captured.value},
+                                       {"time_to_capture_median_s", s.capture_s.median.value_or(none)},
+                                       {"imitation_loss", loss}}),
+                   row(names.timing, {{"wall_s", seconds_since(options_.started) - summary_.evaluation_s},
+                                      {"evaluation_s", summary_.evaluation_s}}));
+  }
+
+  /// A batch of flights, drawn from all that are kept.
+  Lessons some_of(const std::vector<Lessons>& kept) const {
+    const Lessons& first = kept.front();
+    const std::size_t inputs = first.observation.size() / first.counts.size(),
+                      outputs = first.wanted.size() / first.counts.size(), b = of_.batch;
+    Lessons some{std::ranges::max(kept, {}, &Lessons::actions).actions, b, {}, {}, {}};
+    some.observation.resize(some.actions * b * inputs);
+    some.wanted.resize(some.actions * b * outputs);
+    some.counts.resize(some.actions * b);
+    for (std::size_t k = 0; k < b; ++k) {
+      const auto draw = sim::uniform_pair({config_.seed, static_cast<std::uint32_t>(k),
+                                           static_cast<std::uint32_t>(summary_.updates), sim::Stream::replay},
+                                          0);
+      const auto index = [](double share, std::size_t count) {
+        return std::min(static_cast<std::size_t>(share * static_cast<double>(count)), count - 1);
+      };
+      const Lessons& from = kept[index(draw.first, kept.size())];
+      const std::size_t i = index(draw.second, from.flights);
+      for (std::size_t t = 0; t < from.actions; ++t) {
+        const std::size_t there = t * from.flights + i, here = t * b + k;
+        some.counts[here] = from.counts[there];
+        std::copy_n(&from.observation[there * inputs], inputs, &some.observation[here * inputs]);
+        std::copy_n(&from.wanted[there * outputs], outputs, &some.wanted[here * outputs]);
+      }
+    }
+    return some;
+  }
+
+  /// Shows how far teachers and rounds are, as one count of updates. False: stop.
+  bool keep_going(std::size_t teachers, std::size_t rounds, bool evaluated) const {
+    if (!options_.keep_going) return true;
+    TrainProgress p;
+    p.updates = of_.teachers * of_.teacher_updates + of_.rounds * of_.steps;
+    p.update = teachers * of_.teacher_updates + rounds * of_.steps;
+    p.episodes = summary_.episodes, p.env_steps = summary_.env_steps;
+    p.mean_return = std::numeric_limits<double>::quiet_NaN();
+    p.success = success_;
+    p.evaluated = evaluated;
+    return options_.keep_going(p);
+  }
+
+  const TrainConfig& config_;
+  const TrainOptions& options_;
+  const StudentOptions& of_;
+  const fs::path folder_;
+  TrainSummary summary_;
+  bool finished_ = false;
+  double success_ = -1;
+};
+
+}  // namespace
+
+TrainSummary train_student(const TrainConfig& config, const TrainOptions& options) {
+  if (config.learner.actor_activation > policy::Activation::tanh || config.learner.layer_norm)
+    throw io::InputError("networks: a student learns without layer norm, elu and silu; accepted: relu or tanh");
+  io::make_folder(options.folder);
+  std::optional<io::FolderLock> lock;
+  if (io::writes(options.ranks)) {
+    lock.emplace(options.folder);
+    if (options.goes_on) refuse_other_run_in(options.folder, config, options.init.get());
+    else refuse_run_in(options.folder);
+    if (!options.goes_on) {
+      write_config(config, options.folder);
+      write_start(config, options, "TD3 by lanes, then imitation by libtorch " + torch_functions().version());
+    }
+  }
+  return StudentTrainer(config, options).run();
+}
+
+}  // namespace flappy::learn
