@@ -22,6 +22,8 @@ using Lane = model::Lanes<float, 1>;
 constexpr std::size_t kTeacherVehicles = 256;     // settled ones from which a teacher's episodes start
 constexpr std::size_t kTeacherReplay = 200'000;   // transitions
 constexpr std::size_t kTeacherEvaluations = 200;  // flights by which it keeps the better of before and after
+constexpr double kWellFlown = 0.985;              // success of the ancestor on a robot, from which it teaches itself
+constexpr double kFewest = 0.02;                  // of a round's flights that still go on: the others need not wait
 constexpr std::size_t kEvaluations = 20;          // of the student, in the run
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
@@ -49,6 +51,12 @@ TrainConfig of_teacher(const TrainConfig& config, std::size_t k) {
   c.replay = std::min(config.replay, std::max(kTeacherReplay, c.flappers * c.return_steps));
   c.seed = c.learner.seed = config.seed + 1 + k;
   return c;
+}
+
+double success_of(const TrainConfig& config, const std::shared_ptr<const policy::Actor>& actor) {
+  rollout::Evaluator evaluator(rollout::unwatched(config.fly),
+                               {config.evaluate_vehicles, rollout::kValidationFlappers, 1024, nullptr});
+  return rollout::summarise(evaluator.fly({actor, nullptr}, rollout::Detail::success).flights).success.value;
 }
 
 /// An actor in single precision, for one observation at a time.
@@ -119,7 +127,8 @@ class School {
                                  sim::Stream::exploration};
         if (sim::uniform_pair(key, 0).first < led) std::copy_n(wanted, outputs_, action);
       });
-      if (std::ranges::none_of(std::span(all.counts).subspan(t * n, n), [](float x) { return x > 0; })) {
+      const auto going = std::ranges::count(std::span(all.counts).subspan(t * n, n), 1.0F);
+      if (static_cast<double>(going) < kFewest * static_cast<double>(n)) {
         all.actions = t;
         break;
       }
@@ -240,13 +249,20 @@ class StudentTrainer {
     for (std::size_t k = 0; k < of_.teachers && going; ++k) {
       const fs::path file = teacher_file(folder_, k);
       if (fs::exists(file) || !io::is_own(options_.ranks, k)) continue;
+      const TrainConfig config = of_teacher(config_, k);
+      const auto actor = std::make_shared<policy::Actor>(init.actor);
+      if (success_of(config, actor) >= kWellFlown) {
+        policy::write_actor(file, *actor);
+        going = keep_going(k + 1, 0, false);
+        continue;
+      }
       const io::TemporaryFolder work;
       TrainOptions options;
       options.folder = work / "teacher";
       options.init = shared;
       options.commit = options_.commit;
       options.keep_going = [&](const TrainProgress&) { return going = keep_going(k, 0, false); };
-      if (train(of_teacher(config_, k), options).stopped) break;
+      if (train(config, options).stopped) break;
       fs::copy_file(options.folder / "best.json", file, fs::copy_options::overwrite_existing);
     }
     io::wait(options_.ranks);

@@ -18,9 +18,10 @@ struct Case {
   std::uint64_t in_float, in_double;
 };
 constexpr Case kCases[] = {
-    {"pid", 0xc10ee1b178424d2a, 0xe75aa050a549d8be},           {"notched", 0x061cdb6374941593, 0xa666deb590bb004a},
-    {"arc", 0xf5c1f353f7772075, 0x09d4e56cfd8d8bca},           {"actor", 0x54f8be77e5f165bc, 0xb59c7058671bf3b3},
-    {"beat_averaged", 0x72d2f06ed6f723ff, 0x0b27535666c0d83e}, {"jointed", 0x62fe5c1d3fae5f04, 0x14833ce5fd84951f}};
+    {"pid", 0xc10ee1b178424d2a, 0xe75aa050a549d8be},    {"notched", 0x061cdb6374941593, 0xa666deb590bb004a},
+    {"arc", 0xf5c1f353f7772075, 0x09d4e56cfd8d8bca},    {"memory", 0x92a1f1c47b60df07, 0x16cea4b7124201d0},
+    {"actor", 0x54f8be77e5f165bc, 0xb59c7058671bf3b3},  {"beat_averaged", 0x72d2f06ed6f723ff, 0x0b27535666c0d83e},
+    {"jointed", 0x62fe5c1d3fae5f04, 0x14833ce5fd84951f}};
 
 constexpr std::size_t kFlappers = 272, kSmall = 17;
 constexpr int kPeriods = 10;
@@ -108,7 +109,7 @@ model::Vehicle vehicle(std::size_t id) {
   return v;
 }
 
-std::shared_ptr<const policy::Actor> actor(const Task& task) {
+std::shared_ptr<const policy::Actor> actor(const Task& task, bool recurrent) {
   policy::Actor a;
   for (const Signal& s : task.observation()) {
     a.observation.push_back(s.name);
@@ -118,7 +119,8 @@ std::shared_ptr<const policy::Actor> actor(const Task& task) {
   for (const Signal& s : task.action()) a.action.push_back(s.name);
   a.widths = {static_cast<int>(a.observation.size()), 11, 9, static_cast<int>(a.action.size())};
   a.hidden = policy::Activation::tanh;
-  for (std::size_t i = 0; i < policy::weight_count(a.widths); ++i)
+  a.recurrent = recurrent;
+  for (std::size_t i = 0; i < policy::weight_count(a.widths, false, recurrent); ++i)
     a.weights.push_back(static_cast<double>(i * 37 % 101) / 128 - 0.375);
   return std::make_shared<policy::Actor>(std::move(a));
 }
@@ -181,7 +183,6 @@ Fleet<T> fly(const FleetOptions& common, const std::string& name, std::size_t fi
   o.first_flapper = static_cast<std::uint32_t>(first);
   o.batch.threads = threads;
   o.batch.instruction_set = set;
-  const bool acting = name == "actor";
   const auto of_kind = [&](std::size_t id) {
     return name == "beat_averaged" ? beat_averaged(id) : name == "jointed" ? jointed(id) : vehicle(id);
   };
@@ -190,7 +191,7 @@ Fleet<T> fly(const FleetOptions& common, const std::string& name, std::size_t fi
                  : name == "jointed"     ? jointed(0)
                                          : test::identified(),
                  o);
-  if (acting) fleet.set_actor(actor(o.task));
+  if (name == "actor" || name == "memory") fleet.set_actor(actor(o.task, name == "memory"));
   fleet.set_exploration({0.3, 0.3, 0.4});
   const auto start = [&](std::size_t i, std::uint32_t episode) {
     if ((first + i) % 3 == 0) fleet.start(i, episode, {}, sim::Start::standing);
