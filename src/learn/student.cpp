@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "io/parallel.hpp"
 #include "io/temporary_folder.hpp"
@@ -19,12 +20,10 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 using Lane = model::Lanes<float, 1>;
 
-constexpr std::size_t kTeacherVehicles = 256;     // settled ones from which a teacher's episodes start
-constexpr std::size_t kTeacherReplay = 200'000;   // transitions
-constexpr std::size_t kTeacherEvaluations = 200;  // flights by which it keeps the better of before and after
-constexpr double kWellFlown = 0.985;              // success of the ancestor on a robot, from which it teaches itself
-constexpr double kFewest = 0.02;                  // of a round's flights that still go on: the others need not wait
-constexpr std::size_t kEvaluations = 20;          // of the student, in the run
+constexpr std::size_t kTeacherEvaluations = 1000;  // flights by which it keeps the better of before and after
+constexpr double kWellFlown = 0.985;      // success of the ancestor with an effect, from which it teaches itself
+constexpr double kFewest = 0.02;          // of a round's flights that still go on: the others need not wait
+constexpr std::size_t kEvaluations = 20;  // of the student, in the run
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -34,21 +33,16 @@ MetricsColumns columns() {
   return all;
 }
 
-fs::path teacher_file(const fs::path& folder, std::size_t k) {
-  return folder / "teachers" / (std::to_string(k) + ".json");
-}
-
-/// The robot of teacher `k`, in place of all that are drawn.
+/// Robots with one effect, `k` of those that may be drawn.
 TrainConfig of_teacher(const TrainConfig& config, std::size_t k) {
   TrainConfig c = config;
   c.student.reset();
-  c.fly.vehicle = config.fly.vehicle_of(kTeacherFlappers + static_cast<std::uint32_t>(k));
-  c.fly.draw_no_vehicles();
+  c.fly.drawn_effects->none = 0;
+  c.fly.drawn_effects->most = 1;
+  c.fly.drawn_effects->of = {config.fly.drawn_effects->of[k]};
   c.updates = config.student->teacher_updates;
   c.evaluate_every = c.checkpoint_every = c.updates;
   c.evaluate_vehicles = std::min(config.evaluate_vehicles, kTeacherEvaluations);
-  c.vehicles = std::min(config.vehicles, kTeacherVehicles);
-  c.replay = std::min(config.replay, std::max(kTeacherReplay, c.flappers * c.return_steps));
   c.seed = c.learner.seed = config.seed + 1 + k;
   return c;
 }
@@ -85,19 +79,25 @@ class Mind {
   policy::ActorView<float> view_;
 };
 
-/// Flies all robots with a teacher at once, each by the student or led by its teacher, and notes what its teacher would
-/// have done.
+struct Teacher {
+  Mind mind;
+  double gain;  ///< in success, over the ancestor
+};
+
+/// Flies many robots at once, each by the student or led by its teacher, and notes what its teacher would have done.
 class School {
  public:
-  School(const TrainConfig& config, std::vector<Mind> teachers)
-      : config_(config), fly_(config.fly), teachers_(std::move(teachers)), fleet_(make_fleet()) {
+  /// `teachers`: for each effect that may be drawn.
+  School(const TrainConfig& config, Mind ancestor, std::vector<Teacher> teachers)
+      : config_(config),
+        fly_(config.fly),
+        ancestor_(std::move(ancestor)),
+        teachers_(std::move(teachers)),
+        fleet_(make_fleet()) {
     const flight::Task& task = fly_.fleet.task;
     inputs_ = task.observation().size(), outputs_ = static_cast<std::size_t>(task.actions());
     const auto periods = static_cast<std::size_t>(std::ceil(fly_.duration_s * fly_.fleet.control_hz - 1e-6));
     actions_ = (periods + task.action_repeat - 1) / task.action_repeat;
-    if (task.start.settled)
-      hover_ = rollout::settle<float>(fleet_.options(), flights(), rollout::kHover_s,
-                                      [&](std::uint32_t flapper) { return robot(flapper - fly_.fleet.first_flapper); });
   }
 
   std::size_t flights() const { return config_.student->flights; }
@@ -110,6 +110,7 @@ class School {
     all.observation.assign(actions_ * n * inputs_, 0);
     all.wanted.assign(actions_ * n * outputs_, 0);
     all.counts.assign(actions_ * n, 0);
+    if (round % config_.student->redraw == 0) draw(static_cast<std::uint32_t>(round / config_.student->redraw));
     start(static_cast<std::uint32_t>(round));
     std::vector<float> memory(n * student.units(), 0), done(n * outputs_);
     for (std::size_t t = 0; t < actions_; ++t) {
@@ -121,7 +122,7 @@ class School {
         if (!counts) return;
         all.counts[t * n + i] = 1;
         fleet_.observation(i, seen);
-        teacher(i).act(seen, nullptr, wanted);
+        teaches_[i]->act(seen, nullptr, wanted);
         student.act(seen, memory.data() + i * student.units(), action);
         const sim::RandomKey key{config_.seed, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(round),
                                  sim::Stream::exploration};
@@ -145,32 +146,48 @@ class School {
  private:
   flight::Fleet<float> make_fleet() {
     fly_.fleet.seed = config_.seed;
-    fly_.fleet.first_flapper = kTeacherFlappers;
+    fly_.fleet.first_flapper = kStudentFlappers;
     fly_.fleet.batch.threads = config_.threads;
     return {flights(), fly_.roomy_vehicle(), fly_.fleet};
   }
-  const Mind& teacher(std::size_t i) const { return teachers_[i % teachers_.size()]; }
-  model::Vehicle robot(std::size_t i) const {
-    return config_.fly.vehicle_of(kTeacherFlappers + static_cast<std::uint32_t>(i % teachers_.size()));
+
+  /// New robots, settled if the task starts so, and who teaches them.
+  void draw(std::uint32_t generation) {
+    robots_.clear(), teaches_.clear();
+    for (std::size_t i = 0; i < flights(); ++i) {
+      robots_.push_back(fly_.vehicle_of(kStudentFlappers + static_cast<std::uint32_t>(i), generation));
+      const Mind* best = &ancestor_;
+      double gain = 0;
+      for (std::size_t k = 0; k < teachers_.size(); ++k) {
+        const std::string id = fly_.drawn_effects->of[k].effect->info.id;
+        const bool has = robots_[i].effects.contains(id) && !fly_.vehicle.effects.contains(id);
+        if (has && teachers_[k].gain > gain) best = &teachers_[k].mind, gain = teachers_[k].gain;
+      }
+      teaches_.push_back(best);
+    }
+    if (fly_.fleet.task.start.settled)
+      hover_ = rollout::settle<float>(fleet_.options(), flights(), rollout::kHover_s,
+                                      [&](std::uint32_t flapper) { return robots_[flapper - kStudentFlappers]; });
+    else
+      for (std::size_t i = 0; i < flights(); ++i) fleet_.set_vehicle(i, robots_[i]);
   }
 
   void start(std::uint32_t round) {
+    const flight::Task& task = fleet_.options().task;
     for (std::size_t i = 0; i < flights(); ++i) {
-      if (!hover_.empty()) {
-        fleet_.start(i, round, hover_[i]);
-        continue;
-      }
-      const flight::Task& task = fleet_.options().task;
-      if (round == 0) fleet_.set_vehicle(i, robot(i));
-      fleet_.start(i, round, task.sample_start({config_.seed, kTeacherFlappers + static_cast<std::uint32_t>(i), round}),
-                   task.start.kind);
+      const std::uint32_t flapper = kStudentFlappers + static_cast<std::uint32_t>(i);
+      if (hover_.empty()) fleet_.start(i, round, task.sample_start({config_.seed, flapper, round}), task.start.kind);
+      else fleet_.start(i, round, hover_[i]);
     }
   }
 
   const TrainConfig& config_;
   rollout::FlyConfig fly_;
-  std::vector<Mind> teachers_;
+  const Mind ancestor_;
+  const std::vector<Teacher> teachers_;
   flight::Fleet<float> fleet_;
+  std::vector<model::Vehicle> robots_;
+  std::vector<const Mind*> teaches_;  // [flight]
   std::vector<flight::Snapshot<float>> hover_;
   std::size_t inputs_ = 0, outputs_ = 0, actions_ = 0;
 };
@@ -215,7 +232,7 @@ class StudentTrainer {
   TrainSummary run() {
     summary_.seed = config_.seed;
     const auto init = ancestor();
-    if (init && teach(*init)) learn();
+    if (init && teach(*init)) learn(init->actor);
     summary_.stopped = !finished_;
     summary_.wall_s = seconds_since(options_.started) - summary_.evaluation_s;
     if (io::writes(options_.ranks) && finished_) write_summary(folder_, summary_);
@@ -241,48 +258,60 @@ class StudentTrainer {
     return read_train_init(folder);
   }
 
+  std::string name_of(std::size_t teacher) const { return config_.fly.drawn_effects->of[teacher].effect->info.id; }
+  std::size_t teachers() const { return config_.fly.drawn_effects->of.size(); }
+  fs::path file_of(std::size_t teacher) const { return folder_ / "teachers" / (name_of(teacher) + ".json"); }
+  fs::path gain_of(std::size_t teacher) const { return folder_ / "teachers" / (name_of(teacher) + "_gain.json"); }
+
   /// Lets this rank's share of the teachers learn. False: stopped.
   bool teach(const TrainInit& init) {
     io::make_folder(folder_ / "teachers");
-    const auto shared = std::make_shared<TrainInit>(init);
+    const auto ancestor = std::make_shared<TrainInit>(init);
     bool going = true;
-    for (std::size_t k = 0; k < of_.teachers && going; ++k) {
-      const fs::path file = teacher_file(folder_, k);
-      if (fs::exists(file) || !io::is_own(options_.ranks, k)) continue;
+    for (std::size_t k = 0; k < teachers() && going; ++k) {
+      if (fs::exists(gain_of(k)) || !io::is_own(options_.ranks, k)) continue;
       const TrainConfig config = of_teacher(config_, k);
       const auto actor = std::make_shared<policy::Actor>(init.actor);
-      if (success_of(config, actor) >= kWellFlown) {
-        policy::write_actor(file, *actor);
-        going = keep_going(k + 1, 0, false);
-        continue;
+      const double before = success_of(config, actor);
+      double after = before;
+      if (before < kWellFlown) {
+        const io::TemporaryFolder work;
+        TrainOptions options;
+        options.folder = work / "teacher";
+        options.init = ancestor;
+        options.commit = options_.commit;
+        options.keep_going = [&](const TrainProgress& p) { return going = keep_going(k, p.update, 0, false); };
+        const TrainSummary learnt = train(config, options);
+        if (learnt.stopped) break;
+        after = *learnt.best_success;
+        fs::copy_file(options.folder / "best.json", file_of(k), fs::copy_options::overwrite_existing);
+      } else {
+        policy::write_actor(file_of(k), *actor);
+        going = keep_going(k + 1, 0, 0, false);
       }
-      const io::TemporaryFolder work;
-      TrainOptions options;
-      options.folder = work / "teacher";
-      options.init = shared;
-      options.commit = options_.commit;
-      options.keep_going = [&](const TrainProgress&) { return going = keep_going(k, 0, false); };
-      if (train(config, options).stopped) break;
-      fs::copy_file(options.folder / "best.json", file, fs::copy_options::overwrite_existing);
+      io::write_atomically(gain_of(k), nlohmann::ordered_json{{"before", before}, {"after", after}}.dump() + "\n");
     }
     io::wait(options_.ranks);
-    for (std::size_t k = 0; k < of_.teachers; ++k)
-      if (!fs::exists(teacher_file(folder_, k))) {
+    for (std::size_t k = 0; k < teachers(); ++k)
+      if (!fs::exists(gain_of(k))) {
         if (!going || options_.ranks == nullptr) return false;
-        throw io::InputError(teacher_file(folder_, k).string() +
-                             ": is not there; accepted: a folder that all ranks share");
+        throw io::InputError(gain_of(k).string() + ": is not there; accepted: a folder that all ranks share");
       }
     return going;
   }
 
-  void learn() {
+  void learn(const policy::Actor& ancestor) {
     if (!io::writes(options_.ranks)) {
       finished_ = true;
       return;
     }
-    std::vector<Mind> teachers;
-    for (std::size_t k = 0; k < of_.teachers; ++k) teachers.emplace_back(policy::read_actor(teacher_file(folder_, k)));
-    School school(config_, std::move(teachers));
+    std::vector<Teacher> all;
+    for (std::size_t k = 0; k < teachers(); ++k) {
+      const auto success = nlohmann::json::parse(io::read_text(gain_of(k)), nullptr, false);
+      const double gain = success.is_object() ? success.value("after", 0.0) - success.value("before", 0.0) : 0;
+      all.push_back({Mind(policy::read_actor(file_of(k))), gain});
+    }
+    School school(config_, Mind(ancestor), std::move(all));
     policy::Actor student = beginner(config_);
     const auto learner = torch_functions().make_student(student);
     rollout::Evaluator evaluator(rollout::unwatched(config_.fly),
@@ -323,7 +352,7 @@ class StudentTrainer {
         }
         success_ = s.success.value;
       }
-      if (!keep_going(of_.teachers, round + 1, evaluates)) return;
+      if (!keep_going(teachers(), 0, round + 1, evaluates)) return;
     }
     metrics.sync();
     finished_ = true;
@@ -376,12 +405,12 @@ class StudentTrainer {
     return some;
   }
 
-  /// Shows how far teachers and rounds are, as one count of updates. False: stop.
-  bool keep_going(std::size_t teachers, std::size_t rounds, bool evaluated) const {
+  /// Shows how far teachers and rounds are, as one count of updates. `updates`: of the next teacher. False: stop.
+  bool keep_going(std::size_t done, std::uint64_t updates, std::size_t rounds, bool evaluated) const {
     if (!options_.keep_going) return true;
     TrainProgress p;
-    p.updates = of_.teachers * of_.teacher_updates + of_.rounds * of_.steps;
-    p.update = teachers * of_.teacher_updates + rounds * of_.steps;
+    p.updates = teachers() * of_.teacher_updates + of_.rounds * of_.steps;
+    p.update = done * of_.teacher_updates + updates + rounds * of_.steps;
     p.episodes = summary_.episodes, p.env_steps = summary_.env_steps;
     p.mean_return = std::numeric_limits<double>::quiet_NaN();
     p.success = success_;
@@ -401,8 +430,6 @@ class StudentTrainer {
 }  // namespace
 
 TrainSummary train_student(const TrainConfig& config, const TrainOptions& options) {
-  if (config.learner.actor_activation > policy::Activation::tanh || config.learner.layer_norm)
-    throw io::InputError("networks: a student learns without layer norm, elu and silu; accepted: relu or tanh");
   io::make_folder(options.folder);
   std::optional<io::FolderLock> lock;
   if (io::writes(options.ranks)) {

@@ -186,8 +186,11 @@ class Reader {
     if (!has_libtorch())
       root_.fail("student", "learns by LibTorch, which this build has not",
                  "the package flappy-torch, or a build with libtorch-dev installed");
+    if (!c_.fly.drawn_effects)
+      root_.fail("student", "has no effects to be taught, for none are drawn", "a flight with [drawn_effects]");
+    if (c_.learner.actor_activation > policy::Activation::tanh || c_.learner.layer_norm)
+      root_.fail("student", "has a layer norm, elu or silu", "relu or tanh, without layer norm");
     StudentOptions s;
-    s.teachers = whole("teachers", 1, 100'000);
     s.teacher_updates = static_cast<std::uint64_t>(whole("teacher_updates", 1, 1'000'000'000));
     s.memory = static_cast<int>(whole("memory", 0, policy::kMaxMemory));
     s.hidden = widths(t, "hidden");
@@ -196,6 +199,7 @@ class Reader {
     s.steps = whole("steps", 1, 1'000'000);
     s.batch = whole("batch", 1, 1 << 20);
     s.kept = whole("kept", 1, 10'000);
+    s.redraw = whole("redraw", 1, 1'000'000);
     s.led = whole("led", 0, 1'000'000);
     s.rate = t.number("rate", io::positive(1));
     s.last_rate = t.number_or("last_rate", 1, {0, 1});

@@ -20,11 +20,12 @@
 //                           policy_averaging (weight of the actor in its moving average, the policy; 1: no averaging)
 //   [evaluate]              every (updates), vehicles
 //   [checkpoint]            every (updates), keep
-//   [student]               optional: the run distils many teachers into one policy (learn/student.hpp). teachers (their
-//                           number), teacher_updates (of TD3, for each), memory (units of a GRU before the hidden layers;
-//                           0: none), hidden (widths of its layers), rounds, flights (in a round), steps (of Adam after
-//                           each round), batch (flights in a step), rate, last_rate (its share at the end), kept (rounds
-//                           of flights that are learnt from), led (rounds before the last flight led by a teacher)
+//   [student]               optional: the run distils teachers into one policy (learn/student.hpp). teacher_updates (of
+//                           TD3, for each), memory (units of a GRU before the hidden layers; 0: none), hidden (widths of
+//                           its layers), rounds, flights (in a round, each of another robot), redraw (rounds until new
+//                           robots fly), led (rounds before the last flight led by a teacher), kept (rounds of flights
+//                           that are learnt from), steps (of Adam after each round), batch (flights in a step), rate,
+//                           last_rate (its share at the end)
 //
 // learn.updates, evaluate.every and checkpoint.every are rounded up to multiples of updates_per_step. Overrides of other
 // keys, as "task.reward.goal=1", apply to `fly`.
@@ -39,11 +40,10 @@ namespace flappy::learn {
 
 /// How teachers are distilled into one policy.
 struct StudentOptions {
-  std::size_t teachers = 0;
   std::uint64_t teacher_updates = 0;
   int memory = 0;  ///< units of the GRU; 0: none
   std::vector<int> hidden;
-  std::size_t rounds = 0, flights = 0, steps = 0, batch = 0, kept = 0, led = 0;
+  std::size_t rounds = 0, flights = 0, redraw = 0, led = 0, kept = 0, steps = 0, batch = 0;
   double rate = 0, last_rate = 1;
 };
 

@@ -11,6 +11,7 @@
 #include "io/files.hpp"
 #include "learn/run_folder.hpp"
 #include "learn/torch/torch_learner.hpp"
+#include "model/effects/registry.hpp"
 #include "policy/actor.hpp"
 #include "rollout/fly_fixture.hpp"
 #include "sim/lanes.hpp"
@@ -24,13 +25,16 @@ using flight::Folder;
 const std::vector<std::string> kSmall = {
     "collect.flappers=64",    "collect.vehicles=16",    "learn.updates=60",
     "evaluate.every=60",      "evaluate.vehicles=16",   "checkpoint.every=60",
-    "learn.replay=20000",     "student.teachers=3",     "student.teacher_updates=12",
+    "learn.replay=20000",     "student.redraw=2",       "student.teacher_updates=12",
     "student.rounds=4",       "student.flights=12",     "student.steps=5",
     "student.batch=4",        "student.kept=2",         "student.led=2",
     "collect.steps_before=4", "networks.critic=[16,16]"};
 
 TrainConfig config(std::vector<std::string> more = {}) {
   std::vector<std::string> all = kSmall;
+  for (const model::CatalogueEffect& e : model::catalogue_of(test::identified()))
+    if (const std::string id = e.info.id; id != "wing_damage" && id != "command_delay" && id != "wind")
+      all.push_back("drawn_effects.weights." + id + "=0");
   all.insert(all.end(), more.begin(), more.end());
   return read_train_config(test::source_path("configs/train/escape_student.toml"), all);
 }
@@ -121,22 +125,29 @@ TEST(Student, IsARunThatGoesOnToTheSameBytes) {
   options.keep_going = stop_at(12);
   EXPECT_TRUE(train(config({"threads=2"}), options).stopped);
   EXPECT_TRUE(fs::exists(options.folder / "ancestor" / "summary.json"));
-  EXPECT_FALSE(fs::exists(options.folder / "teachers" / "2.json"));
+  EXPECT_TRUE(fs::exists(options.folder / "teachers" / "wing_damage_gain.json"));
+  EXPECT_FALSE(fs::exists(options.folder / "teachers" / "wind.json"));
   options.goes_on = true;
   options.keep_going = stop_at(41);
   EXPECT_TRUE(train(config({"threads=2"}), options).stopped);
-  EXPECT_TRUE(fs::exists(options.folder / "teachers" / "2.json"));
+  EXPECT_TRUE(fs::exists(options.folder / "teachers" / "wind.json"));
   EXPECT_FALSE(fs::exists(options.folder / "summary.json"));
   options.keep_going = nullptr;
   EXPECT_FALSE(train(config({"threads=2"}), options).stopped);
-  for (const char* file : {"best.json", "last.json", "metrics.jsonl", "teachers/2.json"})
+  for (const char* file : {"best.json", "last.json", "metrics.jsonl", "teachers/wind_gain.json"})
     EXPECT_TRUE(io::read_text(options.folder / file) == io::read_text(folder / "whole" / file)) << file;
 }
 
 TEST(Student, RefusesWhatItCannotLearn) {
   const auto refused = [](const std::string& override) { return flight::message([&] { config({override}); }); };
   EXPECT_NE(refused("student.memory=65").find("student.memory"), std::string::npos) << refused("student.memory=65");
-  EXPECT_NE(refused("student.teachers=0").find("student.teachers"), std::string::npos);
+  EXPECT_NE(refused("student.redraw=0").find("student.redraw"), std::string::npos);
+  EXPECT_NE(refused("networks.activation=\"silu\"").find("accepted: "), std::string::npos);
+  const std::string nothing = flight::message(
+      [] { read_train_config(test::source_path("configs/train/escape_student.toml"), {"fly=../fly/escape.toml"}); });
+  EXPECT_NE(nothing.find("has no effects to be taught, for none are drawn; accepted: a flight with [drawn_effects]"),
+            std::string::npos)
+      << nothing;
   EXPECT_NE(refused("student.hidden=[]").find("student.hidden"), std::string::npos);
   EXPECT_NE(refused("student.more=1").find("student.more"), std::string::npos);
 }

@@ -119,10 +119,16 @@ if(TORCH)
   expect_refused("--int8: whole numbers hold no layer norm, linear output, elu or silu; accepted: a policy of relu or tanh without them"
     ${WORK}/deep --out ${WORK}/deep_int8 --int8)
 
-  # a policy with a memory
-  execute_process(COMMAND ${TRAIN} ${SOURCE}/configs/train/escape_student.toml ${small} --set learn.updates=600 --init ${WORK}/run
-    --set fly=../fly/escape.toml --set student.teachers=2 --set student.teacher_updates=60 --set student.rounds=4 --set student.flights=64
-    --set student.steps=20 --set student.batch=16 --set evaluate.every=60 --set checkpoint.every=60 --out ${WORK}/student
+  # a policy with a memory, whose one teacher knows late commands
+  set(no_effects)
+  foreach(effect IN ITEMS com_offset inertia_products wing_inertia wing_damage driver_dead_zone driver_bandwidth winding_heating battery_sag coulomb_friction
+      spring_hardening stop_compliance gear_backlash wind wing_flexibility rotational_lift wake_capture clap_and_fling ground_effect ceiling_effect added_mass
+      wall_effect body_drag tether gyro_bias accelerometer_misalignment vibration_rectification mocap_tilt marker_offset mocap_delay)
+    list(APPEND no_effects --set drawn_effects.weights.${effect}=0)
+  endforeach()
+  execute_process(COMMAND ${TRAIN} ${SOURCE}/configs/train/escape_student.toml ${small} --init ${WORK}/run --set fly=../fly/escape.toml
+    --set drawn_effects.none=0.5 --set drawn_effects.most=1 --set drawn_effects.magnitude=1.0 ${no_effects} --set student.teacher_updates=6
+    --set student.rounds=4 --set student.flights=64 --set student.steps=20 --set student.batch=16 --out ${WORK}/student
     OUTPUT_QUIET ERROR_VARIABLE err RESULT_VARIABLE code)
   expect_equal("exit code of flappy-train: ${err}" "${code}" 0)
   run(${WORK}/student --out ${WORK}/student_out --int8)

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <sstream>
 
 #include "full.hpp"
 #include "gap/next/next_experiment.hpp"
@@ -134,6 +135,27 @@ TEST_F(Benchmark, PredictsSealsAndScores) {
   EXPECT_EQ(test::refusal([&] { score_bench(merged); }),
             (bench / "half.jsonl").string() + ":1: is no JSON; accepted: a line that flappy-blind score wrote");
   fs::remove(bench / "half.jsonl");
+
+  // robots that fly stand beside those that are on a bench, too; a contrast in flight does not stand beside one on a bench
+  const auto write = [&](const char* name, const std::string& part, bool clamped) {
+    std::string text;
+    std::istringstream lines(cases);
+    for (std::string line; std::getline(lines, line);) {
+      auto record = nlohmann::ordered_json::parse(line);
+      if (!record.contains("bench")) continue;
+      record["bench"] = clamped;
+      record["part"] = part;
+      text += record.dump() + "\n";
+    }
+    io::write_atomically(root_ / name, text);
+    return root_ / name;
+  };
+  merged.cases = {write("one.jsonl", "singles", false), write("other.jsonl", "singles_bench", true)};
+  EXPECT_EQ(score_bench(merged).at("cases"), 4);
+  merged.cases = {write("one.jsonl", "changed", false), write("other.jsonl", "changed", true)};
+  EXPECT_TRUE(test::refusal([&] {
+                score_bench(merged);
+              }).ends_with("is clamped and others fly; accepted: one of both in a table"));
   EXPECT_EQ(asked_, 3);
 
   const auto refused = [&] { return test::refusal([&] { score_bench(command()); }); };
