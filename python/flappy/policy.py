@@ -35,14 +35,15 @@ class Policy:
             from onnxruntime import InferenceSession
 
             self._session = InferenceSession(str(path), providers=["CPUExecutionProvider"])
-            self.units = sum(value.shape[1] for value in self._session.get_inputs()[1:])
+            self.units = sum(int(value.shape[1]) for value in self._session.get_inputs()[1:])
             return
         if path.suffix == ".pt":
             from torch import jit
 
             load: Any = jit.load
             self._script = load(str(path))
-            self.units = getattr(self._script, "memory", 0)
+            units = getattr(self._script, "memory", 0)
+            self.units = units if isinstance(units, int) else 0
             return
         sizes = {"OBS": 0, "ACT": 0}
         if path.suffix == ".h" and path.is_file():

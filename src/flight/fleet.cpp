@@ -125,7 +125,7 @@ void Fleet<T>::set_actor(const std::shared_ptr<const policy::Actor>& actor) {
       for (const double x : *list) s.actor_numbers.push_back(static_cast<T>(x));
   s.point_to_actor();
   const std::size_t size = static_cast<std::size_t>(s.plan.actor.memory()) * kLanes<T>;
-  if (size == s.recalled_size) return;  // else another network acts, which remembers nothing yet
+  if (size == s.recalled_size) return;  // an actor that learns goes on with what is remembered
   s.recalled_size = size;
   s.recalled.assign(s.blocks.size() * size, T(0));
 }

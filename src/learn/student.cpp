@@ -12,6 +12,7 @@
 #include "rollout/evaluation.hpp"
 #include "rollout/rollout.hpp"
 #include "sim/random.hpp"
+#include "sim/storage.hpp"
 
 namespace flappy::learn {
 namespace {
@@ -21,8 +22,8 @@ using Clock = std::chrono::steady_clock;
 using Lane = model::Lanes<float, 1>;
 
 constexpr std::size_t kTeacherEvaluations = 1000;  // flights by which it keeps the better of before and after
-constexpr double kWellFlown = 0.985;      // success of the ancestor with an effect, from which it teaches itself
-constexpr double kFewest = 0.02;          // of a round's flights that still go on: the others need not wait
+constexpr double kWellFlown = 0.98;       // success of the ancestor with an effect, from which it teaches itself
+constexpr double kFewest = 0.02;          // share of a round's flights; with fewer still going on, the round ends
 constexpr std::size_t kEvaluations = 20;  // of the student, in the run
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
@@ -43,7 +44,7 @@ TrainConfig of_teacher(const TrainConfig& config, std::size_t k) {
   c.updates = config.student->teacher_updates;
   c.evaluate_every = c.checkpoint_every = c.updates;
   c.evaluate_vehicles = std::min(config.evaluate_vehicles, kTeacherEvaluations);
-  c.seed = c.learner.seed = config.seed + 1 + k;
+  c.seed = c.learner.seed = sim::mixed(config.seed, 1 + k) % INT32_MAX;
   return c;
 }
 
@@ -106,14 +107,18 @@ class School {
   /// Flies a round; `led`: share of the flights in which the teacher acts.
   Lessons fly(std::size_t round, const Mind& student, double led) {
     const std::size_t n = flights();
-    Lessons all{actions_, n, {}, {}, {}};
-    all.observation.assign(actions_ * n * inputs_, 0);
-    all.wanted.assign(actions_ * n * outputs_, 0);
-    all.counts.assign(actions_ * n, 0);
+    Lessons all{0, n, {}, {}, {}};
+    const auto resize = [&](std::size_t actions) {
+      all.actions = actions;
+      all.observation.resize(actions * n * inputs_);
+      all.wanted.resize(actions * n * outputs_);
+      all.counts.resize(actions * n);
+    };
     if (round % config_.student->redraw == 0) draw(static_cast<std::uint32_t>(round / config_.student->redraw));
     start(static_cast<std::uint32_t>(round));
     std::vector<float> memory(n * student.units(), 0), done(n * outputs_);
     for (std::size_t t = 0; t < actions_; ++t) {
+      resize(t + 1);
       io::parallel_for(n, config_.threads, [&](std::size_t i) {
         float* const seen = &all.observation[(t * n + i) * inputs_];
         float* const wanted = &all.wanted[(t * n + i) * outputs_];
@@ -130,16 +135,14 @@ class School {
       });
       const auto going = std::ranges::count(std::span(all.counts).subspan(t * n, n), 1.0F);
       if (static_cast<double>(going) < kFewest * static_cast<double>(n)) {
-        all.actions = t;
+        resize(t);
         break;
       }
       for (std::size_t b = 0; b < fleet_.blocks(); ++b)
         fleet_.set_actions(b, &done[fleet_.flappers(b).first * outputs_]);
       for (std::uint32_t k = 0; k < fly_.fleet.task.action_repeat; ++k) fleet_.step();
     }
-    all.observation.resize(all.actions * n * inputs_);
-    all.wanted.resize(all.actions * n * outputs_);
-    all.counts.resize(all.actions * n);
+    for (std::vector<float>* list : {&all.observation, &all.wanted, &all.counts}) list->shrink_to_fit();
     return all;
   }
 
@@ -242,20 +245,35 @@ class StudentTrainer {
  private:
   /// What all teachers learn on from; null if stopped.
   std::shared_ptr<const TrainInit> ancestor() {
-    if (options_.init) return options_.init;
-    const fs::path folder = folder_ / "ancestor";
-    if (io::writes(options_.ranks) && finished_run_in(folder).is_null()) {
-      TrainConfig config = config_;
-      config.student.reset();
-      TrainOptions options = options_;
-      options.folder = folder;
-      options.from = unfinished_run_in(folder);
-      options.ranks = nullptr;
-      if (!options.from) fs::remove_all(folder);  // stopped before its first checkpoint
-      if (train(config, options).stopped) return nullptr;
+    const fs::path folder = folder_ / "ancestor", best = folder / "best.json";
+    const bool copied = fs::exists(best) && !fs::exists(folder / "run.json");
+    bool stopped = false;
+    if (io::writes(options_.ranks) && !copied) {
+      if (options_.init) copy(*options_.init, folder);
+      else if (finished_run_in(folder).is_null()) stopped = train_ancestor(folder);
     }
-    io::wait(options_.ranks);
-    return read_train_init(folder);
+    if (io::any(options_.ranks, stopped)) return nullptr;
+    return read_train_init(checkpoints_in(folder).empty() ? best : folder);
+  }
+
+  /// The actor last: with it, the copy is whole.
+  static void copy(const TrainInit& init, const fs::path& folder) {
+    io::make_folder(folder);
+    if (init.checkpoint)
+      fs::copy_file(*init.checkpoint, folder / init.checkpoint->filename(), fs::copy_options::overwrite_existing);
+    policy::write_actor(folder / "best.json", init.actor);
+  }
+
+  /// Whether it was stopped.
+  bool train_ancestor(const fs::path& folder) {
+    TrainConfig config = config_;
+    config.student.reset();
+    TrainOptions options = options_;
+    options.folder = folder;
+    options.from = unfinished_run_in(folder);
+    options.ranks = nullptr;
+    if (!options.from) fs::remove_all(folder);  // stopped before its first checkpoint
+    return train(config, options).stopped;
   }
 
   std::string name_of(std::size_t teacher) const { return config_.fly.drawn_effects->of[teacher].effect->info.id; }
@@ -291,13 +309,11 @@ class StudentTrainer {
       }
       io::write_atomically(gain_of(k), nlohmann::ordered_json{{"before", before}, {"after", after}}.dump() + "\n");
     }
-    io::wait(options_.ranks);
+    if (io::any(options_.ranks, !going)) return false;
     for (std::size_t k = 0; k < teachers(); ++k)
-      if (!fs::exists(gain_of(k))) {
-        if (!going || options_.ranks == nullptr) return false;
+      if (!fs::exists(gain_of(k)))
         throw io::InputError(gain_of(k).string() + ": is not there; accepted: a folder that all ranks share");
-      }
-    return going;
+    return true;
   }
 
   void learn(const policy::Actor& ancestor) {
@@ -308,7 +324,10 @@ class StudentTrainer {
     std::vector<Teacher> all;
     for (std::size_t k = 0; k < teachers(); ++k) {
       const auto success = nlohmann::json::parse(io::read_text(gain_of(k)), nullptr, false);
-      const double gain = success.is_object() ? success.value("after", 0.0) - success.value("before", 0.0) : 0;
+      if (!success.is_object() || !success.value("before", nlohmann::json()).is_number() ||
+          !success.value("after", nlohmann::json()).is_number())
+        throw io::InputError(gain_of(k).string() + ": is damaged; accepted: the file as flappy-train left it");
+      const double gain = success["after"].get<double>() - success["before"].get<double>();
       all.push_back({Mind(policy::read_actor(file_of(k))), gain});
     }
     School school(config_, Mind(ancestor), std::move(all));
@@ -319,11 +338,11 @@ class StudentTrainer {
     Metrics metrics(folder_, columns(), 0);
     std::vector<Lessons> kept;
     double loss = 0, best = -1;
-    const std::size_t every = std::max<std::size_t>(1, of_.rounds / kEvaluations);
+    std::size_t losses = 0;
+    const std::size_t every = (of_.rounds + kEvaluations - 1) / kEvaluations;
     for (std::size_t round = 0; round < of_.rounds; ++round) {
-      const double led =
-          std::max(0.0, 1 - static_cast<double>(round) / static_cast<double>(std::max<std::size_t>(1, of_.led)));
-      Lessons flown = school.fly(round, Mind(student), of_.led == 0 ? 0 : led);
+      const double led = round < of_.led ? 1 - static_cast<double>(round) / static_cast<double>(of_.led) : 0;
+      Lessons flown = school.fly(round, Mind(student), led);
       for (const float x : flown.counts) summary_.env_steps += x > 0 ? config_.fly.fleet.task.action_repeat : 0;
       summary_.episodes += school.flights();
       if (kept.size() < of_.kept) kept.push_back(std::move(flown));
@@ -331,8 +350,8 @@ class StudentTrainer {
       for (std::size_t step = 0; step < of_.steps; ++step) {
         const double done = (static_cast<double>(round) + static_cast<double>(step) / static_cast<double>(of_.steps)) /
                             static_cast<double>(of_.rounds);
-        loss += learner->learn(some_of(kept), of_.rate * (1 + (of_.last_rate - 1) * done)) /
-                static_cast<double>(every * of_.steps);
+        loss += learner->learn(some_of(kept), of_.rate * (1 + (of_.last_rate - 1) * done));
+        ++losses;
         ++summary_.updates;
       }
       student.weights = learner->weights();
@@ -342,8 +361,8 @@ class StudentTrainer {
         const rollout::Summary s = rollout::summarise(
             evaluator.fly({std::make_shared<policy::Actor>(student), nullptr}, rollout::Detail::success).flights);
         summary_.evaluation_s += seconds_since(from);
-        record(metrics, s, loss);
-        loss = 0;
+        record(metrics, s, loss / static_cast<double>(losses));
+        loss = 0, losses = 0;
         policy::write_actor(folder_ / "last.json", student);
         if (s.success.value > best) {
           best = s.success.value;
@@ -430,13 +449,17 @@ class StudentTrainer {
 }  // namespace
 
 TrainSummary train_student(const TrainConfig& config, const TrainOptions& options) {
+  if (options.init) refuse_other_networks(config, *options.init);
   io::make_folder(options.folder);
   std::optional<io::FolderLock> lock;
   if (io::writes(options.ranks)) {
     lock.emplace(options.folder);
-    if (options.goes_on) refuse_other_run_in(options.folder, config, options.init.get());
-    else refuse_run_in(options.folder);
-    if (!options.goes_on) {
+    if (options.goes_on) {
+      const auto run = nlohmann::json::parse(io::read_text(options.folder / "run.json"), nullptr, false);
+      if (!run.is_object() || run.value("config_sha256", "") != config.sha256)
+        throw io::InputError(options.folder.string() + ": holds a run of another configuration; accepted: its own");
+    } else {
+      refuse_run_in(options.folder);
       write_config(config, options.folder);
       write_start(config, options, "TD3 by lanes, then imitation by libtorch " + torch_functions().version());
     }

@@ -4,7 +4,7 @@
 // can tell robots apart by how they fly. Beside what every run writes (trainer.hpp):
 //
 //   RUN/ancestor/                    run of TD3 on all robots, from which each teacher learns on; with TrainOptions::init
-//                                    there is none
+//                                    a copy of its actor and its checkpoint
 //   RUN/teachers/EFFECT.json         actor of a teacher
 //   RUN/teachers/EFFECT_gain.json    {"before": b, "after": a}: success of the ancestor and of the teacher
 //
@@ -19,8 +19,9 @@ namespace flappy::learn {
 /// Number of the student's first robot: none of them is flown in evaluations, or by ancestor and teachers.
 inline constexpr std::uint32_t kStudentFlappers = std::uint32_t{1} << 29;
 
-/// The summary and the records are of the student alone; its updates are steps of Adam. Teachers are shared out to the ranks, which
-/// see one folder. Throws io::InputError as train() does, and where ranks have no common folder.
+/// The summary and the records are of the student alone; its updates are steps of Adam. Teachers are shared out to the
+/// ranks, which see one folder. Throws io::InputError as train() does, for a damaged file of a teacher, and where ranks
+/// have no common folder.
 TrainSummary train_student(const TrainConfig& config, const TrainOptions& options);
 
 }  // namespace flappy::learn

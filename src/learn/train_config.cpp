@@ -188,17 +188,22 @@ class Reader {
                  "the package flappy-torch, or a build with libtorch-dev installed");
     if (!c_.fly.drawn_effects)
       root_.fail("student", "has no effects to be taught, for none are drawn", "a flight with [drawn_effects]");
-    if (c_.learner.actor_activation > policy::Activation::tanh || c_.learner.layer_norm)
-      root_.fail("student", "has a layer norm, elu or silu", "relu or tanh, without layer norm");
+    const io::Table networks = root_.table("networks");
+    if (c_.learner.actor_activation > policy::Activation::tanh)
+      networks.fail("activation", "is what a student does not learn", "\"relu\", \"tanh\"");
+    if (c_.learner.layer_norm) networks.fail("layer_norm", "is what a student does not learn", "false");
     StudentOptions s;
     s.teacher_updates = static_cast<std::uint64_t>(whole("teacher_updates", 1, 1'000'000'000));
     s.memory = static_cast<int>(whole("memory", 0, policy::kMaxMemory));
     s.hidden = widths(t, "hidden");
+    if (s.memory > 0 && s.hidden.size() + 1 >= policy::kMaxLayers)
+      t.fail("hidden", "has " + std::to_string(s.hidden.size()) + " layers behind a memory",
+             "at most " + std::to_string(policy::kMaxLayers - 2));
     s.rounds = whole("rounds", 1, 1'000'000);
-    s.flights = whole("flights", 1, 1 << 20);
+    s.flights = whole("flights", 1, 1 << 16);
     s.steps = whole("steps", 1, 1'000'000);
     s.batch = whole("batch", 1, 1 << 20);
-    s.kept = whole("kept", 1, 10'000);
+    s.kept = whole("kept", 1, 1000);
     s.redraw = whole("redraw", 1, 1'000'000);
     s.led = whole("led", 0, 1'000'000);
     s.rate = t.number("rate", io::positive(1));

@@ -104,13 +104,6 @@ class Trainer {
   }
 
   void start_from(const TrainInit& init) {
-    const policy::Actor own = learner_.actor();
-    if (init.actor.observation != names_.observation || init.actor.action != names_.action)
-      throw io::InputError("--init: the policy observes or does something else than task " + names_.task +
-                           "; accepted: a policy of this task");
-    if (init.actor.mean != own.mean || init.actor.scale != own.scale || init.actor.clip != own.clip)
-      throw io::InputError(
-          "--init: the policy scales its observations in another way; accepted: the same [observation] as its run");
     try {
       if (init.checkpoint) {
         const Checkpoint from(*init.checkpoint);
@@ -437,6 +430,12 @@ void refuse_run_beside_seeds(const fs::path& folder) {
                          ": holds a run of its own; accepted with --seeds: a new folder, or one of --seeds");
 }
 
+static void refuse_recurrent(const fs::path& path, const policy::Actor& actor) {
+  if (actor.recurrent)
+    throw io::InputError(path.string() + ": is a policy with a memory, from which TD3 does not learn on; accepted: " +
+                         "ancestor/ of its run, or a policy without memory");
+}
+
 std::shared_ptr<const TrainInit> read_train_init(const fs::path& path) {
   if (!fs::is_directory(path)) {
     const std::string text = io::read_text(path), ending = path.extension().string();
@@ -449,11 +448,13 @@ std::shared_ptr<const TrainInit> read_train_init(const fs::path& path) {
                            "; accepted: a run folder (its best actor and its critics), or an actor, as best.json of a "
                            "run");
     policy::Actor actor = policy::read_actor(path);
+    refuse_recurrent(path, actor);
     const NetworkKeys keys = network_keys(actor);
     return std::make_shared<TrainInit>(TrainInit{std::move(actor), std::nullopt, io::sha256(text), keys});
   }
-  const Checkpoint newest = newest_checkpoint(path);
   const fs::path best = path / "best.json", config = path / "config" / "train.toml";
+  if (fs::exists(best)) refuse_recurrent(path, policy::read_actor(best));
+  const Checkpoint newest = newest_checkpoint(path);
   policy::Actor actor = policy::read_actor(best);
   const NetworkKeys keys = fs::exists(config) ? network_keys(io::Config::load(config).root()) : network_keys(actor);
   return std::make_shared<TrainInit>(
@@ -468,6 +469,14 @@ void refuse_other_networks(const TrainConfig& config, const TrainInit& init) {
       throw io::InputError("--init: " + key + " is " + there + " there, " + here->second +
                            " in this configuration; accepted: the same networks, as by --set '" + key + "=" + there +
                            "'");
+  const policy::Actor names = config.blank_actor();
+  if (init.actor.observation != names.observation || init.actor.action != names.action)
+    throw io::InputError("--init: the policy observes or does something else than task " + names.task +
+                         "; accepted: a policy of this task");
+  const Normaliser& input = config.learner.input;
+  if (init.actor.mean != input.mean || init.actor.scale != input.scale || init.actor.clip != input.clip)
+    throw io::InputError(
+        "--init: the policy scales its observations in another way; accepted: the same [observation] as its run");
 }
 
 void refuse_other_run_in(const fs::path& folder, const TrainConfig& config, const TrainInit* init) {

@@ -54,7 +54,7 @@ struct TrainOptions {
   std::string commit;          ///< commit of the program
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();  ///< start of the process
   std::function<bool(const TrainProgress&)> keep_going;  ///< called after each step; false: save a checkpoint and stop
-  bool goes_on = false;                                  ///< of a student: the folder may hold this run already
+  bool goes_on = false;                                  ///< of a student: the folder holds this run already
 };
 
 struct TrainSummary {
@@ -77,10 +77,10 @@ inline constexpr double kSuccessLevels[4] = {0.5, 0.8, 0.9, 0.95};
 
 /// Columns of a run's records.
 const MetricsColumns& train_columns();
-/// Writes config/ and run.json. `engine`: LearnerEngine::describe().
-void write_config(const TrainConfig& config, const std::filesystem::path& folder);
 /// Writes summary.json, with the hash of best.json.
 void write_summary(const std::filesystem::path& folder, TrainSummary& summary);
+/// Write config/, and run.json. `engine`: LearnerEngine::describe().
+void write_config(const TrainConfig& config, const std::filesystem::path& folder);
 void write_start(const TrainConfig& config, const TrainOptions& options, const std::string& engine);
 
 /// Memory of a run, and upper bound of its files on disk.
@@ -94,7 +94,7 @@ std::filesystem::path seed_folder(const std::filesystem::path& folder, std::uint
 void refuse_run_in(const std::filesystem::path& folder);
 /// Throws io::InputError if a folder for runs of seeds holds a run of its own.
 void refuse_run_beside_seeds(const std::filesystem::path& folder);
-/// Throws io::InputError, with the key that differs, for an `init` of other networks.
+/// Throws io::InputError, with the key that differs, for an `init` of other networks, of another task or other scales.
 void refuse_other_networks(const TrainConfig& config, const TrainInit& init);
 /// Throws io::InputError if the folder holds a run of another configuration or with other initial networks.
 void refuse_other_run_in(const std::filesystem::path& folder, const TrainConfig& config, const TrainInit* init);

@@ -116,6 +116,9 @@ std::unique_ptr<const Policy> load_header(const fs::path& path, int observations
             memory = number("_loaded_memory");
   const auto step = reinterpret_cast<Header::Step>(symbol("_loaded_step"));
   const auto selftest = reinterpret_cast<int (*)()>(symbol("_loaded_selftest"));
+  if (memory < 0 || memory > kMaxRemembered)
+    refuse(header, "remembers " + std::to_string(memory) + " numbers",
+           "FLAPPY_POLICY_MEMORY from 0 to " + std::to_string(kMaxRemembered));
   auto policy = std::make_unique<Header>(std::move(*loaded), has_observations, has_actions, memory, step);
   if (policy->observations() != observations || policy->actions() != actions)
     refuse(header,

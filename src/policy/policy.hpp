@@ -45,6 +45,9 @@ bool is_policy_file(const std::filesystem::path& path);
 /// Those and actors, for messages.
 inline constexpr const char* kPolicyFiles = "an actor (.json), TorchScript (.pt), ONNX (.onnx) or a C header (.h)";
 
+/// Most numbers that a policy of a file may remember.
+inline constexpr int kMaxRemembered = 1 << 16;
+
 inline constexpr std::string_view kPrefix = "flappy";
 
 /// Replaces the prefix "flappy_" or "FLAPPY_" of names by `prefix` in the same case; not in paths.

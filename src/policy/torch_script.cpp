@@ -13,8 +13,6 @@
 namespace flappy::policy {
 namespace {
 
-constexpr std::int64_t kMaxRemembered = 1 << 16;  // numbers that a policy may remember
-
 std::string reason(const std::string& complaint) {
   const std::size_t mark = complaint.rfind("Error: ");
   const std::size_t begin = mark == std::string::npos ? 0 : mark + 7;
@@ -26,8 +24,12 @@ class TorchScript : public Policy {
   TorchScript(const torch::jit::Module& module, int observations, int actions)
       : Policy(observations, actions), module_(module) {
     module_.eval();
-    if (module_.hasattr("memory") && module_.attr("memory").isInt())
-      memory_ = static_cast<int>(std::clamp<std::int64_t>(module_.attr("memory").toInt(), 0, kMaxRemembered));
+    if (!module_.hasattr("memory") || !module_.attr("memory").isInt()) return;
+    const std::int64_t units = module_.attr("memory").toInt();
+    if (units < 0 || units > kMaxRemembered)
+      throw io::InputError("a TorchScript that remembers " + std::to_string(units) + " numbers; accepted: 0 to " +
+                           std::to_string(kMaxRemembered));
+    memory_ = static_cast<int>(units);
   }
 
   void act(std::size_t count, const float* observation, float* action) const override {
@@ -46,7 +48,10 @@ class TorchScript : public Policy {
     if (memory() == 0) return module_.forward({in}).toTensor().contiguous();
     const auto made =
         module_.forward({in.narrow(1, 0, observations()), in.narrow(1, observations(), memory())}).toTuple();
-    return torch::cat({made->elements().at(0).toTensor(), made->elements().at(1).toTensor()}, 1).contiguous();
+    const torch::Tensor action = made->elements().at(0).toTensor(), next = made->elements().at(1).toTensor();
+    if (next.dim() != 2 || next.size(1) != memory())
+      throw std::runtime_error("Error: the next memory is not as wide as the memory, " + std::to_string(memory()));
+    return torch::cat({action, next}, 1).contiguous();
   }
 
  private:
@@ -125,6 +130,8 @@ std::unique_ptr<const Policy> load(const std::filesystem::path& path, int observ
   std::unique_ptr<TorchScript> policy;
   try {
     policy = std::make_unique<TorchScript>(torch::jit::load(file), observations, actions);
+  } catch (const io::InputError&) {
+    throw;
   } catch (const std::exception& e) {
     io::refuse(path, "is no TorchScript file: " + reason(e.what()), "what torch.jit.save writes");
   }

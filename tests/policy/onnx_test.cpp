@@ -53,14 +53,14 @@ TEST(Onnx, ActsOnRows) {
   EXPECT_EQ(model.metadata_props(0).key() + " " + model.metadata_props(0).value(), "task a task");
 }
 
-/// One unit whose sums are worked out by hand: seen (0, 0, x), kept (0, 0, h).
+/// One unit whose sums are worked out by hand: seen (1, -2, x), kept (0, 0, h).
 TEST(Onnx, Remembers) {
   const Folder folder;
   PolicyNetwork n;
   n.widths = {1, 1, 1};
   n.recurrent = true;
   n.mean = {0}, n.scale = {1}, n.clip = 10;
-  n.weights = {0, 0, 0, 0, 0, 1, /**/ 0, 0, 0, 0, 0, 1, /**/ 0, 1};
+  n.weights = {1, 0, -2, 0, 0, 1, /**/ 0, 0, 0, 0, 0, 1, /**/ 0, 1};
   n.middle = {0}, n.half = {2};
   const auto policy = load_policy(folder.write("p.onnx", onnx_model(n, {})), 1, 1);
   ASSERT_EQ(policy->memory(), 1);
@@ -68,8 +68,8 @@ TEST(Onnx, Remembers) {
   const std::vector<float> seen = {1, 0.5F, nan, 0.25F};
   std::vector<float> made(4);
   policy->act(2, seen.data(), made.data());
-  // both gates are 1/2: new = tanh(x + h / 2), next = (new + h) / 2
-  const double next = (std::tanh(1.25) + 0.5) / 2;
+  const double reset = 1 / (1 + std::exp(-1.0)), update = 1 / (1 + std::exp(2.0));
+  const double next = (1 - update) * std::tanh(1 + reset * 0.5) + update * 0.5;
   EXPECT_NEAR(made[1], next, 1e-6);
   EXPECT_NEAR(made[0], 2 * std::tanh(next), 1e-6);
   EXPECT_EQ(made[2], 0);      // refused

@@ -16,13 +16,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A trained actor evaluated from its weights, or a policy in TorchScript or a C header.
+/// A trained actor evaluated from its weights, or a policy in TorchScript or a C header. Each copy of what it returns has a
+/// memory of its own.
 ObservationPolicy policy_of(const fs::path& path, const rollout::FlyConfig& config) {
   if (const auto& actor = config.actor) {
-    return [actor, task = config.fleet.task.constants](const std::vector<double>& observation) {
+    const auto units = static_cast<std::size_t>(actor->recurrent ? actor->widths[1] : 0);
+    return [actor, task = config.fleet.task.constants,
+            memory = std::vector<double>(units, 0)](const std::vector<double>& observation) mutable {
       const auto view = policy::view_of(*actor, actor->weights.data(), actor->mean.data(), actor->scale.data());
       double action[flight::kMaxActions];
-      policy::evaluate(view, observation.data(), action);
+      policy::evaluate(view, observation.data(), action, memory.data());
       std::array<double, flight::kMaxActions> adds{};
       for (int i = 0; i < flight::kMaxActions; ++i)
         adds[static_cast<std::size_t>(i)] = flight::scaled_action(task, i, action[i]);
@@ -32,13 +35,17 @@ ObservationPolicy policy_of(const fs::path& path, const rollout::FlyConfig& conf
   const std::shared_ptr<const policy::Policy> policy =
       policy::load_policy(path, static_cast<int>(config.fleet.task.observation().size()), flight::kMaxActions);
   const auto one_at_a_time = std::make_shared<std::mutex>();
-  return [policy, one_at_a_time, task = config.fleet.task.constants](const std::vector<double>& observation) {
-    const std::vector<float> row(observation.begin(), observation.end());
-    float action[flight::kMaxActions];
+  return [policy, one_at_a_time, task = config.fleet.task.constants,
+          memory = std::vector<float>(static_cast<std::size_t>(policy->memory()), 0)](
+             const std::vector<double>& observation) mutable {
+    std::vector<float> row(observation.begin(), observation.end());
+    row.insert(row.end(), memory.begin(), memory.end());
+    std::vector<float> action(flight::kMaxActions + memory.size());
     {
       const std::scoped_lock lock(*one_at_a_time);
-      policy->act(1, row.data(), action);
+      policy->act(1, row.data(), action.data());
     }
+    std::copy(action.begin() + flight::kMaxActions, action.end(), memory.begin());
     std::array<double, flight::kMaxActions> adds{};
     for (std::size_t i = 0; i < adds.size(); ++i)
       adds[i] = std::clamp<double>(action[i], task.action_low[i], task.action_high[i]);

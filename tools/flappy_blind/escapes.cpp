@@ -28,7 +28,7 @@ Json fly_escapes(const EscapeOptions& o) {
   try {
     io::parallel_for(o.count, 0, [&](std::size_t i) {
       if (io::interrupted()) return;
-      escapes[i] = escape(robot, i, rules);
+      escapes[i] = escape(robot, i, EscapeRules(rules));  // a policy may remember
       const std::scoped_lock lock(mutex);
       progress.show(static_cast<double>(++done) / static_cast<double>(o.count));
     });

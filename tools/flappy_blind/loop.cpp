@@ -211,9 +211,11 @@ class Loop {
   std::function<bool(std::size_t)> escapes_of(const std::string& family, const Assignment& a,
                                               const EscapeRules& rules) const {
     if (family == "a")
-      return [robot = case_of(a), rules](std::size_t n) { return outcome_of(escape(robot, n, rules)).success(); };
+      return [robot = case_of(a), rules](std::size_t n) {
+        return outcome_of(escape(robot, n, EscapeRules(rules))).success();
+      };
     return [&of = benchmark::family_named(family), a, asked = escape_assignment(rules, command_.config)](
-               std::size_t n) { return of.escape(a, n, asked).success; };
+               std::size_t n) { return of.escape(a, n, EscapeAssignment(asked)).success; };
   }
 
   struct Row {

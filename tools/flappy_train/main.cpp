@@ -68,13 +68,17 @@ void print(const fs::path& folder, const TrainSummary& s) {
                 static_cast<unsigned long long>(s.best_update));
   std::printf("  time to 50, 80, 90, 95 %% success:");
   for (const auto& t : s.time_to_s) t ? std::printf(" %.1f s", *t) : std::printf(" -");
-  std::printf("\n  simulation %.0f %%, learning %.0f %%, the rest %.0f %% of the time of all threads\n",
-              100 * s.share_simulation, 100 * s.share_learning, 100 * (1 - s.share_simulation - s.share_learning));
+  std::printf("\n");
+  if (s.share_learning > 0)
+    std::printf("  simulation %.0f %%, learning %.0f %%, the rest %.0f %% of the time of all threads\n",
+                100 * s.share_simulation, 100 * s.share_learning, 100 * (1 - s.share_simulation - s.share_learning));
   if (s.ranks > 1)
     std::printf("  %d ranks: %.0f kB came from others for each update, %.0f %% of the time in exchanges\n", s.ranks,
                 s.exchanged_bytes / 1e3 / static_cast<double>(std::max<std::uint64_t>(1, s.updates)),
                 100 * s.exchange_s / s.wall_s);
-  std::printf("  policy %s, last checkpoint's payload %s\n", (folder / "best.json").c_str(), s.payload_sha256.c_str());
+  std::printf("  policy %s", (folder / "best.json").c_str());
+  if (!s.payload_sha256.empty()) std::printf(", last checkpoint's payload %s", s.payload_sha256.c_str());
+  std::printf("\n");
   if (s.stopped) std::printf("  go on: flappy-train --resume %s\n", folder.c_str());
   std::printf("%s\n", io::shown_by(folder.string()).c_str());
 }
@@ -166,9 +170,11 @@ void train_seeds(io::Program& program, const std::vector<std::uint64_t>& seeds, 
   for (std::size_t i = 0; i < seeds.size() && !io::interrupted(); ++i) {
     if (!io::is_own(ranks, i)) continue;
     options.folder = folder_of(seeds[i]);
-    options.from = unfinished_run_in(options.folder);
     if (!finished_run_in(options.folder).is_null()) continue;
-    train_one(config_of(seeds[i]), options);
+    const TrainConfig config = config_of(seeds[i]);
+    options.goes_on = config.student && fs::exists(options.folder / "run.json");
+    if (!config.student) options.from = unfinished_run_in(options.folder);
+    train_one(config, options);
     options.started = std::chrono::steady_clock::now();
   }
   io::wait(ranks);
@@ -276,8 +282,12 @@ int main(int argc, char** argv) {
       const learn::TrainConfig config =
           io::read_of_run(resume, [&] { return learn::read_train_config(config_file, with_threads({})); });
       options.folder = resume;
-      if (config.student) options.goes_on = true;
-      else options.from = from.empty() ? learn::newest_checkpoint(resume).path() : fs::path(resume) / from;
+      options.goes_on = config.student.has_value();
+      if (options.goes_on && !from.empty())
+        throw io::InputError("--from " + from + ": a student has no checkpoints; accepted: --resume " + resume +
+                             " alone");
+      if (!options.goes_on)
+        options.from = from.empty() ? learn::newest_checkpoint(resume).path() : fs::path(resume) / from;
       return train_it(config);
     }
     if (!init.empty()) options.init = learn::read_train_init(init);

@@ -29,7 +29,7 @@ static inline const float *flappy_policy_layer(const float *weights, const float
     out[o + 2] = s2;
     out[o + 3] = s3;
   }
-  for (o = outputs & ~3U; o < outputs; ++o) { /* from there, or gcc 12 sees no end of it */
+  for (o = outputs & ~3U; o < outputs; ++o) { /* said once more, or gcc 12 warns that o might wrap */
     float sum = *weights++;
     for (i = 0; i < inputs; ++i) sum = flappy_fma(*weights++, in[i], sum);
     out[o] = sum;

@@ -30,7 +30,7 @@ static inline const int8_t *flappy_policy_layer(const int8_t *weights, const int
     sum[o + 2] = s2;
     sum[o + 3] = s3;
   }
-  for (o = outputs & ~3U; o < outputs; ++o) /* from there, or gcc 12 sees no end of it */
+  for (o = outputs & ~3U; o < outputs; ++o) /* said once more, or gcc 12 warns that o might wrap */
     for (i = 0; i < inputs; ++i) sum[o] += *weights++ * (int32_t)in[i];
   return weights;
 }

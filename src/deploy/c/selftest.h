@@ -48,7 +48,7 @@ static inline int flappy_policy_selftest(void) {
   for (bad = 0; bad < FLAPPY_POLICY_OBS; ++bad) {
     flappy_float nan;
     nan.bits = 0x7fc00000U;
-    for (i = 0; i < FLAPPY_POLICY_IN; ++i) in[i] = i == bad ? nan.number : flappy_policy_test_obs[0][i];
+    for (i = 0; i < FLAPPY_POLICY_IN; ++i) in[i] = i == bad ? nan.number : flappy_policy_test_obs[FLAPPY_POLICY_VECTORS - 1][i];
     if (flappy_policy_of(in, out) == 0) return FLAPPY_POLICY_FAILED_NAN;
     for (i = 0; i < FLAPPY_POLICY_OUT; ++i) {
       const float right = i < FLAPPY_POLICY_ACT ? 0.0F : in[FLAPPY_POLICY_OBS + i - FLAPPY_POLICY_ACT];

@@ -18,11 +18,21 @@ using io::refuse;
 
 /// Compiled after both headers. Its names stand for static inline functions, which no library shows.
 constexpr const char* kWrapper = R"(
+#ifndef FLAPPY_POLICY_MEMORY /* exported before policies had one */
+typedef struct {
+  float nothing;
+} flappy_policy_state;
+static inline void flappy_policy_reset(flappy_policy_state *state) { state->nothing = 0.0F; }
+static inline int flappy_policy_step_with(flappy_policy_state *state, const float *obs, float *action) {
+  (void)state;
+  return flappy_policy_step(obs, action);
+}
+#endif
 typedef struct {
   flappy_controller controller;
   flappy_policy_state policy;
 } flown_state;
-static void flown_reset(flappy_controller *c) { flappy_policy_reset(&((flown_state *)c)->policy); }
+void flown_reset(flappy_controller *c) { flappy_policy_reset(&((flown_state *)c)->policy); }
 unsigned flown_state_bytes(void) { return (unsigned)sizeof(flown_state); }
 int flown_selftests(void) {
   return flappy_policy_selftest() != 0 ? 1 : flappy_controller_selftest() != 0 ? 2 : 0;
@@ -74,8 +84,9 @@ void flown_observe(const flappy_controller *c, float *obs) { flappy_controller_o
 void flown_forget(flappy_controller *c) {
 #if FLAPPY_CONTROLLER_PAST > 0
   c->remembers = 0;
+#else
+  (void)c;
 #endif
-  flown_reset(c);
 }
 int flown_policy(flappy_controller *c, const float *obs, float *action) {
   return flappy_policy_step_with(&((flown_state *)c)->policy, obs, action);
@@ -221,6 +232,7 @@ ExportedC::ExportedC(const fs::path& folder, Build build, const std::string& con
   take(ticks, "flown_ticks");
   take(observe, "flown_observe");
   take(forget, "flown_forget");
+  take(reset, "flown_reset");
   take(policy, "flown_policy");
   take(act, "flown_act");
   take(steer, "flown_steer");

@@ -76,7 +76,8 @@ class ExportedC {
   void (*set_handed_back)(void* state, int handed_back);
   std::uint32_t (*ticks)(const void* state);  ///< control periods since begin()
   void (*observe)(const void* state, float* observation);
-  void (*forget)(void* state);  ///< the history, and the memory of a recurrent policy
+  void (*forget)(void* state);  ///< the history
+  void (*reset)(void* state);   ///< the memory of a recurrent policy
   /// Only the memory of `state` is used.
   int (*policy)(void* state, const float* observation, float* action);
   void (*act)(void* state, const float* action);

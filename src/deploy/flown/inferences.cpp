@@ -14,7 +14,9 @@ namespace {
 
 constexpr double kSame = 0.99, kFollows = 0.95, kOfRange = 0.01;
 constexpr int kDithers = 8;
-constexpr double kPause = 3;        ///< policy periods without an inference, after which a policy has been reset
+/// Policy periods between inferences: more than kMissed, and the log has missed one; more than kPause, and the policy has
+/// been reset.
+constexpr double kMissed = 1.5, kPause = 3;
 constexpr double kRounding = 1e-6;  ///< of an output's range: single precision rounds the policy's sums
 
 /// Where each number of the contract is in a row of the log.
@@ -60,15 +62,21 @@ Inferences check_inferences(const std::filesystem::path& folder, const Contract&
   // a recurrent policy remembers; each dithered sequence of observations has a state of its own
   std::vector<std::vector<std::uint64_t>> states(kDithers + 1,
                                                  std::vector<std::uint64_t>(exported.state_bytes() / 8 + 1));
-  double last_s = 0;
+  double last_s = -INFINITY;
+  bool unknown = false;  // what the policy remembers, since the log missed an inference
   for (std::size_t row = 0; row < log.inferences.size(); ++row) {
     const auto number = [&](std::size_t k) { return log.inferences[row].numbers[at[k]]; };
     bool begun = false;  // before its first inference all numbers are 0
     for (std::size_t k = 0; k < seen; ++k) begun = begun || number(k) != 0;
     if (!begun) continue;
-    if (contract.memory > 0 && (row == 0 || log.inferences[row].t_s - last_s > kPause * contract.policy_s))
-      for (auto& state : states) exported.begin(state.data());
+    const double pause_s = log.inferences[row].t_s - last_s;
+    if (contract.memory > 0 && pause_s > kMissed * contract.policy_s) {
+      unknown = pause_s <= kPause * contract.policy_s;
+      if (!unknown)
+        for (auto& state : states) exported.reset(state.data());
+    }
     last_s = log.inferences[row].t_s;
+    if (unknown) continue;
     ++found.rows;
     for (std::size_t d = 0; d <= kDithers; ++d)  // the digits that the log has lost
       for (std::size_t k = 0; k < seen; ++k) {

@@ -195,7 +195,7 @@ void add_observations(List& list, const Contract& contract) {
            [](Wiring& w) { w.mean = w.scale = false; });
   if (contract.memory > 0)
     list.add(kStage, "memory_not_kept", "the policy's memory is reset before each inference",
-             [](Wiring& w) { w.history = false; });
+             [](Wiring& w) { w.memory = false; });
   if (contract.history > 1)
     list.add(kStage, "history_not_kept", "earlier observations are not kept", [](Wiring& w) { w.history = false; });
   std::vector<Parameters> around;

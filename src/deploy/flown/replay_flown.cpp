@@ -171,6 +171,7 @@ class Loop {
     if (c_.ticks(state()) % repeat == 0) {
       float action[4];
       if (!w_.history) c_.forget(state());
+      if (!w_.memory) c_.reset(state());
       c_.observe(state(), observation_.data());
       std::vector<float> seen = observed();
       c_.policy(state(), otherwise_normalised(seen).data(), action);

@@ -30,7 +30,7 @@ struct Wiring {
   std::vector<int> order;          ///< index of the right observation for each; empty: in order
   std::vector<char> zero;          ///< which stay 0; empty: none
   bool mean = true, scale = true;  ///< of the normalisation, applied
-  bool history = true;
+  bool history = true, memory = true;
   std::array<double, 3> goal_m = {0, 0, 0};  ///< is added to the position's error
 
   // Time
