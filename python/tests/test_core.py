@@ -304,6 +304,24 @@ def test_a_header_acts(tmp_path):
         policy(np.zeros(4))
 
 
+def test_a_header_remembers(tmp_path):
+    (tmp_path / "p.h").write_text(
+        "#define FLAPPY_POLICY_OBS 1\n#define FLAPPY_POLICY_ACT 1\n#define FLAPPY_POLICY_MEMORY 1\n"
+        "static void flappy_policy_of(const float in[2], float out[2]) { out[0] = out[1] = in[0] + in[1]; }\n"  # adds up what it has seen
+        "static int flappy_policy_selftest(void) { return 0; }\n"
+    )
+    policy = flappy.Policy(tmp_path / "p.h")
+    seen = np.array([[1], [10]], np.float32)
+    assert [policy(seen).tolist() for _ in range(2)] == [[[1], [10]], [[2], [20]]]
+    assert policy.memory.tolist() == [[2], [20]]
+    policy.reset([True, False])
+    assert policy(seen).tolist() == [[1], [30]]
+    with pytest.raises(ValueError, match=r"has 1 rows; accepted: 2, as before, or reset\(\) first"):
+        policy(seen[0])
+    policy.reset()
+    assert policy(seen[0]).tolist() == [1]
+
+
 def test_an_onnx_file_acts(tmp_path):
     pytest.importorskip("onnxruntime")
 

@@ -449,6 +449,10 @@ class StudentTrainer {
 }  // namespace
 
 TrainSummary train_student(const TrainConfig& config, const TrainOptions& options) {
+  if (!has_libtorch())
+    throw io::InputError(
+        "student: learns by LibTorch, which this build has not; accepted: the package flappy-torch, or a build with "
+        "libtorch-dev installed");
   if (options.init) refuse_other_networks(config, *options.init);
   io::make_folder(options.folder);
   std::optional<io::FolderLock> lock;

@@ -183,9 +183,6 @@ class Reader {
     const auto whole = [&](const char* key, std::int64_t least, std::int64_t most) {
       return static_cast<std::size_t>(t.integer(key, least, most));
     };
-    if (!has_libtorch())
-      root_.fail("student", "learns by LibTorch, which this build has not",
-                 "the package flappy-torch, or a build with libtorch-dev installed");
     if (!c_.fly.drawn_effects)
       root_.fail("student", "has no effects to be taught, for none are drawn", "a flight with [drawn_effects]");
     const io::Table networks = root_.table("networks");

@@ -176,7 +176,17 @@ TEST(Onnx, RefusesWhatDoesNotFit) {
               *m.mutable_graph()->add_output() = m.graph().output(0);
               m.mutable_graph()->mutable_output(1)->set_name("answer");
             }),
-            name + ": has 2 outputs; accepted: one input and one output, float[n][3] to float[n][2], as the task has");
+            name +
+                ": has 2 outputs; accepted: one input and one output, float[n][3] to float[n][2], as the task has; or "
+                "two of each, with the memory second");
+  EXPECT_EQ(said_of([&](onnx::ModelProto& m) {  // a memory of 5 numbers that is one of 2 afterwards
+              *m.mutable_graph()->add_input() = m.graph().input(0);
+              m.mutable_graph()->mutable_input(1)->set_name("memory");
+              shape_of(m.mutable_graph()->mutable_input(1))->mutable_dim(1)->set_dim_value(5);
+              *m.mutable_graph()->add_output() = m.graph().output(0);
+              m.mutable_graph()->mutable_output(1)->set_name("answer");
+            }),
+            name + ": answer is tensor(float)[n, 2]; accepted: a memory of float[n][units], as wide before as after");
   EXPECT_EQ(said_of([](onnx::ModelProto& m) {
               auto* cast = m.mutable_graph()->add_node();
               cast->set_op_type("Cast");
