@@ -8,6 +8,7 @@
 
 #include "io/parallel.hpp"
 #include "io/temporary_folder.hpp"
+#include "learn/checkpoint.hpp"
 #include "learn/torch/torch_learner.hpp"
 #include "rollout/evaluation.hpp"
 #include "rollout/rollout.hpp"
