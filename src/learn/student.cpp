@@ -466,6 +466,8 @@ TrainSummary train_student(const TrainConfig& config, const TrainOptions& option
     } else {
       refuse_run_in(options.folder);
       write_config(config, options.folder);
+      for (const char* name : {"best.json", "last.json"})  // the configuration names it, and so has to find one
+        policy::write_actor(options.folder / name, beginner(config));
       write_start(config, options, "TD3 by lanes, then imitation by libtorch " + torch_functions().version());
     }
   }

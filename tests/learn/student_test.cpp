@@ -143,6 +143,8 @@ TEST(Student, IsARunThatGoesOnToTheSameBytes) {
   options.keep_going = stop_at(12);
   EXPECT_TRUE(train(config({"threads=2"}), options).stopped);
   EXPECT_TRUE(fs::exists(options.folder / "ancestor" / "summary.json"));
+  EXPECT_EQ(read_train_config(options.folder / "config" / "train.toml").sha256,
+            config().sha256);  // as --resume reads it
   EXPECT_TRUE(fs::exists(options.folder / "teachers" / "wing_damage_gain.json"));
   EXPECT_FALSE(fs::exists(options.folder / "teachers" / "wind.json"));
   options.goes_on = true;
