@@ -92,7 +92,7 @@ class Fleet {
   void start(std::size_t i, std::uint32_t episode, const Snapshot<T>& snapshot);
   Snapshot<T> snapshot(std::size_t i) const;
 
-  /// What a recurrent actor remembers of flapper `i`; empty for another one.
+  /// The recurrent actor's memory of flapper `i`, [unit]; empty if the actor is not recurrent.
   std::vector<T> actor_memory(std::size_t i) const;
 
   /// Sets the actor that acts from now on. With no actor the last actions stay in force. Throws std::invalid_argument

@@ -49,7 +49,7 @@ struct FlightSpace {
   T* ring;    // IMU increments that the estimator may still apply, [slot][row of Increment][lane]
   T* queue;   // motion-capture poses in transit, [slot][row of MocapSample][lane]
   T* past;    // earlier observations, [action ago][row of the observation][lane]; unused without a history
-  T* memory;  // of a recurrent actor, [unit][lane]; unused without one
+  T* memory;  // what the recurrent actor remembers, [unit][lane]; unused if the actor is not recurrent
   // [kLateRows][lane]: the offsets or voltages that act now, then the delay of the last action in control periods. It is
   // used only if late_most > 0.
   T* late;

@@ -10,6 +10,7 @@
 #include "io/temporary_folder.hpp"
 #include "learn/checkpoint.hpp"
 #include "learn/torch/torch_learner.hpp"
+#include "policy/policy_network.hpp"
 #include "rollout/evaluation.hpp"
 #include "rollout/rollout.hpp"
 #include "sim/random.hpp"
@@ -25,7 +26,7 @@ using Lane = model::Lanes<float, 1>;
 constexpr std::size_t kTeacherEvaluations = 1000;  // flights by which it keeps the better of before and after
 constexpr double kWellFlown = 0.98;       // success of the ancestor with an effect, from which it teaches itself
 constexpr double kFewest = 0.02;          // share of a round's flights; with fewer still going on, the round ends
-constexpr std::size_t kEvaluations = 20;  // of the student, in the run
+constexpr std::size_t kEvaluations = 20;  // so often a run evaluates its student
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -103,7 +104,6 @@ class School {
   }
 
   std::size_t flights() const { return config_.student->flights; }
-  std::size_t actions() const { return actions_; }
 
   /// Flies a round; `led`: share of the flights in which the teacher acts.
   Lessons fly(std::size_t round, const Mind& student, double led) {
@@ -207,24 +207,17 @@ policy::Actor beginner(const TrainConfig& config) {
   a.widths.push_back(config.learner.shape.action);
   a.hidden = config.learner.actor_activation;
   a.mean = config.learner.input.mean, a.scale = config.learner.input.scale, a.clip = config.learner.input.clip;
-  int number_of_layer = 0;
-  const auto add = [&](int inputs, int outputs, double scale) {
+  const auto blocks = policy::weight_blocks(a.widths, a.recurrent);
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    const auto [inputs, outputs] = blocks[b];
+    const double scale = b + 1 == blocks.size() ? config.learner.last_layer_scale : 1;
     std::uint32_t number = 0;
     for (int o = 0; o < outputs; ++o) {
       a.weights.push_back(0);
-      for (int i = 0; i < inputs; ++i)
-        a.weights.push_back(first_weight(config.seed, 0, number_of_layer, inputs, number++, scale));
+      for (int k = 0; k < inputs; ++k)
+        a.weights.push_back(first_weight(config.seed, 0, static_cast<int>(b), inputs, number++, scale));
     }
-    ++number_of_layer;
-  };
-  std::size_t layer = 0;
-  if (a.recurrent) {
-    add(a.widths[0], 3 * s.memory, 1);
-    add(s.memory, 3 * s.memory, 1);
-    layer = 1;
   }
-  for (; layer + 1 < a.widths.size(); ++layer)
-    add(a.widths[layer], a.widths[layer + 1], layer + 2 == a.widths.size() ? config.learner.last_layer_scale : 1);
   return a;
 }
 
@@ -236,7 +229,7 @@ class StudentTrainer {
   TrainSummary run() {
     summary_.seed = config_.seed;
     const auto init = ancestor();
-    if (init && teach(*init)) learn(init->actor);
+    if (init && teach(init)) learn(init->actor);
     summary_.stopped = !finished_;
     summary_.wall_s = seconds_since(options_.started) - summary_.evaluation_s;
     if (io::writes(options_.ranks) && finished_) write_summary(folder_, summary_);
@@ -244,7 +237,7 @@ class StudentTrainer {
   }
 
  private:
-  /// What all teachers learn on from; null if stopped.
+  /// The run from which all teachers learn on: given, found or trained; null if its training was stopped.
   std::shared_ptr<const TrainInit> ancestor() {
     const fs::path folder = folder_ / "ancestor", best = folder / "best.json";
     const bool copied = fs::exists(best) && !fs::exists(folder / "run.json");
@@ -283,14 +276,13 @@ class StudentTrainer {
   fs::path gain_of(std::size_t teacher) const { return folder_ / "teachers" / (name_of(teacher) + "_gain.json"); }
 
   /// Lets this rank's share of the teachers learn. False: stopped.
-  bool teach(const TrainInit& init) {
+  bool teach(const std::shared_ptr<const TrainInit>& ancestor) {
     io::make_folder(folder_ / "teachers");
-    const auto ancestor = std::make_shared<TrainInit>(init);
+    const auto actor = std::make_shared<policy::Actor>(ancestor->actor);
     bool going = true;
     for (std::size_t k = 0; k < teachers() && going; ++k) {
       if (fs::exists(gain_of(k)) || !io::is_own(options_.ranks, k)) continue;
       const TrainConfig config = of_teacher(config_, k);
-      const auto actor = std::make_shared<policy::Actor>(init.actor);
       const double before = success_of(config, actor);
       double after = before;
       if (before < kWellFlown) {

@@ -8,8 +8,8 @@
 //   RUN/teachers/EFFECT.json         actor of a teacher
 //   RUN/teachers/EFFECT_gain.json    {"before": b, "after": a}: success of the ancestor and of the teacher
 //
-// Of a robot with several effects, the teacher that gained most teaches; without an effect, the ancestor. What is there
-// already when the run starts again is not learnt again; the student begins anew.
+// A robot with several effects is taught by the teacher with the largest gain, a robot without effects by the ancestor. A
+// run that goes on keeps its ancestor and its finished teachers; its student begins anew.
 #pragma once
 
 #include "learn/trainer.hpp"

@@ -54,7 +54,7 @@ struct TrainOptions {
   std::string commit;          ///< commit of the program
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();  ///< start of the process
   std::function<bool(const TrainProgress&)> keep_going;  ///< called after each step; false: save a checkpoint and stop
-  bool goes_on = false;                                  ///< of a student: the folder holds this run already
+  bool goes_on = false;  ///< with a student only: go on with the run that the folder holds
 };
 
 struct TrainSummary {

@@ -7,6 +7,7 @@
 
 #include "io/refuse.hpp"
 #include "io/schema.hpp"
+#include "policy/policy_network.hpp"
 
 namespace flappy::policy {
 namespace {
@@ -17,15 +18,11 @@ using Json = nlohmann::ordered_json;
 }  // namespace
 
 std::size_t weight_count(const std::vector<int>& widths, bool layer_norm, bool recurrent) {
-  std::size_t n = 0, first = 0;
-  if (recurrent) {
-    const auto inputs = static_cast<std::size_t>(widths[0]), units = static_cast<std::size_t>(widths[1]);
-    n = 3 * units * (inputs + 1 + units + 1);
-    first = 1;
-  }
-  for (std::size_t i = first; i + 1 < widths.size(); ++i)
-    n += static_cast<std::size_t>(widths[i] + 1 + (layer_norm && i + 2 < widths.size() ? 2 : 0)) *
-         static_cast<std::size_t>(widths[i + 1]);
+  std::size_t n = 0;
+  for (const auto& [inputs, outputs] : weight_blocks(widths, recurrent))
+    n += static_cast<std::size_t>(inputs + 1) * static_cast<std::size_t>(outputs);
+  for (std::size_t layer = recurrent ? 2 : 1; layer_norm && layer + 1 < widths.size(); ++layer)
+    n += 2 * static_cast<std::size_t>(widths[layer]);
   return n;
 }
 

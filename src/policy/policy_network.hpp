@@ -2,11 +2,22 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "policy/activation.hpp"
 
 namespace flappy::policy {
+
+/// The blocks of a network's weights in their order, each as its inputs and outputs: one for each layer, but two for a
+/// GRU, whose units have three outputs of the observation and three of the memory.
+inline std::vector<std::pair<int, int>> weight_blocks(const std::vector<int>& widths, bool recurrent) {
+  std::vector<std::pair<int, int>> blocks;
+  if (recurrent) blocks = {{widths[0], 3 * widths[1]}, {widths[1], 3 * widths[1]}};
+  for (std::size_t layer = recurrent ? 1 : 0; layer + 1 < widths.size(); ++layer)
+    blocks.emplace_back(widths[layer], widths[layer + 1]);
+  return blocks;
+}
 
 /// action = middle + half tanh(...(clamp((observation - mean) scale, +-clip)))
 /// A recurrent one is a function, too, whose inputs are the observation and the memory, and whose outputs are the action

@@ -65,7 +65,7 @@ def check_memory(policy, observation, memory, remembered):
             getattr(cell, f"bias_{name}").copy_(weights[f"bias_{of}"])
         clipped = ((observation - policy.mean) * policy.scale).clamp(-10, 10)
         own = cell(clipped, memory)
-    own[0] = memory[0]  # what has a NaN is refused, and the memory stays
+    own[0] = memory[0]  # the policy refuses an observation with a NaN and keeps its memory
     for name, is_ in ("policy.pt", after), ("flappy_policy.h", remembered):
         assert (is_ - own).abs().max() <= OF_RANGE, (name, (is_ - own).abs().max())
     return action

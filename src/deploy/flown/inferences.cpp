@@ -63,7 +63,7 @@ Inferences check_inferences(const std::filesystem::path& folder, const Contract&
   std::vector<std::vector<std::uint64_t>> states(kDithers + 1,
                                                  std::vector<std::uint64_t>(exported.state_bytes() / 8 + 1));
   double last_s = -INFINITY;
-  bool unknown = false;  // what the policy remembers, since the log missed an inference
+  bool memory_lost = false;  // the log missed an inference, which the policy remembers and this replay does not
   for (std::size_t row = 0; row < log.inferences.size(); ++row) {
     const auto number = [&](std::size_t k) { return log.inferences[row].numbers[at[k]]; };
     bool begun = false;  // before its first inference all numbers are 0
@@ -71,12 +71,12 @@ Inferences check_inferences(const std::filesystem::path& folder, const Contract&
     if (!begun) continue;
     const double pause_s = log.inferences[row].t_s - last_s;
     if (contract.memory > 0 && pause_s > kMissed * contract.policy_s) {
-      unknown = pause_s <= kPause * contract.policy_s;
-      if (!unknown)
+      memory_lost = pause_s <= kPause * contract.policy_s;
+      if (!memory_lost)
         for (auto& state : states) exported.reset(state.data());
     }
     last_s = log.inferences[row].t_s;
-    if (unknown) continue;
+    if (memory_lost) continue;
     ++found.rows;
     for (std::size_t d = 0; d <= kDithers; ++d)  // the digits that the log has lost
       for (std::size_t k = 0; k < seen; ++k) {

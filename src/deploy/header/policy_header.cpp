@@ -107,16 +107,8 @@ std::string header(const rollout::FlyConfig& config, const policy::RunInfo& run,
   int neurons = 0, multiply_adds = 0;
   std::string widths;
   const int units = n.memory();
-  if (units > 0) {
-    neurons = 6 * units;
-    multiply_adds = 3 * units * n.inputs();
-  }
-  for (std::size_t i = 0; i < n.widths.size(); ++i) {
-    widths += (i > 0 ? ", " : "") + std::to_string(n.widths[i]);
-    if (i == 0 || (i == 1 && units > 0)) continue;
-    neurons += n.widths[i];
-    multiply_adds += n.widths[i - 1] * n.widths[i];
-  }
+  for (std::size_t i = 0; i < n.widths.size(); ++i) widths += (i > 0 ? ", " : "") + std::to_string(n.widths[i]);
+  for (const auto& [in, out] : policy::weight_blocks(n.widths, n.recurrent)) neurons += out, multiply_adds += in * out;
   std::ostringstream text;
   const auto define = [&](const char* name, const auto& value) {
     text << "#define FLAPPY_POLICY_" << name << " " << value << "\n";

@@ -65,7 +65,7 @@ policy::PolicyVectors roll_out(const rollout::FlyConfig& given, std::size_t firs
   rollout::FlyConfig config = given;
   config.fleet.first_flapper = kRolloutFlappers + static_cast<std::uint32_t>(first);
   config.excitation = {};
-  config.fleet.task.action_late_most = 0;  // what the network says, not how late it acts
+  config.fleet.task.action_late_most = 0;  // a late one would stand beside the next observation
   rollout::Rollout<float> flights(std::move(config), count);
   const flight::Fleet<float>& fleet = flights.fleet();
   const flight::Task& task = fleet.options().task;

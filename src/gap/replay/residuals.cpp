@@ -25,7 +25,7 @@ EffectValues sensors_of(const VehicleHypothesis& h) {
 }
 
 /// Calls use(i, residual) with the residual of each vehicle with its effects, on any thread. It does so when all flights
-/// of the vehicle's block are flown, so that few blocks are in memory. Vehicles with other errors of sensors share one.
+/// of the vehicle's block are flown, so that few blocks are in memory. Vehicles with different errors of sensors may be in one block.
 void compare_each(const FlightList& flights, const std::vector<const VehicleHypothesis*>& vehicles, int threads,
                   const std::function<void(std::size_t, Residuals)>& use) {
   std::vector<ComparedVehicle> compared;

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "learn/torch/torch_learner.hpp"
+#include "policy/policy_network.hpp"
 
 namespace flappy::learn {
 namespace {
@@ -26,14 +27,8 @@ class Student : public TorchStudent {
  public:
   explicit Student(const policy::Actor& actor) : actor_(actor) {
     at::set_num_threads(1);  // more are slower for such small networks
-    const auto add = [&](int inputs, int outputs) { shapes_.push_back({outputs, inputs + 1}); };
-    std::size_t layer = 0;
-    if (actor.recurrent) {
-      add(actor.widths[0], 3 * actor.widths[1]);
-      add(actor.widths[1], 3 * actor.widths[1]);
-      layer = 1;
-    }
-    for (; layer + 1 < actor.widths.size(); ++layer) add(actor.widths[layer], actor.widths[layer + 1]);
+    for (const auto& [inputs, outputs] : policy::weight_blocks(actor.widths, actor.recurrent))
+      shapes_.push_back({outputs, inputs + 1});
     numbers_ = of(actor.weights);
     first_ = torch::zeros_like(numbers_), second_ = torch::zeros_like(numbers_);
     numbers_.requires_grad_();
