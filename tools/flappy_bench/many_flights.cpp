@@ -259,7 +259,7 @@ void write_flights([[maybe_unused]] const model::Vehicle& vehicle, [[maybe_unuse
 }
 
 std::vector<WorkPrecisionRow> work_precision(const model::Vehicle& vehicle, [[maybe_unused]] double enough_m,
-                                             bool peers,
+                                             [[maybe_unused]] bool peers,
                                              const std::function<void(double done, const std::string& now)>& tell) {
   const std::vector<OwnFlight> flights = draw(vehicle, kAboutHover);
   const std::vector<Flight> exact = free_flights(flights, kAboutHover.exact_step_s);
