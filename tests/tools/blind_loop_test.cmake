@@ -34,9 +34,15 @@ file(STRINGS ${WORK}/single_loop/loop.csv lines)
 list(GET lines 1 line)
 expect_match("line of a robot" "${line}" "^c,1,singles,[a-z_]+,[a-z]+,[a-z_+]*,1,[01],[01],[01],300")
 # Robots are chosen by what their effect costs, and what was flown to choose them stays.
-run(${loop} --costly)
+run(${loop} --costly ${WORK}/run)
 expect_equal("exit code of loop --costly, which says ${err}" "${code}" 0)
 expect_match("robots that are left out" "${out}" "as often as without their effect: (none|c 1)\n")
 expect_keys(${WORK}/single_loop/c_0001/as_shipped.json of=STRING escapes=NUMBER succeeded=NUMBER)
+# Policies of other runs fly as they are.
+run(${loop} --also ${WORK}/run/)
+expect_equal("exit code of loop --also, which says ${err}" "${code}" 0)
+expect_match("column of another policy" "${out}" "corrected vehicle \\| run \\|\n.*\\| c \\| 1 \\|.* [01]\\.[05]00 \\|\n")
+expect_refused("--also ${WORK}/run: another policy is called run; accepted: run folders of different names"
+  ${loop} --also ${WORK}/run ${WORK}/run)
 file(APPEND ${WORK}/single/predictions/0001.json " ")
 expect_refused("${WORK}/single/predictions/0001.json: has changed; accepted: what was sealed" ${loop})

@@ -13,6 +13,7 @@
 #include "io/program.hpp"
 #include "io/progress.hpp"
 #include "io/sha256.hpp"
+#include "io/text.hpp"
 #include "io/toml_writer.hpp"
 #include "lab/benchmark/families.hpp"
 #include "lab/benchmark/records.hpp"
@@ -27,10 +28,9 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// Policies that every robot flies. The last was trained on with the robot's corrected vehicle; a robot without one flies
-/// the policy before it.
-enum Policy { kAsShipped, kFile, kCorrected, kPolicies };
-constexpr std::array<const char*, kPolicies> kNames = {"as_shipped", "file", "corrected"};
+/// Policies that every robot flies, by their place in Loop::names_; after them come those of LoopCommand::also. kCorrected
+/// was trained on with the robot's corrected vehicle; a robot without one flies kFile in its place.
+enum Policy : std::size_t { kAsShipped, kFile, kCorrected, kPolicies };
 
 /// Parts of a benchmark whose robots have an effect and are diagnosed from rich flights. Each robot occurs once in them.
 constexpr std::string_view kParts[] = {"singles",         "withheld",      "outside", "pairs",
@@ -69,7 +69,15 @@ struct Robot {
 class Loop {
  public:
   explicit Loop(const LoopCommand& command) : command_(command), start_(learn::read_train_init(command.run)) {
-    for (const auto& [file, text] : rollout::read_fly_config(command.config).resolved) escape_text_ += text;
+    for (const std::string& also : command.also) {
+      const std::string name = (fs::absolute(also) / "best.json").lexically_normal().parent_path().filename().string();
+      if (std::ranges::count(names_, name) > 0)
+        throw io::InputError("--also " + also + ": another policy is called " + name +
+                             "; accepted: run folders of different names");
+      names_.push_back(name);
+    }
+    if (!command.costly.empty()) read_rules(command.costly);  // throws, before anything is flown
+    for (const std::string& also : command.also) read_rules(also);
     for (const std::string& folder : command.folders) {
       const Scored& s = *scored_.emplace_back(std::make_unique<Scored>(folder));
       if (s.labels.empty())
@@ -94,8 +102,8 @@ class Loop {
  private:
   /// Chooses the robots, in the order of their cases; false if it was interrupted.
   bool choose() {
-    const fs::path policy = fs::path(command_.run) / "best.json";
-    const EscapeRules shipped = read_escape_rules(policy, command_.config), hover = hover_rules(shipped);
+    const EscapeRules hover = hover_rules(read_rules(command_.run));
+    const bool own = fs::weakly_canonical(command_.costly) == fs::weakly_canonical(command_.run);
     std::map<std::string, std::size_t> benches;
     io::ProgressLine progress("choosing robots");
     for (const auto& s : scored_) {
@@ -109,19 +117,20 @@ class Loop {
         progress.show(static_cast<double>(seen++) / static_cast<double>(s->labels.size()), "family " + family);
         Robot r{s.get(), &label, s->prediction(number), label.robot(s->manifest.vehicle),
                 command_.out / fs::path(name + benchmark::number_text(number))};
-        if (!escapes_of(family, r.made, hover)(0)) {
+        if (!escapes_of(family, r.made, hover, command_.run)(0)) {
           ++unsteady_[family];
           continue;
         }
-        if (command_.costly) {
-          io::make_folder(r.own);
-          const std::optional<std::size_t> with = succeeded(r, kNames[kAsShipped], r.made, policy);
+        io::make_folder(r.own);
+        if (!command_.costly.empty()) {
+          const Flown by{command_.costly, command_.costly};
+          const std::optional<std::size_t> with = succeeded(r, own ? names_[kAsShipped] : "with_effect", r.made, by);
           if (!with) return false;
           std::optional<std::size_t> without = *with;
           if (*with < command_.escapes) {
             Assignment healthy = r.made;
             healthy.effects.clear();
-            without = succeeded(r, "without_effect", healthy, policy);
+            without = succeeded(r, "without_effect", healthy, by);
           }
           if (!without) return false;
           if (*with >= *without) {
@@ -136,17 +145,28 @@ class Loop {
     return true;
   }
 
+  /// The best policy of one run, with the task and the controller of another, which may be the same.
+  struct Flown {
+    fs::path run, rules;
+    fs::path policy() const { return run / "best.json"; }
+    fs::path config() const { return rules / "config" / "fly.toml"; }
+  };
+  static EscapeRules read_rules(const Flown& by) { return read_escape_rules(by.policy(), by.config()); }
+  static EscapeRules read_rules(const fs::path& run) { return read_rules(Flown{run, run}); }
+
   /// Flies the escapes of `flown`, which is the robot of `r` or a variant of it, and counts those that succeed. The count is kept in
   /// the folder of `r` as NAME.json, with a hash of its inputs, and is read from there the next time. Empty after Ctrl-C.
   std::optional<std::size_t> succeeded(const Robot& r, const std::string& name, const Assignment& flown,
-                                       const fs::path& policy) const {
+                                       const Flown& by) const {
     const fs::path file = r.own / (name + ".json");
-    const std::string of = io::sha256(io::read_text(r.of->folder / "manifest.json") + io::read_text(policy) +
-                                      std::to_string(command_.escapes) + escape_text_);
+    std::string inputs =
+        io::read_text(r.of->folder / "manifest.json") + io::read_text(by.policy()) + std::to_string(command_.escapes);
+    for (const auto& [path, text] : rollout::read_fly_config(by.config()).resolved) inputs += text;
+    const std::string of = io::sha256(inputs);
     if (fs::exists(file))
       if (const Json kept = benchmark::read_json(file); kept.value("of", "") == of)
         return kept.at("succeeded").get<std::size_t>();
-    const auto succeeds = escapes_of(r.of->manifest.family, flown, read_escape_rules(policy, command_.config));
+    const auto succeeds = escapes_of(r.of->manifest.family, flown, read_rules(by), by.rules);
     std::atomic<std::size_t> count = 0;
     io::parallel_for(command_.escapes, command_.threads, [&](std::size_t n) {
       if (!io::interrupted()) count += succeeds(n);
@@ -166,8 +186,7 @@ class Loop {
     std::vector<fs::path> runs;
     for (const Robot& r : robots_) {
       if (r.said.corrected.empty()) continue;
-      runs.push_back(r.own / kNames[kCorrected]);
-      io::make_folder(r.own);
+      runs.push_back(r.own / names_[kCorrected]);
       io::write_atomically(vehicle_of(runs.back()), r.said.corrected);
     }
     return benchmark::work_through("training", runs.size(), command_.threads, nullptr,
@@ -181,7 +200,8 @@ class Loop {
     std::vector<std::string> overrides = command_.overrides;
     overrides.push_back("vehicle=" + io::toml_string(fs::absolute(vehicle).string()));
     if (threads > 0) overrides.push_back("threads=" + std::to_string(threads));
-    const learn::TrainConfig config = learn::read_train_config(command_.train, overrides);
+    const learn::TrainConfig config =
+        learn::read_train_config(fs::path(command_.run) / "config" / "train.toml", overrides);
     learn::refuse_other_run_in(folder, config, start_.get());
     learn::TrainOptions options;
     options.folder = folder;
@@ -194,47 +214,48 @@ class Loop {
   }
 
   /// Flies the escapes of a robot with a policy; empty after Ctrl-C.
-  std::optional<std::size_t> flown(const Robot& r, Policy p) const {
+  std::optional<std::size_t> flown(const Robot& r, std::size_t p) const {
     if (p == kCorrected && r.said.corrected.empty()) p = kFile;  // its logs were faulty
-    const fs::path run = p == kAsShipped ? fs::path(command_.run) : p == kFile ? without() : r.own / kNames[p];
-    return succeeded(r, kNames[p], r.made, run / "best.json");
+    if (p >= kPolicies)
+      return succeeded(r, names_[p], r.made, {command_.also[p - kPolicies], command_.also[p - kPolicies]});
+    const fs::path run = p == kAsShipped ? fs::path(command_.run) : p == kFile ? without() : r.own / names_[p];
+    return succeeded(r, names_[p], r.made, {run, command_.run});
   }
 
   bool fly() {
     const bool all = benchmark::work_through("flying", robots_.size(), command_.threads, nullptr, [&](std::size_t i) {
-      for (int p = 0; p < kPolicies; ++p) flown(robots_[i], static_cast<Policy>(p));
+      for (std::size_t p = 0; p < names_.size(); ++p) flown(robots_[i], p);
     });
     return all && !io::interrupted();
   }
 
-  /// A function that flies the escape of a number and returns whether it succeeds.
-  std::function<bool(std::size_t)> escapes_of(const std::string& family, const Assignment& a,
-                                              const EscapeRules& rules) const {
+  /// A function that flies the escape of a number and returns whether it succeeds; `run` is that of the rules.
+  static std::function<bool(std::size_t)> escapes_of(const std::string& family, const Assignment& a,
+                                                     const EscapeRules& rules, const fs::path& run) {
     if (family == "a")
       return [robot = case_of(a), rules](std::size_t n) {
         return outcome_of(escape(robot, n, EscapeRules(rules))).success();
       };
-    return [&of = benchmark::family_named(family), a, asked = escape_assignment(rules, command_.config)](
+    return [&of = benchmark::family_named(family), a, asked = escape_assignment(rules, run / "config" / "fly.toml")](
                std::size_t n) { return of.escape(a, n, EscapeAssignment(asked)).success; };
   }
 
   struct Row {
     std::size_t robots = 0, escapes = 0;
-    std::array<std::size_t, kPolicies> succeeded{}, better{}, worse{};  ///< better and worse than kFile
-    /// Share of the robots that fly better with the policy than with kFile; ties count half.
-    double ties_half(Policy p) const {
-      return 0.5 +
-             (static_cast<double>(better[p]) - static_cast<double>(worse[p])) / (2.0 * static_cast<double>(robots));
+    std::size_t better = 0, worse = 0;   ///< robots by kCorrected, beside kFile
+    std::vector<std::size_t> succeeded;  ///< by policy
+    /// Share of the robots that fly better with kCorrected than with kFile; ties count half.
+    double ties_half() const {
+      return 0.5 + (static_cast<double>(better) - static_cast<double>(worse)) / (2.0 * static_cast<double>(robots));
     }
   };
 
   Json told() const {
     std::map<std::string, Row> rows;
-    std::string lines = "family,case,part,effects,verdict,named,escapes," +
-                        io::joined({kNames.begin(), kNames.end()}, ",") + ",seed,draw\n";
+    std::string lines = "family,case,part,effects,verdict,named,escapes," + io::joined(names_, ",") + ",seed,draw\n";
     for (const Robot& r : robots_) {
-      std::array<std::size_t, kPolicies> count{};
-      for (int p = 0; p < kPolicies; ++p) count[p] = *flown(r, static_cast<Policy>(p));
+      std::vector<std::size_t> count;
+      for (std::size_t p = 0; p < names_.size(); ++p) count.push_back(*flown(r, p));
       const benchmark::Label& label = *r.label;
       const std::string& family = r.of->manifest.family;
       const benchmark::Answer said = answer_of(r.said);
@@ -244,42 +265,42 @@ class Loop {
       for (Row* row : {&rows[family], &rows["all"]}) {
         ++row->robots;
         row->escapes += command_.escapes;
-        for (int p = 0; p < kPolicies; ++p) {
-          row->succeeded[p] += count[p];
-          row->better[p] += count[p] > count[kFile];
-          row->worse[p] += count[p] < count[kFile];
-        }
+        row->better += count[kCorrected] > count[kFile];
+        row->worse += count[kCorrected] < count[kFile];
+        row->succeeded.resize(count.size());
+        for (std::size_t p = 0; p < count.size(); ++p) row->succeeded[p] += count[p];
       }
       for (const std::size_t c : count) lines += "," + std::to_string(c);
       lines += "," + std::to_string(label.planned.seed) + "," + std::to_string(label.draw) + "\n";
     }
     std::string text =
         "| family | robots | better with the diagnosis (95 %) | as good | worse | better, ties half | success as "
-        "shipped "
-        "| trained on with the file | with the corrected vehicle |\n"
-        "|---|---|---|---|---|---|---|---|---|\n";
+        "shipped | trained on with the file | with the corrected vehicle |";
+    for (std::size_t p = kPolicies; p < names_.size(); ++p) text += " " + names_[p] + " |";
+    text += "\n|";
+    for (std::size_t column = 0; column < 6 + names_.size(); ++column) text += "---|";
+    text += "\n";
     Json all = Json::object();
     for (const auto& [family, row] : rows) {
-      const std::size_t better = row.better[kCorrected], worse = row.worse[kCorrected];
-      const rollout::Rate rate = rollout::rate_of(better, row.robots);
-      const auto share = [&row = row](Policy p) {
-        return static_cast<double>(row.succeeded[p]) / static_cast<double>(row.escapes);
-      };
-      char line[300];
-      std::snprintf(line, sizeof line, "| %s | %zu | %.3f (%.3f to %.3f) | %zu | %zu | %.3f | %.3f | %.3f | %.3f |\n",
-                    family.c_str(), row.robots, rate.value, rate.low, rate.high, row.robots - better - worse, worse,
-                    row.ties_half(kCorrected), share(kAsShipped), share(kFile), share(kCorrected));
-      text += line;
+      const rollout::Rate rate = rollout::rate_of(row.better, row.robots);
+      text +=
+          io::format("| %s | %zu | %.3f (%.3f to %.3f) | %zu | %zu | %.3f |", family.c_str(), row.robots, rate.value,
+                     rate.low, rate.high, row.robots - row.better - row.worse, row.worse, row.ties_half());
       all[family] = {
-          {"robots", row.robots}, {"better", better}, {"worse", worse}, {"ties_half", row.ties_half(kCorrected)}};
-      for (int p = 0; p < kPolicies; ++p) all[family][kNames[p]] = share(static_cast<Policy>(p));
+          {"robots", row.robots}, {"better", row.better}, {"worse", row.worse}, {"ties_half", row.ties_half()}};
+      for (std::size_t p = 0; p < names_.size(); ++p) {
+        const double share = static_cast<double>(row.succeeded[p]) / static_cast<double>(row.escapes);
+        text += io::format(" %.3f |", share);
+        all[family][names_[p]] = share;
+      }
+      text += "\n";
     }
     text += "\nleft out, for they do not hover at the goal for three seconds without a policy:";
     for (const auto& [family, count] : unsteady_) text += " " + family + " " + std::to_string(count);
     text += unsteady_.empty() ? " none\n" : "\n";
-    if (command_.costly) text += "left out, for they escape as often as without their effect:";
+    if (!command_.costly.empty()) text += "left out, for they escape as often as without their effect:";
     for (const auto& [family, count] : as_good_) text += " " + family + " " + std::to_string(count);
-    if (command_.costly) text += as_good_.empty() ? " none\n" : "\n";
+    if (!command_.costly.empty()) text += as_good_.empty() ? " none\n" : "\n";
     std::fputs(text.c_str(), stdout);
     io::write_atomically(fs::path(command_.out) / "loop.csv", lines);
     io::write_atomically(fs::path(command_.out) / "loop.md", text);
@@ -292,7 +313,7 @@ class Loop {
   std::map<std::string, std::size_t> unsteady_;  ///< by family: robots that fail hover_rules()
   std::map<std::string, std::size_t> as_good_;   ///< by family: robots whose effect costs no escape
   std::shared_ptr<const learn::TrainInit> start_;
-  std::string escape_text_;  ///< all files of command_.config, resolved
+  std::vector<std::string> names_ = {"as_shipped", "file", "corrected"};  ///< of the policies
 };
 
 }  // namespace

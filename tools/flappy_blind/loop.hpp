@@ -1,13 +1,11 @@
 // flappy-blind loop: measures whether a diagnosis improves a policy. Each robot of a scored benchmark that has an effect, and flew rich
 // flights, flies the escape with a policy whose training was continued on its corrected vehicle, and with the same policy whose
-// training was continued for as long on the vehicle's file.
+// training was continued for as long on the vehicle's file. Each policy flies with the controller of its own run.
 #pragma once
 
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
-
-#include "io/installation.hpp"
 
 namespace flappy::blind {
 
@@ -15,10 +13,10 @@ struct LoopCommand {
   std::vector<std::string> folders;  ///< benchmarks scored by flappy-blind score, one for each family
   std::string run;                   ///< the training run whose best policy is trained further
   std::string out;
-  std::string train = io::config_path("train/escape.toml"), config = io::config_path("fly/escape.toml");
-  std::vector<std::string> overrides;  ///< of keys in `train`, as "learn.updates=20000"
+  std::vector<std::string> also;  ///< other training runs, whose best policies fly as they are
+  std::string costly;  ///< a training run: only robots whose effect costs its best policy escapes; empty: all
+  std::vector<std::string> overrides;  ///< of keys of the run's configuration, as "learn.updates=20000"
   std::size_t robots = 0;              ///< the first robots of each folder, at most; 0: all
-  bool costly = false;  ///< only robots that, with the policy as shipped, escape less often than without their effect
   std::size_t escapes = 50;
   int threads = 0;  ///< number of robots in parallel; 0: one for each processor
 };

@@ -302,11 +302,10 @@ int main(int argc, char** argv) {
   loop.option("folders", looped.folders, "of flappy-blind score").required();
   loop.option("--run", looped.run, "run folder of flappy-train, whose best policy is trained on").required();
   loop.option("--out", looped.out, "folder for what is trained, loop.csv and loop.md").required();
-  loop.option("--train", looped.train, "how it is trained on").shows_default();
-  loop.option("--set", looped.overrides, "override a key of that: learn.updates=20000").one_at_a_time();
-  loop.option("--config", looped.config, "task and controller that it was trained with").shows_default();
+  loop.option("--also", looped.also, "other run folders, whose best policies the robots fly as they are");
+  loop.option("--set", looped.overrides, "override a key of the run: learn.updates=20000").one_at_a_time();
   loop.option("--robots", looped.robots, "of each folder at most").range(1, 1000);
-  loop.flag("--costly", looped.costly, "only robots whose effect costs escapes with the policy as shipped");
+  loop.option("--costly", looped.costly, "run folder: only robots whose effect costs its best policy escapes");
   loop.option("--escapes", looped.escapes, "of each robot and policy").range(1, 10000).shows_default();
   loop.option("--threads", looped.threads, "robots at a time; 0: one for each processor").range(0, 1024);
   program.app().expect_commands(1, 1);
