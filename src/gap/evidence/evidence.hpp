@@ -225,6 +225,11 @@ class Evidence {
   ScaledEvidence weigh(const SufficientStatistics& residual, const Regressors& regressors, const std::vector<char>& use,
                        const BasisCoefficients& law_sd, const Scales& start,
                        std::optional<double> unknown_penalty_nats = {}, int max_iterations = kMaxIterations) const;
+  /// weigh() of one residual by `law_sd` and `start`, several times: most of what depends on neither is computed once.
+  using Weigher = std::function<ScaledEvidence(const BasisCoefficients& law_sd, const Scales& start)>;
+  /// The evidence and `regressors` have to outlive the result, which may not be called at the same time by several threads.
+  Weigher weigher(const SufficientStatistics& residual, const Regressors& regressors, const std::vector<char>& use,
+                  std::optional<double> unknown_penalty_nats = {}) const;
   /// Largest number of iterations of a search for scales. Choice.
   static constexpr int kMaxIterations = 40;
   /// Log-prior cost, in nats, of a background magnitude whose scale is `times`.

@@ -10,6 +10,7 @@
 // hypothesis.
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "gap/evidence/evidence.hpp"
 #include "gap/evidence/wide_kernel.hpp"
@@ -90,17 +91,14 @@ double Evidence::scale_cost_nats(double times, ScalePrior prior, const Scales& s
   return -log_prior(times, scales.prior_scale(prior), prior.freedom);
 }
 
-/// One call of Evidence::weigh.
+/// What Evidence::weigh needs of one residual. Sums that depend neither on scales nor on law_sd are made once.
 class Evidence::Weighing {
  public:
   Weighing(const Evidence& evidence, const SufficientStatistics& residual, const Regressors& regressors,
-           const std::vector<char>& use, const BasisCoefficients& law_sd, const Scales& start,
-           std::optional<double> unknown_penalty_nats)
+           const std::vector<char>& use, std::optional<double> unknown_penalty_nats)
       : e_(evidence),
         regressors_(regressors),
-        law_sd_(law_sd),
         unknown_penalty_nats_(unknown_penalty_nats),
-        start_(start),
         q_(evidence.basis().size()),
         k_(static_cast<Index>(regressors.columns.size())),
         prior_mean_(regressors.prior_mean()) {
@@ -108,18 +106,20 @@ class Evidence::Weighing {
     count_blocks();
     sum_groups(residual, use);
     count_effects();
-    if (start_.blocks.empty()) start_.blocks.assign(kBlocks, 1);
-    if (start_.free.empty()) start_.free.assign(kBlocks, 0);
   }
 
   /// Expectation-maximisation, over-relaxed.
-  ScaledEvidence run(int max_iterations) {
+  ScaledEvidence run(const BasisCoefficients& law_sd, Scales start, int max_iterations) {
+    law_sd_ = &law_sd;
+    start.effects.resize(std::max(start.effects.size(), of_effect_.size()), 1);
+    if (start.blocks.empty()) start.blocks.assign(kBlocks, 1);
+    if (start.free.empty()) start.free.assign(kBlocks, 0);
     ScaledEvidence best;
-    best.scales = start_;
+    best.scales = start;
     best.posterior.log_evidence = -std::numeric_limits<double>::infinity();
-    Scales now = start_, next = start_;
+    Scales now = start, next = start;
     double stride = 1;
-    if (max_iterations > 1 && start_.session == sessions().first_scale())  // not searched before
+    if (max_iterations > 1 && start.session == sessions().first_scale())  // not searched before
       now = e_.rules_->first_scales(now, [&](const Scales& s) { return evidence_at(s, false).posterior.log_evidence; });
     for (int iteration = 0; iteration < max_iterations; ++iteration) {
       ScaledEvidence w = evidence_at(now, true);
@@ -219,9 +219,6 @@ class Evidence::Weighing {
         ++of_effect_[e];
         priors_[e] = regressors_.priors[i];
       }
-    start_.effects.resize(std::max(start_.effects.size(), of_effect_.size()), 1);
-    of_effect_.resize(start_.effects.size());
-    priors_.resize(start_.effects.size());
   }
 
   /// The evidence with delta integrated out, under these scales. Leaves the groups in halves_.
@@ -235,7 +232,7 @@ class Evidence::Weighing {
     io::parallel_for(seen_.size(), e_.threads_, [&](std::size_t n) {
       const Sums& s = sums_[n];
       Half& h = halves_[n];
-      h.law_sd = law_sd_.size() > 0 ? VectorXd(law_sd_.row(seen_[n]).transpose()) : VectorXd::Zero(q_);
+      h.law_sd = law_sd_->size() > 0 ? VectorXd(law_sd_->row(seen_[n]).transpose()) : VectorXd::Zero(q_);
       h.sd.resize(q_);
       for (Index i = 0; i < q_; ++i) {
         const int block = e_.block_of(seen_[n], static_cast<int>(i));
@@ -371,9 +368,8 @@ class Evidence::Weighing {
   const Evidence& e_;
   const WideKernel& kernel_ = wide_kernel();
   const Regressors& regressors_;
-  const BasisCoefficients& law_sd_;
+  const BasisCoefficients* law_sd_ = nullptr;  ///< of the present run
   std::optional<double> unknown_penalty_nats_;
-  Scales start_;
   Index q_, k_;  ///< number of functions of the basis; of regressors
   VectorXd prior_mean_;
   std::vector<int> seen_;           ///< groups with rows
@@ -390,7 +386,13 @@ class Evidence::Weighing {
 ScaledEvidence Evidence::weigh(const SufficientStatistics& residual, const Regressors& regressors,
                                const std::vector<char>& use, const BasisCoefficients& law_sd, const Scales& start,
                                std::optional<double> unknown_penalty_nats, int max_iterations) const {
-  return Weighing(*this, residual, regressors, use, law_sd, start, unknown_penalty_nats).run(max_iterations);
+  return Weighing(*this, residual, regressors, use, unknown_penalty_nats).run(law_sd, start, max_iterations);
+}
+
+Evidence::Weigher Evidence::weigher(const SufficientStatistics& residual, const Regressors& regressors,
+                                    const std::vector<char>& use, std::optional<double> unknown_penalty_nats) const {
+  return [w = std::make_shared<Weighing>(*this, residual, regressors, use, unknown_penalty_nats)](
+             const BasisCoefficients& law_sd, const Scales& start) { return w->run(law_sd, start, kMaxIterations); };
 }
 
 }  // namespace flappy::gap

@@ -383,20 +383,18 @@ ScaledEvidence RobotFit::weigh(const Hypothesis& hypothesis, const Fit& fit, con
                                std::optional<double> unknown_penalty_nats) const {
   const Regressors regressors = fitter_.unscaled_regressors(fit);
   const LawPrior law = rules().law_prior(evidence().discrepancy());
-  const auto with = [&](double law_factor, const Scales& from) {
-    ScaledEvidence w = evidence().weigh(fit.statistics, regressors, fitter_.all_flights(),
-                                        fitter_.law_sd(hypothesis, fit, law_factor), from, unknown_penalty_nats);
-    w.law_factor = law_factor;
-    w.posterior.log_evidence -= 0.5 * std::pow(std::log(law_factor) / law.spread, 2);
-    return w;
-  };
+  const Evidence::Weigher weigh_from =
+      evidence().weigher(fit.statistics, regressors, fitter_.all_flights(), unknown_penalty_nats);
   // another law factor starts from the best scales so far, in a contrast also from further starts
   const std::vector<Scales> starts = further_starts(hypothesis, start), none;
   const auto best_of = [&](double law_factor, const Scales& from, const std::vector<Scales>& others) {
-    ScaledEvidence best = with(law_factor, from);
+    const BasisCoefficients law_sd = fitter_.law_sd(hypothesis, fit, law_factor);
+    ScaledEvidence best = weigh_from(law_sd, from);
     for (const Scales& further : others)
-      if (ScaledEvidence w = with(law_factor, further); w.posterior.log_evidence > best.posterior.log_evidence)
+      if (ScaledEvidence w = weigh_from(law_sd, further); w.posterior.log_evidence > best.posterior.log_evidence)
         best = std::move(w);
+    best.law_factor = law_factor;
+    best.posterior.log_evidence -= 0.5 * std::pow(std::log(law_factor) / law.spread, 2);
     return best;
   };
   ScaledEvidence best = best_of(1, start, starts);
