@@ -42,6 +42,16 @@ expect_keys(${WORK}/single_loop/c_0001/as_shipped.json of=STRING escapes=NUMBER 
 run(${loop} --also ${WORK}/run/)
 expect_equal("exit code of loop --also, which says ${err}" "${code}" 0)
 expect_match("column of another policy" "${out}" "corrected vehicle \\| run \\|\n.*\\| c \\| 1 \\|.* [01]\\.[05]00 \\|\n")
+expect_refused("loop: no policy to fly; accepted: --run, --also or both" loop ${WORK}/single --out ${WORK}/flown)
+# Without a run to train on, no diagnosis is read, and effects stay sealed.
+file(RENAME ${WORK}/single/predictions ${WORK}/predictions)
+run(loop ${WORK}/single --also ${WORK}/run --out ${WORK}/flown --escapes 2)
+file(RENAME ${WORK}/predictions ${WORK}/single/predictions)
+expect_equal("exit code of loop without --run, which says ${err}" "${code}" 0)
+expect_match("table of policies alone" "${out}" "\\| family \\| robots \\| run \\|\n.*\\| c \\| 1 \\| [01]\\.[05]00 \\|\n")
+file(STRINGS ${WORK}/flown/loop.csv lines)
+list(GET lines 1 line)
+expect_match("line of a robot" "${line}" "^c,1,singles,2,[012],300")
 expect_refused("--also ${WORK}/run: another policy is called run; accepted: run folders of different names"
   ${loop} --also ${WORK}/run ${WORK}/run)
 file(APPEND ${WORK}/single/predictions/0001.json " ")

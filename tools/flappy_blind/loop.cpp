@@ -28,19 +28,19 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// Policies that every robot flies, by their place in Loop::names_; after them come those of LoopCommand::also. kCorrected
-/// was trained on with the robot's corrected vehicle; a robot without one flies kFile in its place.
+/// Policies of a run that is trained on, by their place in Loop::names_; after them come those of LoopCommand::also.
+/// kCorrected was trained on with the robot's corrected vehicle; a robot without one flies kFile in its place.
 enum Policy : std::size_t { kAsShipped, kFile, kCorrected, kPolicies };
 
 /// Parts of a benchmark whose robots have an effect and are diagnosed from rich flights. Each robot occurs once in them.
 constexpr std::string_view kParts[] = {"singles",         "withheld",      "outside", "pairs",
                                        "changed_outside", "changed_pairs", "changed"};
 
-/// A scored benchmark. The constructor checks the hashes of its predictions and opens the labels.
-struct Scored {
-  explicit Scored(const fs::path& at) : folder(at), manifest(benchmark::read_manifest(at)) {
+/// A benchmark. The constructor opens the labels; with `scored`, it first checks the hashes of its predictions.
+struct Benchmark {
+  Benchmark(const fs::path& at, bool scored) : folder(at), manifest(benchmark::read_manifest(at)) {
     benchmark::check_engine(folder, manifest.family, manifest.engine);
-    benchmark::check_predictions(folder, manifest);
+    if (scored) benchmark::check_predictions(folder, manifest);
     if (io::sha256(io::read_text(manifest.vehicle)) != manifest.vehicle_sha256)
       throw io::InputError(manifest.vehicle + ": has changed since " + at.string() +
                            " was made; accepted: the vehicle that was diagnosed");
@@ -59,16 +59,22 @@ struct Scored {
 };
 
 struct Robot {
-  const Scored* of;
+  const Benchmark* of;
   const benchmark::Label* label;
-  benchmark::Prediction said;
-  Assignment made;  ///< as its maker made it, with its effects
-  fs::path own;     ///< folder of this robot's results
+  benchmark::Prediction said;  ///< empty where nothing is trained
+  Assignment made;             ///< as its maker made it, with its effects
+  fs::path own;                ///< folder of this robot's results
 };
 
 class Loop {
  public:
-  explicit Loop(const LoopCommand& command) : command_(command), start_(learn::read_train_init(command.run)) {
+  explicit Loop(const LoopCommand& command) : command_(command) {
+    if (trains()) {
+      start_ = learn::read_train_init(command.run);
+      names_ = {"as_shipped", "file", "corrected"};
+    } else if (command.also.empty()) {
+      throw io::InputError("loop: no policy to fly; accepted: --run, --also or both");
+    }
     for (const std::string& also : command.also) {
       const std::string name = (fs::absolute(also) / "best.json").lexically_normal().parent_path().filename().string();
       if (std::ranges::count(names_, name) > 0)
@@ -79,11 +85,11 @@ class Loop {
     if (!command.costly.empty()) read_rules(command.costly);  // throws, before anything is flown
     for (const std::string& also : command.also) read_rules(also);
     for (const std::string& folder : command.folders) {
-      const Scored& s = *scored_.emplace_back(std::make_unique<Scored>(folder));
+      const Benchmark& s = *benchmarks_.emplace_back(std::make_unique<Benchmark>(folder, trains()));
       if (s.labels.empty())
         throw io::InputError(folder + ": no robot with an effect and rich flights; accepted: a benchmark with " +
                              io::joined({std::begin(kParts), std::end(kParts)}));
-      if (s.manifest.vehicle_sha256 != scored_.front()->manifest.vehicle_sha256)
+      if (s.manifest.vehicle_sha256 != benchmarks_.front()->manifest.vehicle_sha256)
         throw io::InputError(folder + ": is of another vehicle; accepted: benchmarks of one vehicle");
     }
   }
@@ -100,13 +106,19 @@ class Loop {
   }
 
  private:
+  /// Whether a policy is trained on, for which the diagnoses are read.
+  bool trains() const { return !command_.run.empty(); }
+  /// Number of the policies before those of LoopCommand::also.
+  std::size_t own_policies() const { return trains() ? std::size_t{kPolicies} : 0; }
+
   /// Chooses the robots, in the order of their cases; false if it was interrupted.
   bool choose() {
-    const EscapeRules hover = hover_rules(read_rules(command_.run));
+    const fs::path any = trains() ? command_.run : command_.also[0];
+    const EscapeRules hover = hover_rules(read_rules(any));
     const bool own = fs::weakly_canonical(command_.costly) == fs::weakly_canonical(command_.run);
     std::map<std::string, std::size_t> benches;
     io::ProgressLine progress("choosing robots");
-    for (const auto& s : scored_) {
+    for (const auto& s : benchmarks_) {
       const std::string& family = s->manifest.family;
       const std::size_t before = benches[family]++;  // benchmarks of the same family
       const std::string name = family + (before > 0 ? std::to_string(before + 1) : "") + "_";
@@ -115,9 +127,9 @@ class Loop {
         if (command_.robots > 0 && robots == command_.robots) break;
         if (io::interrupted()) return false;
         progress.show(static_cast<double>(seen++) / static_cast<double>(s->labels.size()), "family " + family);
-        Robot r{s.get(), &label, s->prediction(number), label.robot(s->manifest.vehicle),
-                command_.out / fs::path(name + benchmark::number_text(number))};
-        if (!escapes_of(family, r.made, hover, command_.run)(0)) {
+        Robot r{s.get(), &label, trains() ? s->prediction(number) : benchmark::Prediction(),
+                label.robot(s->manifest.vehicle), command_.out / fs::path(name + benchmark::number_text(number))};
+        if (!escapes_of(family, r.made, hover, any)(0)) {
           ++unsteady_[family];
           continue;
         }
@@ -181,7 +193,8 @@ class Loop {
 
   /// Trains by the predictions alone, without the labels' effects.
   bool train() {
-    const fs::path declared = scored_.front()->manifest.vehicle;
+    if (!trains()) return true;
+    const fs::path declared = benchmarks_.front()->manifest.vehicle;
     if (!train_on(declared, without(), 0)) return false;
     std::vector<fs::path> runs;
     for (const Robot& r : robots_) {
@@ -215,9 +228,11 @@ class Loop {
 
   /// Flies the escapes of a robot with a policy; empty after Ctrl-C.
   std::optional<std::size_t> flown(const Robot& r, std::size_t p) const {
+    if (p >= own_policies()) {
+      const fs::path run = command_.also[p - own_policies()];
+      return succeeded(r, names_[p], r.made, {run, run});
+    }
     if (p == kCorrected && r.said.corrected.empty()) p = kFile;  // its logs were faulty
-    if (p >= kPolicies)
-      return succeeded(r, names_[p], r.made, {command_.also[p - kPolicies], command_.also[p - kPolicies]});
     const fs::path run = p == kAsShipped ? fs::path(command_.run) : p == kFile ? without() : r.own / names_[p];
     return succeeded(r, names_[p], r.made, {run, command_.run});
   }
@@ -252,42 +267,52 @@ class Loop {
 
   Json told() const {
     std::map<std::string, Row> rows;
-    std::string lines = "family,case,part,effects,verdict,named,escapes," + io::joined(names_, ",") + ",seed,draw\n";
+    // where nothing was diagnosed, effects stay sealed, so that the benchmark can still be scored
+    std::string lines = std::string("family,case,part,") + (trains() ? "effects,verdict,named," : "") + "escapes," +
+                        io::joined(names_, ",") + ",seed,draw\n";
     for (const Robot& r : robots_) {
       std::vector<std::size_t> count;
       for (std::size_t p = 0; p < names_.size(); ++p) count.push_back(*flown(r, p));
       const benchmark::Label& label = *r.label;
       const std::string& family = r.of->manifest.family;
-      const benchmark::Answer said = answer_of(r.said);
-      lines += family + "," + std::to_string(label.planned.number) + "," + label.planned.part + "," +
-               io::joined(label.truth().effects, "+") + "," + said.kind + "," + io::joined(said.effects, "+") + "," +
-               std::to_string(command_.escapes);
+      lines += family + "," + std::to_string(label.planned.number) + "," + label.planned.part + ",";
+      if (trains()) {
+        const benchmark::Answer said = answer_of(r.said);
+        lines += io::joined(label.truth().effects, "+") + "," + said.kind + "," + io::joined(said.effects, "+") + ",";
+      }
+      lines += std::to_string(command_.escapes);
       for (Row* row : {&rows[family], &rows["all"]}) {
         ++row->robots;
         row->escapes += command_.escapes;
-        row->better += count[kCorrected] > count[kFile];
-        row->worse += count[kCorrected] < count[kFile];
+        if (trains()) {
+          row->better += count[kCorrected] > count[kFile];
+          row->worse += count[kCorrected] < count[kFile];
+        }
         row->succeeded.resize(count.size());
         for (std::size_t p = 0; p < count.size(); ++p) row->succeeded[p] += count[p];
       }
       for (const std::size_t c : count) lines += "," + std::to_string(c);
       lines += "," + std::to_string(label.planned.seed) + "," + std::to_string(label.draw) + "\n";
     }
-    std::string text =
-        "| family | robots | better with the diagnosis (95 %) | as good | worse | better, ties half | success as "
-        "shipped | trained on with the file | with the corrected vehicle |";
-    for (std::size_t p = kPolicies; p < names_.size(); ++p) text += " " + names_[p] + " |";
+    std::string text = "| family | robots |";
+    if (trains())
+      text +=
+          " better with the diagnosis (95 %) | as good | worse | better, ties half | success as shipped | trained on "
+          "with the file | with the corrected vehicle |";
+    for (std::size_t p = own_policies(); p < names_.size(); ++p) text += " " + names_[p] + " |";
     text += "\n|";
-    for (std::size_t column = 0; column < 6 + names_.size(); ++column) text += "---|";
+    for (std::size_t column = 0; column < (trains() ? 6 : 2) + names_.size(); ++column) text += "---|";
     text += "\n";
     Json all = Json::object();
     for (const auto& [family, row] : rows) {
-      const rollout::Rate rate = rollout::rate_of(row.better, row.robots);
-      text +=
-          io::format("| %s | %zu | %.3f (%.3f to %.3f) | %zu | %zu | %.3f |", family.c_str(), row.robots, rate.value,
-                     rate.low, rate.high, row.robots - row.better - row.worse, row.worse, row.ties_half());
-      all[family] = {
-          {"robots", row.robots}, {"better", row.better}, {"worse", row.worse}, {"ties_half", row.ties_half()}};
+      text += io::format("| %s | %zu |", family.c_str(), row.robots);
+      all[family] = {{"robots", row.robots}};
+      if (trains()) {
+        const rollout::Rate rate = rollout::rate_of(row.better, row.robots);
+        text += io::format(" %.3f (%.3f to %.3f) | %zu | %zu | %.3f |", rate.value, rate.low, rate.high,
+                           row.robots - row.better - row.worse, row.worse, row.ties_half());
+        all[family].update({{"better", row.better}, {"worse", row.worse}, {"ties_half", row.ties_half()}});
+      }
       for (std::size_t p = 0; p < names_.size(); ++p) {
         const double share = static_cast<double>(row.succeeded[p]) / static_cast<double>(row.escapes);
         text += io::format(" %.3f |", share);
@@ -308,12 +333,12 @@ class Loop {
   }
 
   const LoopCommand& command_;
-  std::vector<std::unique_ptr<Scored>> scored_;
+  std::vector<std::unique_ptr<Benchmark>> benchmarks_;
   std::vector<Robot> robots_;
   std::map<std::string, std::size_t> unsteady_;  ///< by family: robots that fail hover_rules()
   std::map<std::string, std::size_t> as_good_;   ///< by family: robots whose effect costs no escape
   std::shared_ptr<const learn::TrainInit> start_;
-  std::vector<std::string> names_ = {"as_shipped", "file", "corrected"};  ///< of the policies
+  std::vector<std::string> names_;  ///< of the policies
 };
 
 }  // namespace

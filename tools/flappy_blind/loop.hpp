@@ -1,6 +1,7 @@
 // flappy-blind loop: measures whether a diagnosis improves a policy. Each robot of a scored benchmark that has an effect, and flew rich
 // flights, flies the escape with a policy whose training was continued on its corrected vehicle, and with the same policy whose
-// training was continued for as long on the vehicle's file. Each policy flies with the controller of its own run.
+// training was continued for as long on the vehicle's file. Without a run to be trained on, policies fly as they are, robots need no
+// diagnosis, and their effects stay sealed. Each policy flies with the controller of its own run.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -10,8 +11,8 @@
 namespace flappy::blind {
 
 struct LoopCommand {
-  std::vector<std::string> folders;  ///< benchmarks scored by flappy-blind score, one for each family
-  std::string run;                   ///< the training run whose best policy is trained further
+  std::vector<std::string> folders;  ///< benchmarks, one for each family; with `run` they have to be scored
+  std::string run;                   ///< the training run whose best policy is trained further; empty: none is trained
   std::string out;
   std::vector<std::string> also;  ///< other training runs, whose best policies fly as they are
   std::string costly;  ///< a training run: only robots whose effect costs its best policy escapes; empty: all

@@ -299,8 +299,8 @@ int main(int argc, char** argv) {
   io::Command loop =
       program.app().command("loop", "trains on with what was diagnosed, and flies robots with it and without");
   blind::LoopCommand looped;
-  loop.option("folders", looped.folders, "of flappy-blind score").required();
-  loop.option("--run", looped.run, "run folder of flappy-train, whose best policy is trained on").required();
+  loop.option("folders", looped.folders, "of flappy-blind score; without --run, of make").required();
+  loop.option("--run", looped.run, "run folder of flappy-train, whose best policy is trained on");
   loop.option("--out", looped.out, "folder for what is trained, loop.csv and loop.md").required();
   loop.option("--also", looped.also, "other run folders, whose best policies the robots fly as they are");
   loop.option("--set", looped.overrides, "override a key of the run: learn.updates=20000").one_at_a_time();

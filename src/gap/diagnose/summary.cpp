@@ -25,8 +25,10 @@ std::string estimate_line(const Estimate& s) {
 
 std::string place_of(const UnexplainedTerm& u) { return u.channel + ", " + harmonic_words(u.harmonic); }
 
-std::string verdict_line(const Verdict& v, bool contrast) {
-  const std::string words = verdict_words(v, contrast, as_it_is);
+std::string verdict_line(const Diagnosis& diagnosis, bool contrast) {
+  const Verdict& v = diagnosis.verdict;
+  const bool seen = !seen_words(diagnosis.seen, as_it_is).empty();
+  const std::string words = verdict_words(v, contrast, as_it_is, seen);
   if (v.kind == VerdictKind::data) return words;
   const bool together = v.kind == VerdictKind::group;
   return words + " (" + (together ? io::format("together %.2f", v.probability) : probability_words(v.probability)) +
@@ -48,7 +50,10 @@ std::string next_line(const Diagnosis& r, const std::string& out) {
   const std::string folder = out.empty() ? "DIR" : std::filesystem::absolute(out).lexically_normal().string();
   switch (c.kind) {
     case VerdictKind::parameters:
-      if (!r.reference.empty()) return "next: nothing to correct; more reference sessions show smaller changes";
+      if (!r.reference.empty())
+        return seen_words(r.seen, as_it_is).empty()
+                   ? "next: nothing to correct; more reference sessions show smaller changes"
+                   : "next: fly more reference sessions, to tell whether what is seen is a change";
       [[fallthrough]];
     case VerdictKind::effect:
       return "next: train on what was found, with flappy-train --adapt " + folder + " --init RUN; or fly on with " +
@@ -144,7 +149,7 @@ std::vector<std::string> seen_lines(const Diagnosis& diagnosis) {
 
 std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::string& out) {
   std::vector<std::string> lines = seen_lines(diagnosis);
-  lines.push_back(diagnosis.complete ? verdict_line(diagnosis.verdict, !diagnosis.reference.empty())
+  lines.push_back(diagnosis.complete ? verdict_line(diagnosis, !diagnosis.reference.empty())
                                      : capitalised(kStopped) + ": " + kNoVerdict);
   if (diagnosis.verdict.kind == VerdictKind::data) {
     for (std::size_t i = 0; i < diagnosis.faults.size() && i + 3 < kSummaryLines; ++i)
@@ -154,7 +159,7 @@ std::vector<std::string> summary_of(const Diagnosis& diagnosis, const std::strin
     return lines;
   }
   for (const NamedDiagnosis& s : diagnosis.sets)
-    lines.push_back(s.name + ": " + (s.diagnosis.complete ? verdict_line(s.diagnosis.verdict, true) : kStopped));
+    lines.push_back(s.name + ": " + (s.diagnosis.complete ? verdict_line(s.diagnosis, true) : kStopped));
   for (const std::string& warning : diagnosis.warnings) lines.push_back("warning: " + warning);
   std::vector<const RankedHypothesis*> ranked;
   for (const RankedHypothesis& c : diagnosis.hypotheses) ranked.push_back(&c);

@@ -29,7 +29,7 @@ std::string spoken_list(const std::vector<std::string>& words, const char* last)
   return all;
 }
 
-std::string verdict_words(const Verdict& v, bool contrast, Spoken spoken) {
+std::string verdict_words(const Verdict& v, bool contrast, Spoken spoken, bool seen) {
   const std::string what = contrast ? "Changed since the reference: " : "Missing in the model: ";
   switch (v.kind) {
     case VerdictKind::effect:
@@ -37,8 +37,9 @@ std::string verdict_words(const Verdict& v, bool contrast, Spoken spoken) {
     case VerdictKind::group:
       return what + "one of " + effects_words(v.effects, spoken, "or") + ", which these flights cannot tell apart";
     case VerdictKind::parameters:
-      return contrast ? "Changed by no more than sessions differ by"
-                      : "Nothing is missing in the model, its parameters are off";
+      return !contrast ? "Nothing is missing in the model, its parameters are off"
+             : seen    ? "What is seen may be no more than sessions differ by"
+                       : "Changed by no more than sessions differ by";
     case VerdictKind::none:
       return contrast ? "Unchanged since the reference"
                       : "No gap beyond noise: the vehicle's file explains the flights";

@@ -22,8 +22,9 @@ inline constexpr const char* kReferenceDecides =
 std::string capitalised(std::string words);
 /// "a, b and c".
 std::string spoken_list(const std::vector<std::string>& words, const char* last = "and");
-/// "Missing in the model: wind"; in a contrast "Changed since the reference: wind".
-std::string verdict_words(const Verdict& verdict, bool contrast, Spoken spoken);
+/// "Missing in the model: wind"; in a contrast "Changed since the reference: wind". `seen`: whether seen_words() has a line
+/// of it.
+std::string verdict_words(const Verdict& verdict, bool contrast, Spoken spoken, bool seen = false);
 /// "probability 0.40, no more than a guess".
 std::string probability_words(double probability);
 /// "wind and tether and more", "parameters alone".

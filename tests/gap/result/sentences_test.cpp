@@ -15,6 +15,9 @@ std::string spoken(std::string name) {
 TEST(Sentences, SayAVerdictAloneAndInAContrast) {
   const Verdict two{VerdictKind::effect, {"body_drag", "wind"}, true, 0.9};
   EXPECT_EQ(verdict_words(two, false, as_it_is), "Missing in the model: body_drag and wind, and something more");
+  const Verdict unchanged{VerdictKind::parameters, {}, false, 0.9};
+  EXPECT_EQ(verdict_words(unchanged, true, spoken, true), "What is seen may be no more than sessions differ by");
+  EXPECT_EQ(verdict_words(unchanged, true, spoken, false), "Changed by no more than sessions differ by");
   EXPECT_EQ(verdict_words(two, true, spoken), "Changed since the reference: body drag and wind, and something more");
   EXPECT_EQ(verdict_words({VerdictKind::group, {"a", "b", "c"}, false, 0.9}, false, spoken),
             "Missing in the model: one of a, b or c, which these flights cannot tell apart");
