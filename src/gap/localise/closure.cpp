@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <numeric>
 #include <random>
@@ -32,11 +33,24 @@ double huber_floor() {
   return 0.5 - tail - k * density + 2 * k * density - k * k * tail;
 }
 
-std::optional<double> Losses::mean() const {
+namespace {
+
+std::optional<double> mean_of_blocks(const Losses& l, const std::function<bool(std::size_t)>& counts) {
   double s = 0, n = 0;
-  for (std::size_t i = 0; i < sum.size(); ++i) s += sum[i], n += count[i];
+  for (std::size_t i = 0; i < l.sum.size(); ++i)
+    if (counts(i)) s += l.sum[i], n += l.count[i];
   if (!(n > 0)) return std::nullopt;
   return s / n;
+}
+
+}  // namespace
+
+std::optional<double> Losses::mean() const {
+  return mean_of_blocks(*this, [](std::size_t) { return true; });
+}
+
+std::optional<double> Losses::mean_where(bool on_bench) const {
+  return mean_of_blocks(*this, [&](std::size_t i) { return (clamped[i] != 0) == on_bench; });
 }
 
 Losses losses_of(const RowContext& around, const TestResiduals& residual) {
@@ -44,7 +58,7 @@ Losses losses_of(const RowContext& around, const TestResiduals& residual) {
   for (std::size_t f = 0; f < around.beats.size(); ++f) {
     if (residual.size() <= f || residual[f].empty()) return {};
     for (std::size_t j = 0; j < around.beats[f]; ++j) {
-      if (j % kBlock == 0) l.sum.push_back(0), l.count.push_back(0);
+      if (j % kBlock == 0) l.sum.push_back(0), l.count.push_back(0), l.clamped.push_back(around.clamped[f]);
       for (int channel = 0; channel < kChannels; ++channel) {
         if (!around.covers(f, j, channel)) continue;
         double sum = 0, n = 0;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "gap/question/alone.hpp"
 #include "gap/synthetic_flight.hpp"
 
 namespace flappy::gap::question_test {
@@ -22,6 +23,32 @@ TEST(Question, AloneAsksWhatIsMissing) {
   EXPECT_EQ(q.apart(flights), Which{});
   EXPECT_NE(q.pool(of_kind(HypothesisKind::none)), q.pool(of_kind(HypothesisKind::parameters)));
   EXPECT_EQ(&question_beside({}), &q);
+}
+
+// By how much an effect multiplies the residual of flights and of the bench.
+TEST(Question, RefutesAnEffectThatHelpsNeitherInFlightNorOnABench) {
+  const auto made = synthetic_flights(4, synthetic_law);
+  made[2]->on_bench = made[3]->on_bench = true;
+  const Flights flights = as_flights(made);
+  Inference d;
+  d.noise_sd.assign(kGroups, 1);
+  for (std::size_t f = 0; f < made.size(); ++f) d.refit.push_back(made[f]->noise(f));
+  const auto effect = [&](const char* id, double in_flight, double on_bench) {
+    ScoredHypothesis a = of_kind(HypothesisKind::effect);
+    a.effects = {id};
+    a.fit.residual = a.held_out = d.refit;
+    for (std::size_t f = 0; f < made.size(); ++f)
+      for (double& r : a.held_out[f]) r *= made[f]->on_bench ? on_bench : in_flight;
+    return a;
+  };
+  d.hypotheses = {effect("spring_hardening", 1.1, 0.9), effect("wind", 0.9, 1.1), effect("tether", 1.1, 1.1),
+                  effect("wall_effect", 1, 1), of_kind(HypothesisKind::parameters)};
+  refute_idle_effects(flights.tests, d);
+  EXPECT_EQ(d.hypotheses[0].log_evidence, 0);
+  EXPECT_EQ(d.hypotheses[1].log_evidence, 0);
+  EXPECT_EQ(d.hypotheses[2].log_evidence, kRefuted);
+  EXPECT_EQ(d.hypotheses[3].log_evidence, kRefuted);
+  EXPECT_EQ(d.hypotheses[4].log_evidence, 0);
 }
 
 TEST(Question, ReferencesWithoutTestsAreFittedAsFlightsAlone) {
