@@ -31,7 +31,7 @@ FIRST_SEED = 900_000  # below those of benchmarks, beyond those that are spent
 
 
 def with_bench(text, learnt):
-    """A file of what models get wrong with the shares of runs on a bench that another one has learnt."""
+    """A file of what models get wrong with the shares and backgrounds of runs on a bench that another one has learnt."""
     tables = re.compile(r"^\[bench_share\..*?\n\n", re.S | re.M)
     commit = re.search(r"commit (\w+)", learnt).group(1)
     text = re.sub(r" Shares of a bench: commit \w+\.", "", tables.sub("", text))
@@ -39,7 +39,14 @@ def with_bench(text, learnt):
     meaning = " bench_share: of runs on a bench, where it differs."
     if meaning not in text:
         text = text.replace("from which learning started.", "from which learning started." + meaning, 1)
-    return re.sub(r"^(?=# Priors of the scales)", "".join(tables.findall(learnt)), text, count=1, flags=re.M)
+    text = re.sub(r"^(?=# Priors of the scales)", "".join(tables.findall(learnt)), text, count=1, flags=re.M)
+    of_flights, names = text.split("[background_sd]\n")
+    lines = [line for line in names.splitlines() if "_on_bench" not in line]
+    for line in learnt.split("[background_sd]\n")[1].splitlines():
+        name, value = line.split(" = ")
+        if name != "other" and "_on_bench" not in name:
+            lines.append(f"{name}_on_bench = {value}")
+    return of_flights + "[background_sd]\n" + "\n".join(sorted(lines)) + "\n"
 
 
 def with_laws(text, of_flights):

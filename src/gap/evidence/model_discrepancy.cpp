@@ -33,10 +33,14 @@ constexpr const char* kBackground =
 # every effect, or of something that looks like it; only more than that is evidence of the effect.
 )";
 
-/// The effect of a background magnitude, without the suffix of what both wings share.
-std::string effect_of(const std::string& background) {
-  return background.ends_with(kOfBoth) ? background.substr(0, background.size() - std::strlen(kOfBoth)) : background;
+/// The name of a background magnitude without its last suffix.
+std::string without_suffix(const std::string& background) {
+  for (const char* suffix : {kOnBench, kOfBoth})
+    if (background.ends_with(suffix)) return background.substr(0, background.size() - std::strlen(suffix));
+  return background;
 }
+
+std::string effect_of(const std::string& background) { return without_suffix(without_suffix(background)); }
 
 }  // namespace
 
@@ -56,10 +60,14 @@ Regimes regimes_of(BasisFunction function) {
   }
 }
 
+std::array<std::string, 4> backgrounds_of(const std::string& effect) {
+  return {effect, effect + kOfBoth, effect + kOnBench, effect + kOfBoth + kOnBench};
+}
+
 double ModelDiscrepancy::background_sd(const std::string& effect) const {
   const auto at = background.find(effect);
   if (at != background.end()) return at->second;
-  const std::string own = effect_of(effect);
+  const std::string own = without_suffix(effect);
   return own != effect ? background_sd(own) : background.at("other");
 }
 

@@ -3,6 +3,7 @@
 // have files of their own in configs/gap/beat_averaged.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -39,13 +40,14 @@ struct ModelDiscrepancy {
     return share_of(shares, channel, harmonic, function);
   }
   /// Prior sd of the background magnitude of an effect, in its coordinates (hypothesis.hpp): what a vehicle without the
-  /// effect has of it, or of something that looks like it.
+  /// effect has of it, or of something that looks like it. A name with a suffix that is not listed has that of the name
+  /// without.
   double background_sd(const std::string& effect) const;
   /// Degrees of freedom of the scale of a block.
   double freedom_of(Regimes regimes) const {
     return regimes == Regimes::place ? spread.place_freedom : spread.block_freedom;
   }
-  /// Prior of the scale of a background magnitude. `effect`: an effect, perhaps with one of the prefixes or the suffix
+  /// Prior of the scale of a background magnitude. `effect`: an effect, perhaps with one of the prefixes or suffixes
   /// below.
   ScalePrior scale_prior(const std::string& effect) const;
 
@@ -67,6 +69,11 @@ inline constexpr const char* kModelOf = "model of ";
 
 /// Suffix of the background magnitude that both wings share, for an effect with a magnitude for each wing.
 inline constexpr const char* kOfBoth = "_of_both";
+/// Last suffix of the background magnitude that acts on a bench alone, for logs of flights and of a bench: what errors of
+/// a model look like there is not what they look like in flight, while an effect is the same in both.
+inline constexpr const char* kOnBench = "_on_bench";
+/// Names of all background magnitudes that an effect may have: without suffix, and with one or both.
+std::array<std::string, 4> backgrounds_of(const std::string& effect);
 
 /// Text of configs/gap/model_discrepancy.toml. `learnt`: source of the values, for the head of the file.
 std::string discrepancy_text(const ModelDiscrepancy& discrepancy, const std::string& learnt);

@@ -60,6 +60,23 @@ ModelDiscrepancy of_flights(ModelDiscrepancy discrepancy, const Flights& flights
   return discrepancy;
 }
 
+/// Each background once for flights and once for a bench. The latter moves no vehicle, for a corrected one has to fly.
+std::vector<Background> apart_on_bench(const std::vector<Background>& list, const ModelDiscrepancy& discrepancy) {
+  constexpr auto kFlown =
+      static_cast<Eigen::Index>(kRowsPerBeat);  // groups of flights, which come before those of a bench
+  std::vector<Background> apart;
+  for (const Background& b : list) {
+    const std::string name = b.effect + kOnBench;
+    Background flown = b,
+               clamped{name, discrepancy.background_sd(name) / discrepancy.background_sd(b.effect) * b.column, {}};
+    flown.column.bottomRows(kGroups - kFlown).setZero();
+    clamped.column.topRows(kFlown).setZero();
+    for (Background* part : {&flown, &clamped})
+      if (!part->column.isZero(0)) apart.push_back(std::move(*part));
+  }
+  return apart;
+}
+
 /// `withheld`; tether, unless each flight in which effects act has a ground: it would hang down to nowhere; and what
 /// surrounds a robot in the air, if all runs are on a bench: a rig stays where it stands.
 std::vector<std::string> without_idle(std::vector<std::string> withheld, const Flights& flights) {
@@ -232,7 +249,9 @@ void RobotFit::widen_backgrounds() {
 double RobotFit::beyond_background(const std::string& effect, const VectorXd& magnitudes, const Scales& scales) const {
   const ScalePrior prior = evidence().discrepancy().scale_prior(effect);
   const double nu = prior.freedom, f = scales.prior_scale(prior);
-  const auto improbable = [&](const std::string& name, const VectorXd& m) {
+  const auto improbable = [&](const std::string& in_flight, const VectorXd& m) {
+    // a bench shows a magnitude most precisely, so it counts what that is there
+    const std::string name = fitter_.place_of(in_flight + kOnBench) < 0 ? in_flight : in_flight + kOnBench;
     const double sd = evidence().discrepancy().background_sd(name), n = static_cast<double>(m.size());
     const double times = std::sqrt((m.squaredNorm() / (sd * sd) + nu * f * f) / (n + nu));
     return 0.5 * m.squaredNorm() / std::pow(times * sd, 2) + n * std::log(times * sd) +
@@ -301,7 +320,13 @@ std::vector<Background> RobotFit::background(const ModelDiscrepancy& discrepancy
   }
   for (std::size_t i = 0; shapes && i < shapes_.size(); ++i)
     list.push_back({shapes_[i].effect, discrepancy.background_sd(shapes_[i].effect) * shapes_[i].change});
-  return list;
+  return in_flight_and_on_bench() ? apart_on_bench(list, discrepancy) : list;
+}
+
+bool RobotFit::in_flight_and_on_bench() const {
+  const FlightList all = flights_.all();
+  const auto on_bench = std::ranges::count_if(all, [](const auto& f) { return f->clamped(); });
+  return on_bench > 0 && on_bench < std::ssize(all);
 }
 
 void RobotFit::set_nuisances() {
@@ -415,7 +440,7 @@ std::vector<Scales> RobotFit::further_starts(const Hypothesis& hypothesis, const
   Scales without_background = start;
   bool differs = false;
   for (const std::string& effect : hypothesis.effects())
-    for (const std::string& name : {effect, effect + kOfBoth})
+    for (const std::string& name : backgrounds_of(effect))
       if (const auto e = static_cast<std::size_t>(fitter_.place_of(name)); e < start.effects.size()) {
         without_background.effects[e] = start.prior_scale(d.scale_prior(name));
         differs = true;

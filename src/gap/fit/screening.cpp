@@ -81,7 +81,7 @@ class Screening {
     const std::vector<double>& scales = fitter_.scales().effects;
     std::vector<int> others = base_;
     double saved = 0;
-    for (const std::string& name : {effect, effect + kOfBoth}) {
+    for (const std::string& name : backgrounds_of(effect)) {
       const int place = fitter_.place_of(name);
       const auto of_it = [&](int i) { return effects_[static_cast<std::size_t>(i)] == place; };
       if (place < 0 || std::erase_if(others, of_it) == 0 || static_cast<std::size_t>(place) >= scales.size()) continue;

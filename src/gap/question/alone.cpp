@@ -178,7 +178,10 @@ VectorXd Alone::next_effects(const Fitter& /*fitter*/, const Hypothesis& /*hypot
 
 NearSteps Alone::near_steps(const ModelDiscrepancy& discrepancy) const {
   return {[&discrepancy](const std::string& effect) {
-            return std::max(discrepancy.background_sd(effect), discrepancy.background_sd(effect + kOfBoth));
+            double most = 0;
+            for (const std::string& name : backgrounds_of(effect))
+              most = std::max(most, discrepancy.background_sd(name));
+            return most;
           },
           true};
 }

@@ -37,6 +37,10 @@ TEST(ModelDiscrepancy, KnowsBackgroundsByEffect) {
   EXPECT_EQ(d.background_sd("wing_damage_of_both"), 0.2) << "as each wing's, unless it is named";
   d.background["wing_damage_of_both"] = 0.05;
   EXPECT_EQ(d.background_sd("wing_damage_of_both"), 0.05);
+  EXPECT_EQ(d.background_sd("wing_damage_of_both_on_bench"), 0.05) << "as in flight, unless it is named";
+  EXPECT_EQ(d.background_sd("wind_on_bench"), 0.3);
+  d.background["wing_damage_of_both_on_bench"] = 0.01;
+  EXPECT_EQ(d.background_sd("wing_damage_of_both_on_bench"), 0.01);
 }
 
 TEST(ModelDiscrepancy, LetsEffectsOfModelsFollowTheRobot) {

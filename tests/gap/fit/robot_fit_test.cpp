@@ -151,6 +151,36 @@ TEST_F(RobotFits, WeighsAContrastAlsoFromThePriorsOfItsScales) {
   EXPECT_NEAR(log_evidence(far), log_evidence(near), 0.5);
 }
 
+// In flight and on a bench backgrounds are apart: each has the rows of one of them, and what it weighs there.
+TEST_F(RobotFits, HasBackgroundsOfItsOwnOnABench) {
+  const auto made = synthetic_flights(4, synthetic_law);
+  const Hypothesis none(*priors_, {});
+  made[2]->on_bench = made[3]->on_bench = true;
+  for (const auto& f : made) f->fly(none.vehicle(none.start()));
+  const Flights flights = as_flights(made);
+  ModelDiscrepancy discrepancy = read_model_discrepancy();
+  discrepancy.background["wind"] = 0.1, discrepancy.background["wind_on_bench"] = 0.02;
+  const RobotFit robot = RobotFit::planned(question_of(flights), flights, *priors_, discrepancy, 2);
+  const auto flown = static_cast<Eigen::Index>(kRowsPerBeat);
+  const auto rms = [&](const std::string& name, bool on_bench) {
+    double sum = 0;
+    for (const Background& b : robot.background(discrepancy, false))
+      if (b.effect == name)
+        sum += (on_bench ? b.column.bottomRows(kGroups - flown) : b.column.topRows(flown)).squaredNorm();
+    return std::sqrt(sum);
+  };
+  const std::string name = "wind", on_bench = name + kOnBench;
+  EXPECT_GT(rms(name, false), 0);
+  EXPECT_EQ(rms(name, true), 0);
+  EXPECT_EQ(rms(on_bench, false), 0);
+  const double weight = rms(on_bench, true);
+  discrepancy.background["wind_on_bench"] = 0.04;
+  EXPECT_NEAR(rms(on_bench, true), 2 * weight, 1e-12 * weight);
+  EXPECT_GT(weight, 0);
+  for (const Background& b : robot.background(discrepancy, false))
+    EXPECT_EQ(b.moves.empty(), b.effect.ends_with(kOnBench)) << b.effect << ": a corrected vehicle flies";
+}
+
 // The same by a search for the scale t that makes magnitudes most probable as background: -log N(0, (t sd)^2), and the cost of t.
 TEST_F(RobotFits, SaysHowMuchMoreProbableMagnitudesAreAsAnEffect) {
   const ModelDiscrepancy discrepancy = read_model_discrepancy();
