@@ -28,6 +28,8 @@ namespace flappy::gap {
 /// Number of groups; [group] is channel x kCoefficients + coefficient. Runs on a bench have groups of their own, which
 /// follow those of flights in the air.
 inline constexpr int kGroups = kSettingChannels * kCoefficients;
+/// Groups of flights, which come before those of a bench.
+inline constexpr int kFlownGroups = kChannels * kCoefficients;
 /// First group of a channel.
 constexpr int first_group(bool on_bench, int channel) { return ((on_bench ? kChannels : 0) + channel) * kCoefficients; }
 constexpr bool of_bench(int group) { return group >= first_group(true, 0); }

@@ -62,15 +62,13 @@ ModelDiscrepancy of_flights(ModelDiscrepancy discrepancy, const Flights& flights
 
 /// Each background once for flights and once for a bench. The latter moves no vehicle, for a corrected one has to fly.
 std::vector<Background> apart_on_bench(const std::vector<Background>& list, const ModelDiscrepancy& discrepancy) {
-  constexpr auto kFlown =
-      static_cast<Eigen::Index>(kRowsPerBeat);  // groups of flights, which come before those of a bench
   std::vector<Background> apart;
   for (const Background& b : list) {
     const std::string name = b.effect + kOnBench;
     Background flown = b,
                clamped{name, discrepancy.background_sd(name) / discrepancy.background_sd(b.effect) * b.column, {}};
-    flown.column.bottomRows(kGroups - kFlown).setZero();
-    clamped.column.topRows(kFlown).setZero();
+    flown.column.bottomRows(kGroups - kFlownGroups).setZero();
+    clamped.column.topRows(kFlownGroups).setZero();
     for (Background* part : {&flown, &clamped})
       if (!part->column.isZero(0)) apart.push_back(std::move(*part));
   }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <map>
 
 #include "gap/localise/closure.hpp"
@@ -231,34 +233,39 @@ std::vector<TestResiduals> Alone::held_out(const Fitter& fitter, const Flights& 
 void Alone::refute(const RobotFit& robot, const Fitter& fitter, const Flights& flights, const VerdictRule& rule,
                    Inference& d) const {
   share_backgrounds(robot, fitter.scales(), rule.unknown.penalty_nats, d.hypotheses);
-  refute_idle_effects(flights.tests, d);
+  const auto acts_on_bench = [&](const std::string& effect) {
+    return std::ranges::any_of(robot.magnitudes(), [&](const MagnitudeColumn& m) {
+      return m.effect == effect && m.change.bottomRows(kGroups - kFlownGroups).cwiseAbs().maxCoeff() > kNoChange;
+    });
+  };
+  refute_idle_effects(flights.tests, acts_on_bench, d);
 }
 
-/// Refutes hypotheses with an effect that lowers the loss neither of flights nor of runs on a bench held out. Apart, for
-/// what shows on a bench may be lost in a flight among larger errors of the air.
-void refute_idle_effects(const FlightList& tests, Inference& d) {
+void refute_idle_effects(const FlightList& tests, const std::function<bool(const std::string&)>& acts_on_bench,
+                         Inference& d) {
   const RowContext context = row_context_of(tests, d.noise_sd);
   const Losses alone = losses_of(context, d.refit);
   std::vector<ScoredHypothesis>& all = d.hypotheses;
   std::vector<Losses> losses;
   for (const ScoredHypothesis& a : all) losses.push_back(losses_of(context, a.held_out));
-  const auto idle = [&](std::size_t with, const Losses& without) {
+  const auto idle = [&](std::size_t with, const Losses& without, const std::string& effect) {
     if (all[with].held_out.empty() || without.sum.empty()) return false;
     const auto lowers = [&](bool on_bench) {
       const std::optional<double> before = without.mean_where(on_bench), after = losses[with].mean_where(on_bench);
       return before && after && *after < *before;  // none after: it diverges
     };
-    return !lowers(false) && !lowers(true);
+    return !lowers(false) && !(acts_on_bench(effect) && lowers(true));
   };
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (!all[i].fitted()) continue;
-    bool refuted = all[i].effects.size() == 1 && idle(i, alone);
+    bool refuted = all[i].effects.size() == 1 && idle(i, alone, all[i].effects[0]);
     for (std::size_t k = 0; k < all.size(); ++k) {
       const ScoredHypothesis& part = all[k];
+      std::vector<std::string> more;
+      std::ranges::copy_if(all[i].effects, std::back_inserter(more),
+                           [&](const std::string& e) { return std::ranges::count(part.effects, e) == 0; });
       refuted |= part.fitted() && part.has_remainder() == all[i].has_remainder() &&
-                 part.effects.size() + 1 == all[i].effects.size() && idle(i, losses[k]) &&
-                 std::ranges::all_of(part.effects,
-                                     [&](const std::string& e) { return std::ranges::count(all[i].effects, e) > 0; });
+                 part.effects.size() + 1 == all[i].effects.size() && more.size() == 1 && idle(i, losses[k], more[0]);
     }
     if (refuted) all[i].log_evidence = kRefuted;
   }

@@ -91,9 +91,12 @@ class Alone : public Question {
   double min_step_nats_;
 };
 
-/// Refutes hypotheses with an effect that does not lower the loss of held-out test flights. One effect is compared with
-/// the parameters alone, a set of effects with each of its subsets that has one effect fewer.
-void refute_idle_effects(const FlightList& tests, Inference& d);
+/// Refutes hypotheses with an effect that lowers the loss neither of flights held out nor, if it acts there, of runs on a
+/// bench held out. Flights and runs count apart: what shows on a bench may be lost in a flight among larger errors of the
+/// air. One effect is compared with the parameters alone, a set of effects with each of its subsets that has one effect
+/// fewer.
+void refute_idle_effects(const FlightList& tests, const std::function<bool(const std::string&)>& acts_on_bench,
+                         Inference& d);
 /// The pool of a hypothesis: pool_name() of its effects, or "/" and its kind. Contrast uses it, too, except for the
 /// hypothesis none.
 std::string pool_of(const ScoredHypothesis& hypothesis);

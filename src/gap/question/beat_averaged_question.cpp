@@ -35,7 +35,8 @@ std::vector<TestResiduals> BeatAveraged::held_out(const Fitter& fitter, const Fl
 
 void BeatAveraged::refute(const RobotFit& /*robot*/, const Fitter& /*fitter*/, const Flights& flights,
                           const VerdictRule& /*rule*/, Inference& d) const {
-  refute_idle_effects(flights.tests, d);
+  refute_idle_effects(
+      flights.tests, [](const std::string&) { return false; }, d);
 }
 
 std::optional<Validation> BeatAveraged::validate(const Fitter& fitter, const sim::Randomisation& uncertain,

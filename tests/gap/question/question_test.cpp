@@ -41,14 +41,17 @@ TEST(Question, RefutesAnEffectThatHelpsNeitherInFlightNorOnABench) {
       for (double& r : a.held_out[f]) r *= made[f]->on_bench ? on_bench : in_flight;
     return a;
   };
-  d.hypotheses = {effect("spring_hardening", 1.1, 0.9), effect("wind", 0.9, 1.1), effect("tether", 1.1, 1.1),
-                  effect("wall_effect", 1, 1), of_kind(HypothesisKind::parameters)};
-  refute_idle_effects(flights.tests, d);
+  d.hypotheses = {effect("spring_hardening", 1.1, 0.9), effect("wind", 0.9, 1.1),
+                  effect("tether", 1.1, 1.1),           effect("wall_effect", 1, 1),
+                  of_kind(HypothesisKind::parameters),  effect("accelerometer_misalignment", 1.1, 0.9)};
+  refute_idle_effects(
+      flights.tests, [](const std::string& id) { return id == "spring_hardening"; }, d);
   EXPECT_EQ(d.hypotheses[0].log_evidence, 0);
   EXPECT_EQ(d.hypotheses[1].log_evidence, 0);
   EXPECT_EQ(d.hypotheses[2].log_evidence, kRefuted);
   EXPECT_EQ(d.hypotheses[3].log_evidence, kRefuted);
   EXPECT_EQ(d.hypotheses[4].log_evidence, 0);
+  EXPECT_EQ(d.hypotheses[5].log_evidence, kRefuted) << "it does not act on a bench";
 }
 
 TEST(Question, ReferencesWithoutTestsAreFittedAsFlightsAlone) {
