@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "gap/fit/one_sided.hpp"
@@ -97,21 +96,6 @@ std::vector<std::string> untestable(const RobotFit& robot, const std::vector<std
   return list;
 }
 
-/// Evidence of the parameters alone, fitted on from where they are in the best fit of a single effect: such a fit may find
-/// a better point for them, which is no evidence of the effect. -infinity where a question does not fit them again.
-double parameters_from_best(const Question& question, const RobotFit& robot,
-                            const std::vector<ScoredHypothesis>& singles) {
-  constexpr double kNone = -std::numeric_limits<double>::infinity();
-  const auto best = std::ranges::max_element(singles, {}, [](const ScoredHypothesis& a) {
-    return a.fitted() ? a.explained() : -std::numeric_limits<double>::infinity();
-  });
-  if (best == singles.end() || !best->fitted()) return kNone;
-  const Hypothesis& h = robot.no_effects();
-  const std::optional<Fit> fit =
-      question.refit_jointly(robot.fitter(), h, best->fit.mean().head(h.size()), robot.parameters());
-  return fit && fit->flown() ? robot.weigh(h, *fit, robot.fitter().scales()).posterior.log_evidence : kNone;
-}
-
 }  // namespace
 
 Baselines weigh_baselines(const Question& question, const RobotFit& robot, const VerdictRule& rule) {
@@ -150,8 +134,7 @@ void raise_baselines(const Question& question, const RobotFit& robot, const Verd
     return gain;
   };
   raise(baselines.unknown, most.log_evidence - rule.unknown.penalty_nats);
-  const double gain = raise(baselines.parameters,
-                            std::max(most.log_evidence_of_harmless, parameters_from_best(question, robot, singles)));
+  const double gain = raise(baselines.parameters, most.log_evidence_of_harmless);
   for (ScoredHypothesis& a : singles)
     if (!a.fitted()) a.log_evidence += gain;
   std::ranges::sort(singles, std::greater{}, &ScoredHypothesis::explained);
