@@ -137,7 +137,7 @@ class DiagnosisSection {
   void add_verdict() {
     const gap::Verdict& v = diagnosis_.verdict;
     const std::size_t references = diagnosis_.reference.size();
-    section_.say(verdict_words(v, references > 0, spoken, !seen_words(diagnosis_.seen, spoken).empty()) + ".", "lead");
+    section_.say(verdict_words(v, references > 0, spoken, any_told(diagnosis_.seen)) + ".", "lead");
     if (v.kind != gap::VerdictKind::data)
       section_.say(format("%s, from %zu flights%s.", gap::capitalised(gap::probability_words(v.probability)).c_str(),
                           diagnosis_.flights.size(),

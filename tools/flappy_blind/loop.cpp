@@ -82,8 +82,8 @@ class Loop {
                              "; accepted: run folders of different names");
       names_.push_back(name);
     }
-    if (!command.costly.empty()) read_rules(command.costly);  // throws, before anything is flown
-    for (const std::string& also : command.also) read_rules(also);
+    if (!command.costly.empty()) read_rules(as_it_is(command.costly));  // throws, before anything is flown
+    for (const std::string& also : command.also) read_rules(as_it_is(also));
     for (const std::string& folder : command.folders) {
       const Benchmark& s = *benchmarks_.emplace_back(std::make_unique<Benchmark>(folder, trains()));
       if (s.labels.empty())
@@ -113,7 +113,7 @@ class Loop {
 
   /// Chooses the robots, in the order of their cases; false if it was interrupted.
   bool choose() {
-    const fs::path any = trains() ? command_.run : command_.also[0];
+    const Flown any = as_it_is(trains() ? command_.run : command_.also[0]);
     const EscapeRules hover = hover_rules(read_rules(any));
     const bool own = fs::weakly_canonical(command_.costly) == fs::weakly_canonical(command_.run);
     std::map<std::string, std::size_t> benches;
@@ -129,13 +129,13 @@ class Loop {
         progress.show(static_cast<double>(seen++) / static_cast<double>(s->labels.size()), "family " + family);
         Robot r{s.get(), &label, trains() ? s->prediction(number) : benchmark::Prediction(),
                 label.robot(s->manifest.vehicle), command_.out / fs::path(name + benchmark::number_text(number))};
-        if (!escapes_of(family, r.made, hover, any)(0)) {
+        if (!escapes_of(family, r.made, hover, any.config())(0)) {
           ++unsteady_[family];
           continue;
         }
         io::make_folder(r.own);
         if (!command_.costly.empty()) {
-          const Flown by{command_.costly, command_.costly};
+          const Flown by = as_it_is(command_.costly);
           const std::optional<std::size_t> with = succeeded(r, own ? names_[kAsShipped] : "with_effect", r.made, by);
           if (!with) return false;
           std::optional<std::size_t> without = *with;
@@ -163,8 +163,8 @@ class Loop {
     fs::path policy() const { return run / "best.json"; }
     fs::path config() const { return rules / "config" / "fly.toml"; }
   };
+  static Flown as_it_is(const fs::path& run) { return {run, run}; }
   static EscapeRules read_rules(const Flown& by) { return read_escape_rules(by.policy(), by.config()); }
-  static EscapeRules read_rules(const fs::path& run) { return read_rules(Flown{run, run}); }
 
   /// Flies the escapes of `flown`, which is the robot of `r` or a variant of it, and counts those that succeed. The count is kept in
   /// the folder of `r` as NAME.json, with a hash of its inputs, and is read from there the next time. Empty after Ctrl-C.
@@ -178,7 +178,7 @@ class Loop {
     if (fs::exists(file))
       if (const Json kept = benchmark::read_json(file); kept.value("of", "") == of)
         return kept.at("succeeded").get<std::size_t>();
-    const auto succeeds = escapes_of(r.of->manifest.family, flown, read_rules(by), by.rules);
+    const auto succeeds = escapes_of(r.of->manifest.family, flown, read_rules(by), by.config());
     std::atomic<std::size_t> count = 0;
     io::parallel_for(command_.escapes, command_.threads, [&](std::size_t n) {
       if (!io::interrupted()) count += succeeds(n);
@@ -228,10 +228,7 @@ class Loop {
 
   /// Flies the escapes of a robot with a policy; empty after Ctrl-C.
   std::optional<std::size_t> flown(const Robot& r, std::size_t p) const {
-    if (p >= own_policies()) {
-      const fs::path run = command_.also[p - own_policies()];
-      return succeeded(r, names_[p], r.made, {run, run});
-    }
+    if (p >= own_policies()) return succeeded(r, names_[p], r.made, as_it_is(command_.also[p - own_policies()]));
     if (p == kCorrected && r.said.corrected.empty()) p = kFile;  // its logs were faulty
     const fs::path run = p == kAsShipped ? fs::path(command_.run) : p == kFile ? without() : r.own / names_[p];
     return succeeded(r, names_[p], r.made, {run, command_.run});
@@ -244,15 +241,16 @@ class Loop {
     return all && !io::interrupted();
   }
 
-  /// A function that flies the escape of a number and returns whether it succeeds; `run` is that of the rules.
+  /// A function that flies the escape of a number and returns whether it succeeds. `config`: the file of the rules.
   static std::function<bool(std::size_t)> escapes_of(const std::string& family, const Assignment& a,
-                                                     const EscapeRules& rules, const fs::path& run) {
+                                                     const EscapeRules& rules, const fs::path& config) {
     if (family == "a")
       return [robot = case_of(a), rules](std::size_t n) {
         return outcome_of(escape(robot, n, EscapeRules(rules))).success();
       };
-    return [&of = benchmark::family_named(family), a, asked = escape_assignment(rules, run / "config" / "fly.toml")](
-               std::size_t n) { return of.escape(a, n, EscapeAssignment(asked)).success; };
+    return [&of = benchmark::family_named(family), a, asked = escape_assignment(rules, config)](std::size_t n) {
+      return of.escape(a, n, EscapeAssignment(asked)).success;
+    };
   }
 
   struct Row {
@@ -338,7 +336,7 @@ class Loop {
   std::map<std::string, std::size_t> unsteady_;  ///< by family: robots that fail hover_rules()
   std::map<std::string, std::size_t> as_good_;   ///< by family: robots whose effect costs no escape
   std::shared_ptr<const learn::TrainInit> start_;
-  std::vector<std::string> names_;  ///< of the policies
+  std::vector<std::string> names_;  ///< [policy] name of its column and of its counts' files
 };
 
 }  // namespace

@@ -16,7 +16,7 @@ struct LoopCommand {
   std::string out;
   std::vector<std::string> also;  ///< other training runs, whose best policies fly as they are
   std::string costly;  ///< a training run: only robots whose effect costs its best policy escapes; empty: all
-  std::vector<std::string> overrides;  ///< of keys of the run's configuration, as "learn.updates=20000"
+  std::vector<std::string> overrides;  ///< replace keys of RUN/config/train.toml: "learn.updates=20000"
   std::size_t robots = 0;              ///< the first robots of each folder, at most; 0: all
   std::size_t escapes = 50;
   int threads = 0;  ///< number of robots in parallel; 0: one for each processor

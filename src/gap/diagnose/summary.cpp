@@ -27,8 +27,7 @@ std::string place_of(const UnexplainedTerm& u) { return u.channel + ", " + harmo
 
 std::string verdict_line(const Diagnosis& diagnosis, bool contrast) {
   const Verdict& v = diagnosis.verdict;
-  const bool seen = !seen_words(diagnosis.seen, as_it_is).empty();
-  const std::string words = verdict_words(v, contrast, as_it_is, seen);
+  const std::string words = verdict_words(v, contrast, as_it_is, any_told(diagnosis.seen));
   if (v.kind == VerdictKind::data) return words;
   const bool together = v.kind == VerdictKind::group;
   return words + " (" + (together ? io::format("together %.2f", v.probability) : probability_words(v.probability)) +
@@ -51,9 +50,8 @@ std::string next_line(const Diagnosis& r, const std::string& out) {
   switch (c.kind) {
     case VerdictKind::parameters:
       if (!r.reference.empty())
-        return seen_words(r.seen, as_it_is).empty()
-                   ? "next: nothing to correct; more reference sessions show smaller changes"
-                   : "next: fly more reference sessions, to tell whether what is seen is a change";
+        return any_told(r.seen) ? "next: fly more reference sessions, to tell whether what is seen is a change"
+                                : "next: nothing to correct; more reference sessions show smaller changes";
       [[fallthrough]];
     case VerdictKind::effect:
       return "next: train on what was found, with flappy-train --adapt " + folder + " --init RUN; or fly on with " +

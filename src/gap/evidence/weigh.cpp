@@ -91,7 +91,7 @@ double Evidence::scale_cost_nats(double times, ScalePrior prior, const Scales& s
   return -log_prior(times, scales.prior_scale(prior), prior.freedom);
 }
 
-/// What Evidence::weigh needs of one residual. Sums that depend neither on scales nor on law_sd are made once.
+/// Weighs one residual, from any start and with any law_sd. The constructor computes the sums that depend on neither.
 class Evidence::Weighing {
  public:
   Weighing(const Evidence& evidence, const SufficientStatistics& residual, const Regressors& regressors,
@@ -368,7 +368,7 @@ class Evidence::Weighing {
   const Evidence& e_;
   const WideKernel& kernel_ = wide_kernel();
   const Regressors& regressors_;
-  const BasisCoefficients* law_sd_ = nullptr;  ///< of the present run
+  const BasisCoefficients* law_sd_ = nullptr;  ///< argument of run()
   std::optional<double> unknown_penalty_nats_;
   Index q_, k_;  ///< number of functions of the basis; of regressors
   VectorXd prior_mean_;

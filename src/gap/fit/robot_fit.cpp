@@ -318,13 +318,9 @@ std::vector<Background> RobotFit::background(const ModelDiscrepancy& discrepancy
   }
   for (std::size_t i = 0; shapes && i < shapes_.size(); ++i)
     list.push_back({shapes_[i].effect, discrepancy.background_sd(shapes_[i].effect) * shapes_[i].change});
-  return in_flight_and_on_bench() ? apart_on_bench(list, discrepancy) : list;
-}
-
-bool RobotFit::in_flight_and_on_bench() const {
   const FlightList all = flights_.all();
   const auto on_bench = std::ranges::count_if(all, [](const auto& f) { return f->clamped(); });
-  return on_bench > 0 && on_bench < std::ssize(all);
+  return on_bench > 0 && on_bench < std::ssize(all) ? apart_on_bench(list, discrepancy) : list;
 }
 
 void RobotFit::set_nuisances() {

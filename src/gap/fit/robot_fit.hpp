@@ -56,7 +56,6 @@ class RobotFit {
   /// both share (kOfBoth), as an error of a wing model is the same in both. Each is apart in flight and on a bench
   /// (kOnBench) if there are both. `shapes`: also what a move of each shape parameter changes.
   std::vector<Background> background(const ModelDiscrepancy& discrepancy, bool shapes) const;
-  bool in_flight_and_on_bench() const;
   /// Changes between sessions though nothing that matters has changed: of parameters and errors of sensors (all named
   /// kSessionParameters), and of each effect's magnitudes (kSessionOf and the effect's name). They act in the test
   /// flights alone. Only in a contrast.

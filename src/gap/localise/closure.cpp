@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <numbers>
 #include <numeric>
 #include <random>
@@ -33,24 +32,12 @@ double huber_floor() {
   return 0.5 - tail - k * density + 2 * k * density - k * k * tail;
 }
 
-namespace {
-
-std::optional<double> mean_of_blocks(const Losses& l, const std::function<bool(std::size_t)>& counts) {
+std::optional<double> Losses::mean(std::optional<bool> on_bench) const {
   double s = 0, n = 0;
-  for (std::size_t i = 0; i < l.sum.size(); ++i)
-    if (counts(i)) s += l.sum[i], n += l.count[i];
+  for (std::size_t i = 0; i < sum.size(); ++i)
+    if (!on_bench || (clamped[i] != 0) == *on_bench) s += sum[i], n += count[i];
   if (!(n > 0)) return std::nullopt;
   return s / n;
-}
-
-}  // namespace
-
-std::optional<double> Losses::mean() const {
-  return mean_of_blocks(*this, [](std::size_t) { return true; });
-}
-
-std::optional<double> Losses::mean_where(bool on_bench) const {
-  return mean_of_blocks(*this, [&](std::size_t i) { return (clamped[i] != 0) == on_bench; });
 }
 
 Losses losses_of(const RowContext& around, const TestResiduals& residual) {

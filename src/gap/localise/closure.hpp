@@ -20,11 +20,10 @@ double huber_floor();
 
 /// Losses of one hypothesis over all test flights.
 struct Losses {
-  std::vector<double> sum, count;      ///< [block of consecutive beats] sum and number; empty if a simulation diverged
-  std::vector<char> clamped;           ///< [block] whether the robot was clamped
-  std::optional<double> mean() const;  ///< none: no losses
-  /// Of the flights alone, or of the runs on a bench.
-  std::optional<double> mean_where(bool clamped) const;
+  std::vector<double> sum, count;  ///< [block of consecutive beats] sum and number; empty if a simulation diverged
+  std::vector<char> clamped;       ///< [block] whether the robot was clamped
+  /// Mean loss over the runs on a bench (true), over the flights (false), or over all. None: there are no losses.
+  std::optional<double> mean(std::optional<bool> on_bench = {}) const;
 };
 /// The losses of a residual; empty if that of any flight is empty. `around`: of the test flights.
 Losses losses_of(const RowContext& around, const TestResiduals& residual);

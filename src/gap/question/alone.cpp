@@ -251,7 +251,7 @@ void refute_idle_effects(const FlightList& tests, const std::function<bool(const
   const auto idle = [&](std::size_t with, const Losses& without, const std::string& effect) {
     if (all[with].held_out.empty() || without.sum.empty()) return false;
     const auto lowers = [&](bool on_bench) {
-      const std::optional<double> before = without.mean_where(on_bench), after = losses[with].mean_where(on_bench);
+      const std::optional<double> before = without.mean(on_bench), after = losses[with].mean(on_bench);
       return before && after && *after < *before;  // none after: it diverges
     };
     return !lowers(false) && !(acts_on_bench(effect) && lowers(true));

@@ -92,6 +92,10 @@ std::string seen_value(const SeenQuantity& quantity, double value, bool sign) {
   return io::format(sign ? "%+.3g" : "%.3g", factor * value) + (*unit ? std::string(" ") + unit : "");
 }
 
+bool any_told(const std::vector<SeenQuantity>& seen) {
+  return std::ranges::any_of(seen, [](const SeenQuantity& s) { return std::abs(s.times()) > kTold; });
+}
+
 std::vector<std::string> seen_words(const std::vector<SeenQuantity>& seen, Spoken spoken) {
   std::vector<const SeenQuantity*> told;
   for (const SeenQuantity& s : seen)

@@ -22,8 +22,7 @@ inline constexpr const char* kReferenceDecides =
 std::string capitalised(std::string words);
 /// "a, b and c".
 std::string spoken_list(const std::vector<std::string>& words, const char* last = "and");
-/// "Missing in the model: wind"; in a contrast "Changed since the reference: wind". `seen`: whether seen_words() has a line
-/// of it.
+/// "Missing in the model: wind"; in a contrast "Changed since the reference: wind". `seen`: any_told() of the diagnosis.
 std::string verdict_words(const Verdict& verdict, bool contrast, Spoken spoken, bool seen = false);
 /// "probability 0.40, no more than a guess".
 std::string probability_words(double probability);
@@ -36,6 +35,8 @@ std::string suspects_words(const std::vector<Suspect>& suspects, Spoken spoken);
 /// A quantity is reported if it changed by more standard deviations between sessions than this. Choice: of twenty
 /// quantities one goes so far by chance.
 inline constexpr double kTold = 2;
+/// Whether any quantity changed by more than kTold, so that seen_words() is not empty.
+bool any_told(const std::vector<SeenQuantity>& seen);
 /// A line for each quantity that changed by more than kTold, whatever the cause; the largest change first: "thrust of
 /// rotor_3 -9.4 %, 6.1 times what sessions differ by".
 std::vector<std::string> seen_words(const std::vector<SeenQuantity>& seen, Spoken spoken);

@@ -306,12 +306,12 @@ TEST(Closure, LossesOfNoiseAreTheFloor) {
 
 TEST(Closure, LossesOfFlightsAndOfABenchAreApart) {
   Flown f = flown(3, 0);
-  EXPECT_FALSE(losses_of(f.around, f.residual).mean_where(true)) << "there is no bench";
+  EXPECT_FALSE(losses_of(f.around, f.residual).mean(true)) << "there is no bench";
   f.around.clamped[2] = 1;
   for (double& r : f.residual[2]) r *= 5;
   const Losses l = losses_of(f.around, f.residual);
-  EXPECT_NEAR(*l.mean_where(false), huber_floor(), 0.015);
-  EXPECT_GT(*l.mean_where(true), 4 * huber_floor());
+  EXPECT_NEAR(*l.mean(false), huber_floor(), 0.015);
+  EXPECT_GT(*l.mean(true), 4 * huber_floor());
 }
 
 /// Blocks whose mean loss scatters by the given sd.
