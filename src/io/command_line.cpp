@@ -60,7 +60,7 @@ Option Command::option(const std::string& name, T& value, const std::string& hel
                            std::is_same_v<T, std::vector<std::filesystem::path>>;
   if constexpr (is_text)  // as of --out "$OUT" where OUT is not set, which must not stand for the default
     option->check([](const std::string& text) { return text.empty() ? "is empty; accepted: a value" : ""; });
-  if constexpr (std::is_unsigned_v<T>)  // CLI11 would accept -1
+  if constexpr (std::is_unsigned_v<T> || std::is_same_v<T, std::vector<std::uint64_t>>)  // CLI11 would accept -1
     option->check([](const std::string& text) {
       return text.find('-') == std::string::npos ? "" : "Value " + text + " is below 0";
     });
@@ -80,6 +80,7 @@ template Option Command::option(const std::string&, std::string&, const std::str
 template Option Command::option(const std::string&, std::filesystem::path&, const std::string&) const;
 template Option Command::option(const std::string&, std::vector<std::string>&, const std::string&) const;
 template Option Command::option(const std::string&, std::vector<double>&, const std::string&) const;
+template Option Command::option(const std::string&, std::vector<std::uint64_t>&, const std::string&) const;
 template Option Command::option(const std::string&, std::vector<std::filesystem::path>&, const std::string&) const;
 
 Option Command::flag(const std::string& name, bool& value, const std::string& help) const {

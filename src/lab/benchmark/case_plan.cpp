@@ -5,6 +5,7 @@
 #include <random>
 
 #include "io/files.hpp"
+#include "io/text.hpp"
 #include "lab/benchmark/families.hpp"
 #include "model/effects/registry.hpp"
 
@@ -256,7 +257,14 @@ std::optional<blind::Assignment> reference_of(const PlannedCase& planned, const 
 }
 
 std::vector<PlannedCase> plan_cases(const blind::Family& family, const PlanOptions& options) {
-  return Planner(family, options).run();
+  std::vector<PlannedCase> all = Planner(family, options).run();
+  for (const std::uint64_t number : options.only)
+    if (number < 1 || number > all.size())
+      throw io::InputError(io::format("--only %llu: no such case; accepted: 1 to %zu",
+                                      static_cast<unsigned long long>(number), all.size()));
+  if (!options.only.empty())
+    std::erase_if(all, [&](const PlannedCase& c) { return std::ranges::count(options.only, c.number) == 0; });
+  return all;
 }
 
 }  // namespace flappy::benchmark

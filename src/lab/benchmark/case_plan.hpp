@@ -42,6 +42,8 @@ struct PlanOptions {
   std::vector<std::string> parts;    ///< empty: all
   std::vector<std::string> effects;  ///< robots have these effects of the catalogue alone; empty: all
   std::size_t at_most = 0;           ///< most cases of each part; 0: all
+  std::vector<std::uint64_t>
+      only;  ///< of what is planned by all the rest, the cases of these numbers alone; empty: all
   std::size_t flights = blind::Family::kFlights;  ///< most flights of a session of a contrast
   /// The references of a contrast are of so many sessions. Each number has seeds of its own, and so have benches.
   std::size_t reference_sessions = blind::Family::kFlights;
@@ -49,7 +51,7 @@ struct PlanOptions {
 };
 
 /// Seeds of family b begin at 20,000,000 (development) and 29,000,000 (reported); a and c: 10,000,000 and 30,000,000
-/// likewise.
+/// likewise. io::InputError for parts, effects or numbers that are not there.
 std::vector<PlannedCase> plan_cases(const blind::Family& family, const PlanOptions& options);
 
 }  // namespace flappy::benchmark

@@ -437,6 +437,27 @@ TEST(PlanCases, ReferencesOnABenchAreWholeSessions) {
   EXPECT_NE(plan_cases(family, options).front().seed, c.seed);
 }
 
+TEST(PlanCases, TakesCasesOfSomeNumbersAsTheyAreAmongAll) {
+  std::vector<blind::FamilyEffect> effects(2);
+  effects[0].id = "wind", effects[1].id = "coulomb_friction";
+  const RecordingFamily family("recording", effects);
+  PlanOptions options;
+  options.parts = {"singles"};
+  options.at_most = 4;
+  const std::vector<PlannedCase> all = plan_cases(family, options);
+  ASSERT_EQ(all.size(), 4U);
+  options.only = {4, 2};
+  const std::vector<PlannedCase> some = plan_cases(family, options);
+  ASSERT_EQ(some.size(), 2U);
+  for (const std::size_t i : {0U, 1U}) {
+    EXPECT_EQ(some[i].number, 2 * (i + 1));
+    EXPECT_EQ(some[i].seed, all[some[i].number - 1].seed);
+    EXPECT_EQ(some[i].effects.front().id, all[some[i].number - 1].effects.front().id);
+  }
+  options.only = {5};
+  EXPECT_EQ(test::refusal([&] { plan_cases(family, options); }), "--only 5: no such case; accepted: 1 to 4");
+}
+
 TEST_F(Benchmark, PlansEveryPart) {
   const blind::Family& family = family_named("a");
   const std::vector<PlannedCase> plan = plan_cases(family, {});
