@@ -115,7 +115,6 @@ class Loop {
   bool choose() {
     const Flown any = as_it_is(trains() ? command_.run : command_.also[0]);
     const EscapeRules hover = hover_rules(read_rules(any));
-    const bool own = fs::weakly_canonical(command_.costly) == fs::weakly_canonical(command_.run);
     std::map<std::string, std::size_t> benches;
     io::ProgressLine progress("choosing robots");
     for (const auto& s : benchmarks_) {
@@ -136,7 +135,7 @@ class Loop {
         io::make_folder(r.own);
         if (!command_.costly.empty()) {
           const Flown by = as_it_is(command_.costly);
-          const std::optional<std::size_t> with = succeeded(r, own ? names_[kAsShipped] : "with_effect", r.made, by);
+          const std::optional<std::size_t> with = succeeded(r, name_of_costly(), r.made, by);
           if (!with) return false;
           std::optional<std::size_t> without = *with;
           if (*with < command_.escapes) {
@@ -164,6 +163,16 @@ class Loop {
     fs::path config() const { return rules / "config" / "fly.toml"; }
   };
   static Flown as_it_is(const fs::path& run) { return {run, run}; }
+  /// Name of the counts by which robots are chosen: of the same policy, where that is one of those that fly.
+  std::string name_of_costly() const {
+    const auto is = [&](const fs::path& run) {
+      return fs::weakly_canonical(command_.costly) == fs::weakly_canonical(run);
+    };
+    if (trains() && is(command_.run)) return names_[kAsShipped];
+    for (std::size_t k = 0; k < command_.also.size(); ++k)
+      if (is(command_.also[k])) return names_[own_policies() + k];
+    return "with_effect";
+  }
   static EscapeRules read_rules(const Flown& by) { return read_escape_rules(by.policy(), by.config()); }
 
   /// Flies the escapes of `flown`, which is the robot of `r` or a variant of it, and counts those that succeed. The count is kept in
