@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The table of the blind benchmark: every part, on new robots, of one commit.
 
-    scripts/results/blind_table.py OUT [--cases 4] [--families a b c] [--kinds contrast alone bench both] [--launch "mpirun -n 4"] [--add cases.jsonl ...]
+    scripts/results/blind_table.py OUT [--cases 4] [--skip 0] [--families a b c] [--kinds contrast alone bench both] [--launch "mpirun -n 4"] [--add cases.jsonl ...]
 
 Makes and scores the robots of each family, with what is learnt from the other two, and writes OUT/table.md, and score.csv and cases.jsonl
 of robots in flight and on a bench, OUT/flight and OUT/bench. After any stop, the same command goes on. --launch runs the programs on several ranks, which may be on several machines that
@@ -50,6 +50,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path)
     parser.add_argument("--cases", type=int, default=4, help="of each part at most (4)")
+    parser.add_argument("--skip", type=int, default=0, help="of each part, so many cases before: robots whose labels are open (0)")
     parser.add_argument("--families", nargs="+", default=["a", "b", "c"], choices=["a", "b", "c"])
     parser.add_argument("--kinds", nargs="+", default=list(KINDS), choices=list(KINDS))
     parser.add_argument("--set", default="reported", choices=["reported", "development"])
@@ -84,7 +85,7 @@ def main():
         if (folder / "cases.jsonl").exists():
             continue
         if not (folder / "manifest.json").exists():
-            run(f"make {folder.name}", "make", "--family", family, "--set", o.set, *KINDS[kind], "--cases", o.cases, "--out", folder)
+            run(f"make {folder.name}", "make", "--family", family, "--set", o.set, *KINDS[kind], "--cases", o.cases, "--skip", o.skip, "--out", folder)
             if not (folder / "manifest.json").exists():
                 sys.exit(f"{folder}: stopped; the same command goes on")
         run(f"score {folder.name}", "score", folder, *options[kind, family])

@@ -264,6 +264,8 @@ int main(int argc, char** argv) {
   parts.insert(parts.end(), std::begin(benchmark::kContrastParts), std::end(benchmark::kContrastParts));
   make.option("--part", made.plan.parts, "these parts alone").one_of(parts);
   make.option("--cases", made.plan.at_most, "of each part at most").range(1, 1000);
+  make.option("--skip", made.plan.skip, "of each part, so many cases before: robots whose labels are open")
+      .range(0, 1000);
   make.option("--only", made.plan.only, "of these cases those of these numbers alone");
   make.option("--flights", made.plan.flights, "of each session at most, with --contrast")
       .range(std::size_t{1}, blind::Family::kFlights)

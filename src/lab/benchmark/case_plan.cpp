@@ -139,8 +139,8 @@ class Planner {
   template <class Fill>
   void part(const char* name, std::size_t count, const Fill& fill) {
     if (!options_.parts.empty() && !std::ranges::count(options_.parts, name)) return;
-    if (options_.at_most > 0) count = std::min(count, options_.at_most);
-    for (std::size_t k = 0; k < count; ++k) {
+    if (options_.at_most > 0) count = std::min(count, options_.skip + options_.at_most);
+    for (std::size_t k = options_.skip; k < count; ++k) {
       PlannedCase c;
       c.part = name;
       c.seed = seed_of(name, k);
@@ -258,6 +258,8 @@ std::optional<blind::Assignment> reference_of(const PlannedCase& planned, const 
 
 std::vector<PlannedCase> plan_cases(const blind::Family& family, const PlanOptions& options) {
   std::vector<PlannedCase> all = Planner(family, options).run();
+  if (all.empty() && options.skip > 0)
+    throw io::InputError(io::format("--skip %zu: leaves no case; accepted: less than a part has", options.skip));
   for (const std::uint64_t number : options.only)
     if (number < 1 || number > all.size())
       throw io::InputError(io::format("--only %llu: no such case; accepted: 1 to %zu",

@@ -41,6 +41,7 @@ struct PlanOptions {
   bool contrast = false;             ///< parts of the contrast; false: of the diagnosis without reference flights
   std::vector<std::string> parts;    ///< empty: all
   std::vector<std::string> effects;  ///< robots have these effects of the catalogue alone; empty: all
+  std::size_t skip = 0;              ///< of each part, so many cases are left out before the first
   std::size_t at_most = 0;           ///< most cases of each part; 0: all
   std::vector<std::uint64_t>
       only;  ///< of what is planned by all the rest, the cases of these numbers alone; empty: all

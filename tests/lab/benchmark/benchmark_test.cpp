@@ -458,6 +458,26 @@ TEST(PlanCases, TakesCasesOfSomeNumbersAsTheyAreAmongAll) {
   EXPECT_EQ(test::refusal([&] { plan_cases(family, options); }), "--only 5: no such case; accepted: 1 to 4");
 }
 
+TEST(PlanCases, LeavesOutTheFirstOfEachPart) {
+  std::vector<blind::FamilyEffect> effects(2);
+  effects[0].id = "wind", effects[1].id = "coulomb_friction";
+  const RecordingFamily family("recording", effects);
+  PlanOptions options;
+  options.parts = {"none"};
+  options.at_most = 3;
+  const auto seeds = [&] {
+    std::set<std::uint64_t> all;
+    for (const PlannedCase& c : plan_cases(family, options)) all.insert(c.seed);
+    return all;
+  };
+  const std::uint64_t first = *seeds().begin();
+  EXPECT_EQ(seeds(), (std::set<std::uint64_t>{first, first + 1, first + 2}));
+  options.skip = 2;
+  EXPECT_EQ(seeds(), (std::set<std::uint64_t>{first + 2, first + 3, first + 4}));
+  options.skip = 1000;
+  EXPECT_EQ(test::refusal(seeds), "--skip 1000: leaves no case; accepted: less than a part has");
+}
+
 TEST_F(Benchmark, PlansEveryPart) {
   const blind::Family& family = family_named("a");
   const std::vector<PlannedCase> plan = plan_cases(family, {});
