@@ -39,7 +39,7 @@ endif()
 
 # A robot of a family, A by the interface that all have; what there is not.
 run(effects --family a)
-expect_match("effects of a family" "${out}" "^ground_effect +Hayden.*\noutside_mocap_lens +[^\n]+\n$")
+expect_match("effects of a family" "${out}" "^ground_effect +an image source.*\noutside_mocap_lens +[^\n]+\n$")
 run(fly --family a --hover --own-parameters --conventions --seed 1 --out ${WORK}/family --json ${WORK}/family.json)
 expect_equal("exit code of fly --family: ${err}" "${code}" 0)
 expect_keys(${WORK}/family.json family=STRING seed=NUMBER draw=NUMBER crashes=ARRAY flights=ARRAY)
@@ -80,5 +80,9 @@ expect_refused("${SOURCE}/configs/fly/hover.toml: is nothing that this robot can
 
 # Before hours of work, not after.
 expect_refused("--family d: no such family; accepted: a, b or c" make --family d --set development --out ${WORK}/c)
-expect_refused("flappy-blind: --part: nonsense not in {singles,singles_current,redeclared,none,parameters,own_parameters,conventions,withheld,outside,pairs,hover,changed,changed_short_reference,changed_short_test,unchanged,changed_calm,unchanged_calm,changed_withheld,changed_outside,changed_pairs}; see flappy-blind --help"
+expect_refused("flappy-blind: --part: nonsense not in {singles,singles_current,redeclared,none,parameters,own_parameters,conventions,withheld,outside,pairs,hover,singles_bench,own_parameters_bench,changed,changed_short_reference,changed_short_test,unchanged,changed_calm,unchanged_calm,changed_withheld,changed_outside,changed_pairs}; see flappy-blind --help"
   make --set development --part nonsense --out ${WORK}/c)
+expect_refused("--only 7: no such case; accepted: 1 to 1"
+  make --set development --part none --cases 1 --only 7 --out ${WORK}/c)
+expect_refused("--skip 1000: leaves no case; accepted: less than a part has"
+  make --set development --part none --skip 1000 --out ${WORK}/c)
