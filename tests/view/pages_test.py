@@ -261,7 +261,7 @@ def check_laboratory(browser: Browser) -> None:
     asked = browser.run("return [...document.querySelectorAll('.question')].map((e) => e.textContent)")
     assert "Would a laboratory believe it?" in asked, asked
     shown = browser.run("return [...document.querySelectorAll('figure[data-figure]')].map((e) => e.dataset.figure)")
-    for figure in ("ladder_force", "ladder_kinds_force", "controls", "agreement_1"):
+    for figure in ("ladder_specific_force", "ladder_kinds_specific_force", "controls", "agreement_1"):
         assert figure in shown, f"no {figure} in {shown}"
     words = browser.run("return document.querySelector('article').textContent")
     assert "stroke plane actuation and flapping counter force" in words
