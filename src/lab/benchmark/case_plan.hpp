@@ -41,10 +41,9 @@ struct PlanOptions {
   bool contrast = false;             ///< parts of the contrast; false: of the diagnosis without reference flights
   std::vector<std::string> parts;    ///< empty: all
   std::vector<std::string> effects;  ///< robots have these effects of the catalogue alone; empty: all
-  std::size_t skip = 0;              ///< of each part, so many cases are left out before the first
+  std::size_t skip = 0;              ///< number of cases that each part leaves out, its first ones
   std::size_t at_most = 0;           ///< most cases of each part; 0: all
-  std::vector<std::uint64_t>
-      only;  ///< of what is planned by all the rest, the cases of these numbers alone; empty: all
+  std::vector<std::uint64_t> only;   ///< PlannedCase::number of the cases to keep; empty: all
   std::size_t flights = blind::Family::kFlights;  ///< most flights of a session of a contrast
   /// The references of a contrast are of so many sessions. Each number has seeds of its own, and so have benches.
   std::size_t reference_sessions = blind::Family::kFlights;

@@ -417,10 +417,14 @@ TEST(FlyDrawn, EachSessionHasAllRunsOfABench) {
   EXPECT_EQ(flown(false), (Flown{{0, 0}, {2, 1}, {0, 2}, {1, 0}, {1, 1}, {1, 2}}));
 }
 
-TEST(PlanCases, ReferencesOnABenchAreWholeSessions) {
+std::vector<blind::FamilyEffect> two_effects() {
   std::vector<blind::FamilyEffect> effects(2);
   effects[0].id = "wind", effects[1].id = "coulomb_friction";
-  const RecordingFamily family("recording", effects);
+  return effects;
+}
+
+TEST(PlanCases, ReferencesOnABenchAreWholeSessions) {
+  const RecordingFamily family("recording", two_effects());
   PlanOptions options;
   options.contrast = options.bench = true;
   options.parts = {"unchanged"};
@@ -438,9 +442,7 @@ TEST(PlanCases, ReferencesOnABenchAreWholeSessions) {
 }
 
 TEST(PlanCases, TakesCasesOfSomeNumbersAsTheyAreAmongAll) {
-  std::vector<blind::FamilyEffect> effects(2);
-  effects[0].id = "wind", effects[1].id = "coulomb_friction";
-  const RecordingFamily family("recording", effects);
+  const RecordingFamily family("recording", two_effects());
   PlanOptions options;
   options.parts = {"singles"};
   options.at_most = 4;
@@ -459,9 +461,7 @@ TEST(PlanCases, TakesCasesOfSomeNumbersAsTheyAreAmongAll) {
 }
 
 TEST(PlanCases, LeavesOutTheFirstOfEachPart) {
-  std::vector<blind::FamilyEffect> effects(2);
-  effects[0].id = "wind", effects[1].id = "coulomb_friction";
-  const RecordingFamily family("recording", effects);
+  const RecordingFamily family("recording", two_effects());
   PlanOptions options;
   options.parts = {"none"};
   options.at_most = 3;
